@@ -1,0 +1,95 @@
+"""The contract between the search and what it searches: candidates go in, evaluated points come out, everything is counted.
+
+The search knows full vectors. Of their D entries it alters only the *free* ones (d of them); the others are the memory of a point, which
+the evaluator needs again: for a trajectory, the states from which the next inner solve starts. A black box has no others.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A batch of k evaluated points.
+
+    Attributes
+    ----------
+    Z : array (k, D)
+        Full vectors, in the user's units, as they came back: the nearest feasible points, where there was something to make feasible.
+    F : array (k, m)
+        Objectives, all minimised. NaN in a row whose evaluation failed.
+    violation : array (k,)
+        Largest scaled residual of any constraint, 0 where there is none, infinite where the evaluation failed.
+    status : array (k,) of str
+        "converged" (feasible within the tolerance), "infeasible", "failed" or "timeout".
+    moved : array (k,)
+        Euclidean distance that the inner level moved the free variables, each divided by the span of its bounds.
+    """
+
+    Z: np.ndarray
+    F: np.ndarray
+    violation: np.ndarray
+    status: np.ndarray
+    moved: np.ndarray
+
+
+@dataclass
+class Counts:
+    """What a run has spent so far. `failures` counts the statuses that are not "converged"."""
+
+    evaluations: int = 0
+    inner_iterations: int = 0
+    gradient_solves: int = 0
+    failures: Counter[str] = field(default_factory=Counter)
+
+
+class Evaluator(ABC):
+    """Something whose points can be evaluated.
+
+    An implementation sets the attributes below and defines `first_guess` and `_evaluate`; it never counts.
+
+    Attributes
+    ----------
+    m : int
+        Number of objectives.
+    free : array (d,) of int
+        Indices, in the full vector, of the variables that a search may alter.
+    lower, upper : arrays (d,)
+        Finite bounds of the free variables, in the user's units; `lower < upper`.
+    period : array (d,)
+        Length of the period of a free variable that wraps around at its bounds, which are one period wide; 0 where it does not.
+    tolerance : float
+        A point whose violation is at most this is feasible.
+    counts : Counts
+    """
+
+    m: int
+    free: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    period: np.ndarray
+    tolerance: float
+    counts: Counts
+
+    @abstractmethod
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        """Full vectors (k, D) for candidates (k, d) that nothing is known of yet."""
+
+    @abstractmethod
+    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        """Evaluate full vectors (k, D), k > 0; also returns the inner iterations spent."""
+
+    def evaluate(self, Z: np.ndarray) -> Evaluation:
+        """Evaluate full vectors (k, D): their free entries are the candidates, the others what to start from. Each row counts as one."""
+        evaluation, iterations = self._evaluate(Z)
+        self.counts.evaluations += len(Z)
+        self.counts.inner_iterations += iterations
+        self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
+        return evaluation

@@ -1,0 +1,143 @@
+"""What a problem is once it is stated: plain data and named CasADi Functions, no symbols.
+
+Everything above this floor reads a problem through these classes. They pickle, compare by their fingerprint, and never change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A state, control, parameter or time: its bounds, and how it is shown and scaled.
+
+    `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
+    quantity of which `bounds` hold exactly one period.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    unit: str = ""
+    scale: float = 1.0
+    period: float | None = None
+
+    @property
+    def span(self) -> float:
+        return self.upper - self.lower
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One named row `lower <= expression <= upper`; an equality where both are the same. Infinite where there is no limit."""
+
+    name: str
+    lower: float
+    upper: float
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A named objective as the user stated it; the compiled function returns `sign` times its value, which is always minimised."""
+
+    name: str
+    unit: str = ""
+    sense: str = "minimize"
+    scale: float | None = None
+
+    @property
+    def sign(self) -> float:
+        return 1.0 if self.sense == "minimize" else -1.0
+
+
+@dataclass(frozen=True)
+class Link:
+    """`tf` and the final `states` of phase `first` are `t0` and the initial states of phase `second` (indices of phases)."""
+
+    first: int
+    second: int
+    states: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledPhase:
+    """One phase.
+
+    Every Function takes `(x, u, t, s)`: states (nx), controls (nu), time, and `s = [t0, tf, *parameters]`. `dynamics` returns the rates
+    (nx) per `time_unit`; `paths`, `initials`, `finals`, `integrands`, `peaks` return columns, one row for each expression of that kind.
+    """
+
+    name: str
+    time_unit: str
+    t0: Variable
+    tf: Variable
+    duration: tuple[float, float]
+    states: tuple[Variable, ...]
+    controls: tuple[Variable, ...]
+    initial: tuple[tuple[float, float], ...]
+    """Range of each state at t0; equal ends where the state is fixed."""
+    final: tuple[tuple[float, float], ...]
+    paths: tuple[Limit, ...]
+    guesses: Mapping[str, Any]
+    """By name (states, controls, "t0", "tf"): a number, a pair, or a pair of arrays (times, values)."""
+    dynamics: ca.Function
+    path: ca.Function
+    initials: ca.Function
+    finals: ca.Function
+    integrands: ca.Function
+    peaks: ca.Function
+
+    @property
+    def n_quantities(self) -> int:
+        """Length of the column `q` that objectives and constraints see: t0, tf, initials, finals, integrals, peaks."""
+        return 2 + sum(f.size1_out(0) for f in (self.initials, self.finals, self.integrands, self.peaks))
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledProblem:
+    """A whole problem. `objectives` and `constraints` take `(q of phase 1, ..., q of phase n, parameters)`.
+
+    `objectives` returns the column that is minimised (m); `constraints` the column that `limits` bounds.
+    """
+
+    name: str
+    phases: tuple[CompiledPhase, ...]
+    parameters: tuple[Variable, ...]
+    guesses: Mapping[str, float]
+    goals: tuple[Objective, ...]
+    limits: tuple[Limit, ...]
+    links: tuple[Link, ...]
+    objectives: ca.Function
+    constraints: ca.Function
+    address: str = ""
+    """What `problems.load` made it from; empty for a problem built in a script."""
+    data: Mapping[str, Any] = field(default_factory=dict)
+    """The keyword arguments that `problems.load` was given."""
+
+    @property
+    def signs(self) -> np.ndarray:
+        """+1 for a minimised, -1 for a maximised objective, shape (m,)."""
+        return np.array([goal.sign for goal in self.goals])
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A hash of everything that decides what the problem's trajectories are: two problems with the same one are the same."""
+        digest = hashlib.sha256()
+        for phase in self.phases:
+            digest.update(repr((phase.name, phase.time_unit, phase.t0, phase.tf, phase.duration, phase.states, phase.controls)).encode())
+            digest.update(repr((phase.initial, phase.final, phase.paths)).encode())
+            for function in (phase.dynamics, phase.path, phase.initials, phase.finals, phase.integrands, phase.peaks):
+                digest.update(function.serialize().encode())
+        digest.update(repr((self.name, self.parameters, self.goals, self.limits, self.links)).encode())
+        for function in (self.objectives, self.constraints):
+            digest.update(function.serialize().encode())
+        return digest.hexdigest()[:32]

@@ -1,0 +1,99 @@
+"""Polynomial bases on [-1, 1]: Gauss nodes and weights, Lagrange and Bernstein functions and their derivatives.
+
+Pure functions: arrays in, arrays out. Lagrange functions are evaluated by the barycentric formula (Berrut and Trefethen, "Barycentric
+Lagrange Interpolation", SIAM Review 46(3), 2004), Bernstein functions from their definition (Farouki, "The Bernstein polynomial basis: a
+centennial retrospective", CAGD 29(6), 2012).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.special import comb
+
+BASES = ("lobatto", "legendre", "bernstein")
+
+
+def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The n Gauss-Legendre nodes and weights on [-1, 1]: exact for polynomials of degree 2n - 1."""
+    return legendre.leggauss(n)
+
+
+def lobatto_nodes(n: int) -> np.ndarray:
+    """The n Gauss-Lobatto nodes on [-1, 1], both ends among them: the roots of (1 - t^2) P'_{n-1}(t). For n = 1, the midpoint."""
+    if n == 1:
+        return np.zeros(1)
+    inner = legendre.Legendre.basis(n - 1).deriv().roots().real if n > 2 else np.empty(0)
+    inner = np.sort(inner)
+    return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
+
+
+@lru_cache(maxsize=None)
+def nodes(basis: str, degree: int) -> np.ndarray:
+    """Where the basis' coefficients live on [-1, 1], shape (degree + 1,): the nodes of a Lagrange basis, the abscissae of the Bernstein
+    control points (equally spaced). Raises ValueError for an unknown basis."""
+    if basis == "lobatto":
+        points = lobatto_nodes(degree + 1)
+    elif basis == "legendre":
+        points = gauss_legendre(degree + 1)[0]
+    elif basis == "bernstein":
+        points = np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1)
+    else:
+        raise ValueError(f"unknown basis '{basis}'; there are {', '.join(BASES)}")
+    points.setflags(write=False)
+    return points
+
+
+def lagrange_matrix(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Values of the Lagrange functions on `points` (k,) at `tau` (n,), shape (n, k)."""
+    weights = _barycentric_weights(points)
+    difference = np.asarray(tau, dtype=float)[:, None] - points[None, :]
+    hit = np.abs(difference) < 1e-15
+    terms = weights / np.where(hit, 1.0, difference)
+    values = terms / terms.sum(axis=1, keepdims=True)
+    return np.where(hit.any(axis=1, keepdims=True), hit.astype(float), values)
+
+
+def lagrange_derivative(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Derivatives of the Lagrange functions on `points` (k,) at `tau` (n,), shape (n, k)."""
+    weights = _barycentric_weights(points)
+    difference = points[:, None] - points[None, :] + np.eye(len(points))
+    at_points = (weights[None, :] / weights[:, None]) / difference
+    np.fill_diagonal(at_points, 0.0)
+    np.fill_diagonal(at_points, -at_points.sum(axis=1))
+    return lagrange_matrix(points, tau) @ at_points
+
+
+def bernstein_matrix(degree: int, tau: np.ndarray) -> np.ndarray:
+    """Values of the Bernstein functions of a degree at `tau` (n,), shape (n, degree + 1)."""
+    s = 0.5 * (np.asarray(tau, dtype=float)[:, None] + 1.0)
+    i = np.arange(degree + 1)
+    return comb(degree, i) * s**i * (1.0 - s) ** (degree - i)
+
+
+def bernstein_derivative(degree: int, tau: np.ndarray) -> np.ndarray:
+    """Derivatives of the Bernstein functions of a degree at `tau` (n,), with respect to tau, shape (n, degree + 1)."""
+    if degree == 0:
+        return np.zeros((len(np.atleast_1d(tau)), 1))
+    lower = bernstein_matrix(degree - 1, tau)
+    zero = np.zeros((len(lower), 1))
+    return 0.5 * degree * (np.hstack([zero, lower]) - np.hstack([lower, zero]))
+
+
+def basis_matrix(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
+    """Values of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
+    points = nodes(basis, degree)
+    return bernstein_matrix(degree, tau) if basis == "bernstein" else lagrange_matrix(points, tau)
+
+
+def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
+    """Derivatives of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
+    points = nodes(basis, degree)
+    return bernstein_derivative(degree, tau) if basis == "bernstein" else lagrange_derivative(points, tau)
+
+
+def _barycentric_weights(points: np.ndarray) -> np.ndarray:
+    difference = points[:, None] - points[None, :] + np.eye(len(points))
+    return 1.0 / np.prod(difference, axis=1)

@@ -1,0 +1,128 @@
+"""What a user looks at: the states and controls of one flight, interpolated by the polynomials of the method that made it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.compiled import Limit, Variable
+
+from .polynomials import basis_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewisePolynomial:
+    """Polynomials on consecutive elements, right-continuous.
+
+    Parameters
+    ----------
+    edges : array (N + 1,)
+        Increasing ends of the elements, in time.
+    coefficients : array (N, degree + 1, k)
+        Of `k` quantities in the basis, on each element.
+    basis : str
+        One of `polynomials.BASES`: "lobatto", "legendre" (values at those nodes) or "bernstein".
+    """
+
+    edges: np.ndarray
+    coefficients: np.ndarray
+    basis: str
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """Values at `times` (any shape), with a last axis of length k. Times outside the elements use the nearest element."""
+        times = np.asarray(times, dtype=float)
+        flat = times.ravel()
+        element = np.clip(np.searchsorted(self.edges, flat, side="right") - 1, 0, len(self.edges) - 2)
+        left, right = self.edges[element], self.edges[element + 1]
+        length = np.where(right > left, right - left, 1.0)
+        values = basis_matrix(self.basis, self.coefficients.shape[1] - 1, 2.0 * (flat - left) / length - 1.0)
+        return np.einsum("ni,nik->nk", values, self.coefficients[element]).reshape(*times.shape, self.coefficients.shape[2])
+
+    def on_element(self, j: int, tau: np.ndarray) -> np.ndarray:
+        """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
+        return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseTrajectory:
+    """One phase of a flight, at nodes and between them.
+
+    `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
+    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there. `edge_states` (N + 1, nx) are the states at the ends
+    of the elements, the most accurate the method knows; inside, `state` and `control` interpolate. All in the user's units.
+    """
+
+    name: str
+    time_unit: str
+    time: np.ndarray
+    states: np.ndarray
+    controls: np.ndarray
+    paths: np.ndarray
+    edge_states: np.ndarray
+    state: PiecewisePolynomial
+    control: PiecewisePolynomial
+    state_variables: tuple[Variable, ...]
+    control_variables: tuple[Variable, ...]
+    path_limits: tuple[Limit, ...]
+
+    @property
+    def t0(self) -> float:
+        return float(self.state.edges[0])
+
+    @property
+    def tf(self) -> float:
+        return float(self.state.edges[-1])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, controls and path constraints, in that order."""
+        return tuple(v.name for v in (*self.state_variables, *self.control_variables, *self.path_limits))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values at the nodes (`time`) of the state, control or path constraint called `name`."""
+        if name not in self.names:
+            raise KeyError(f"phase '{self.name}' has no '{name}'; it has {', '.join(self.names)}")
+        return np.hstack([self.states, self.controls, self.paths])[:, self.names.index(name)]
+
+    def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
+        """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.
+
+        At an end of an element the states are the edge states, and a control that jumps there has its value just after the jump.
+
+        Raises
+        ------
+        ValueError
+            If a time lies outside the phase.
+        """
+        times = np.asarray(time, dtype=float)
+        slack = 1e-12 * max(1.0, abs(self.t0), abs(self.tf))
+        if not np.all((times >= self.t0 - slack) & (times <= self.tf + slack)):
+            raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
+        states = self.state(times)
+        edge = np.minimum(np.searchsorted(self.state.edges, times - slack), len(self.state.edges) - 1)
+        on_edge = np.abs(self.state.edges[edge] - times) <= slack
+        states = np.where(on_edge[..., None], self.edge_states[edge], states)
+        values = np.concatenate([states, self.control(times)], axis=-1)
+        return {name: values[..., i] if times.ndim else float(values[..., i]) for i, name in enumerate(self.names[: values.shape[-1]])}
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Mapping[str, PhaseTrajectory]):
+    """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
+
+    phases: tuple[PhaseTrajectory, ...]
+    parameters: Mapping[str, float]
+
+    def __getitem__(self, name: str) -> PhaseTrajectory:
+        for phase in self.phases:
+            if phase.name == name:
+                return phase
+        raise KeyError(f"no phase '{name}'; there are {', '.join(self)}")
+
+    def __iter__(self):
+        return (phase.name for phase in self.phases)
+
+    def __len__(self) -> int:
+        return len(self.phases)
