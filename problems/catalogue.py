@@ -1,0 +1,104 @@
+"""From a name or an address to a Problem."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .problem import Problem
+
+CASES: dict[str, tuple[str, str]] = {
+    "goddard": ("problems.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
+    "orbit_rise": ("problems.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
+    "orbit_rise_full": ("problems.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
+}
+
+
+def names() -> tuple[str, ...]:
+    """The names of the cases that come with the project."""
+    return tuple(CASES)
+
+
+def describe(name: str) -> str:
+    """One line on a case of the catalogue."""
+    return CASES[name][1]
+
+
+def load(name: str, **data: Any) -> Problem:
+    """Make a problem.
+
+    Parameters
+    ----------
+    name : str
+        A case of `names()`, or the address of a function that returns a Problem: "file.py:function" or "package.module:function".
+    **data
+        Keyword arguments for that function.
+
+    Returns
+    -------
+    Problem
+        Its `address` and `data` say where it came from, so that a saved front finds it again.
+
+    Raises
+    ------
+    ValueError
+        There is no such case, file, module or function, or it does not return a Problem.
+    """
+    address = CASES[name][0] if name in CASES else name
+    place, _, function_name = address.rpartition(":")
+    if not place or not function_name:
+        near = difflib.get_close_matches(name, CASES, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        known = ", ".join(CASES)
+        raise ValueError(f"there is no problem '{name}'{hint} There are {known}, or give 'file.py:function' or 'package.module:function'")
+    module = _file_module(place) if place.endswith(".py") else _named_module(place, name)
+    function = getattr(module, function_name, None)
+    if not callable(function):
+        raise ValueError(f"'{place}' has no function '{function_name}'")
+    try:
+        problem = function(**data)
+    except TypeError as error:
+        if data:
+            raise ValueError(f"problem '{name}' does not take {', '.join(data)}: {error}") from error
+        raise
+    if not isinstance(problem, Problem):
+        raise ValueError(f"'{name}' must return a Problem, not {type(problem).__name__}")
+    problem.address, problem.data = _portable(name), data
+    return problem
+
+
+def _portable(name: str) -> str:
+    """The address with which the same file is found from another folder."""
+    place, _, function_name = name.rpartition(":")
+    return f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name
+
+
+def _file_module(place: str) -> ModuleType:
+    path = Path(place).resolve()
+    if not path.is_file():
+        raise ValueError(f"there is no file '{place}'")
+    spec = importlib.util.spec_from_file_location(f"_problem_file_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"'{place}' is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    # As for a script: what stands beside the file can be imported by it.
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    except SyntaxError as error:
+        raise ValueError(f"'{place}' is not valid Python: {error}") from error
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
+
+
+def _named_module(place: str, name: str) -> ModuleType:
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        raise ValueError(f"there is no module '{place}' for the problem '{name}': {error}") from error

@@ -1,0 +1,129 @@
+"""Checks of what a user states. Each raises a ValueError of one line that names the user's own thing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+
+def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
+    """A new name: a non-empty string that is not among `taken`."""
+    if not isinstance(name, str) or not name.strip():
+        raise ValueError(f"{place}: the name of a {kind} must be a non-empty string, not {name!r}")
+    if name in taken:
+        raise ValueError(f"{place}: the name '{name}' is used twice")
+    return name
+
+
+def number(value: Any, what: str) -> float:
+    """A finite real number."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError, RuntimeError, NotImplementedError):
+        raise ValueError(f"{what} must be a number, not {value!r}") from None
+    if not math.isfinite(result):
+        raise ValueError(f"{what} must be finite, not {result}")
+    return result
+
+
+def interval(value: Any, what: str) -> tuple[float, float]:
+    """A finite pair (lower, upper), lower <= upper."""
+    try:
+        lower, upper = value
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be a pair (lower, upper), not {value!r}") from None
+    lower, upper = number(lower, f"the lower end of {what}"), number(upper, f"the upper end of {what}")
+    if lower > upper:
+        raise ValueError(f"{what} is an empty interval: {lower:g} > {upper:g}")
+    return lower, upper
+
+
+def fixed_or_interval(value: Any, what: str) -> tuple[float, float]:
+    """A number, which is fixed, or a pair, which is free within it."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and np.ndim(value) == 1:
+        return interval(value, what)
+    fixed = number(value, what)
+    return fixed, fixed
+
+
+def within(inner: tuple[float, float], outer: tuple[float, float], what: str) -> tuple[float, float]:
+    """`inner`, if it lies inside `outer`."""
+    if inner[0] < outer[0] or inner[1] > outer[1]:
+        shown = f"{inner[0]:g}" if inner[0] == inner[1] else f"({inner[0]:g}, {inner[1]:g})"
+        raise ValueError(f"{what} is {shown}, outside its bounds ({outer[0]:g}, {outer[1]:g})")
+    return inner
+
+
+def intersection(first: tuple[float, float], second: tuple[float, float], what: str) -> tuple[float, float]:
+    """What two intervals share; an error if they share nothing."""
+    lower, upper = max(first[0], second[0]), min(first[1], second[1])
+    if lower > upper:
+        raise ValueError(f"{what}: nothing lies both in ({first[0]:g}, {first[1]:g}) and in ({second[0]:g}, {second[1]:g})")
+    return lower, upper
+
+
+def scale(value: Any, default: float, what: str) -> float:
+    """A positive number, or the default where none is given."""
+    if value is None:
+        return default
+    result = number(value, f"the scale of {what}")
+    if result <= 0:
+        raise ValueError(f"the scale of {what} must be positive, not {result:g}")
+    return result
+
+
+def one_sided(lower: Any, upper: Any, what: str) -> tuple[float, float]:
+    """Limits of which at least one is given; the other is infinite."""
+    if lower is None and upper is None:
+        raise ValueError(f"{what} has neither a lower nor an upper limit")
+    low = -math.inf if lower is None else number(lower, f"the lower limit of {what}")
+    high = math.inf if upper is None else number(upper, f"the upper limit of {what}")
+    if low > high:
+        raise ValueError(f"{what} is an empty interval: {low:g} > {high:g}")
+    return low, high
+
+
+def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
+    """A period, whose length must be that of the bounds."""
+    if value is None:
+        return None
+    length = number(value, f"the period of {what}")
+    if length <= 0 or not math.isclose(length, bounds[1] - bounds[0], rel_tol=1e-9):
+        raise ValueError(f"the bounds of {what} must be one period ({length:g}) wide, not ({bounds[0]:g}, {bounds[1]:g})")
+    return length
+
+
+def expression(value: Any, known: Mapping[int, str], what: str, hint: str) -> ca.MX:
+    """A scalar CasADi expression of known symbols only (by hash); plain numbers are expressions too."""
+    if isinstance(value, ca.MX):
+        if value.shape != (1, 1):
+            raise ValueError(f"{what} must be a scalar, not of shape {value.shape}")
+        for symbol in ca.symvar(value):
+            if symbol.__hash__() not in known:
+                raise ValueError(f"{what} uses '{symbol.name()}', {hint}")
+        if value.is_constant() and not math.isfinite(float(value)):
+            raise ValueError(f"{what} must be finite, not {float(value)}")
+        return value
+    return ca.MX(number(value, what))
+
+
+def guess(value: Any, what: str) -> Any:
+    """A number, a pair of numbers (a straight line), or (times, values): two sequences of the same length, times increasing."""
+    if np.ndim(value) == 0 and not isinstance(value, Sequence):
+        return number(value, what)
+    try:
+        first, second = value
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be a number, a pair of numbers or a pair (times, values)") from None
+    if np.ndim(first) == 0 and np.ndim(second) == 0:
+        return number(first, what), number(second, what)
+    times, values = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
+        raise ValueError(f"{what}: times and values must be two sequences of the same length, at least 2")
+    if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values)) and np.all(np.diff(times) > 0)):
+        raise ValueError(f"{what}: times must increase, and all must be finite")
+    return times, values

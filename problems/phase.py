@@ -1,0 +1,219 @@
+"""One phase of a problem, as its user states it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+
+from . import checks
+from .compiled import CompiledPhase, Limit, Variable
+from .functions import vector_function
+
+if TYPE_CHECKING:
+    from .problem import Problem
+
+_KINDS = ("initial", "final", "integral", "peak")
+
+
+class Phase:
+    """A stretch of time with its own states, controls and dynamics. Made by `Problem.phase`.
+
+    Attributes
+    ----------
+    name : str
+    time, t0, tf : MX
+        Time, and the times at which the phase begins and ends: always symbols, usable in any expression of the phase.
+    """
+
+    def __init__(self, problem: Problem, name: str, t0: Any, tf: Any, duration: Any, time_unit: str) -> None:
+        self._problem = problem
+        self.name = name
+        self._time_unit = time_unit
+        self._t0_range = checks.fixed_or_interval(t0, f"phase '{name}': t0")
+        self._tf_range = checks.fixed_or_interval(tf, f"phase '{name}': tf")
+        length = (0.0, float("inf")) if duration is None else checks.fixed_or_interval(duration, f"phase '{name}': duration")
+        if length[1] <= 0 or length[0] < 0:
+            raise ValueError(f"phase '{name}': the duration must be positive, not ({length[0]:g}, {length[1]:g})")
+        self._duration = length
+        self.time, self.t0, self.tf = (ca.MX.sym(f"{word} of {name}") for word in ("time", "t0", "tf"))
+        self._symbols: dict[str, ca.MX] = {}
+        self._states: dict[str, Variable] = {}
+        self._controls: dict[str, Variable] = {}
+        self._initial: dict[str, tuple[float, float]] = {}
+        self._final: dict[str, tuple[float, float]] = {}
+        self._rates: dict[str, ca.MX] = {}
+        self._paths: dict[str, tuple[Limit, ca.MX]] = {}
+        self._quantities: dict[str, list[tuple[ca.MX, ca.MX]]] = {kind: [] for kind in _KINDS}
+        self._guesses: dict[str, Any] = {}
+
+    def __repr__(self) -> str:
+        return f"Phase('{self.name}', states=[{', '.join(self._states)}], controls=[{', '.join(self._controls)}])"
+
+    def __getitem__(self, name: str) -> ca.MX:
+        """The symbol of a state or control."""
+        if name not in self._symbols:
+            raise KeyError(f"phase '{self.name}' has no '{name}'; it has {', '.join(self._symbols) or 'nothing yet'}")
+        return self._symbols[name]
+
+    def state(
+        self, name: str, *, bounds: Any, initial: Any = None, final: Any = None, unit: str = "", scale: float | None = None
+    ) -> ca.MX:
+        """Declare a state.
+
+        Parameters
+        ----------
+        bounds : pair
+            Finite limits, all along the phase.
+        initial, final : None, float or pair
+            Free within the bounds, fixed, or free within a range, at t0 and at tf.
+        unit : str
+            A label, carried to tables, plots and files.
+        scale : float, optional
+            What counts as one in residuals; the span of the bounds by default.
+
+        Returns
+        -------
+        MX
+            Its symbol.
+        """
+        what = self._new_name("state", name)
+        limits = checks.interval(bounds, f"the bounds of {what}")
+        if limits[0] == limits[1]:
+            raise ValueError(f"the bounds of {what} hold one value only, {limits[0]:g}; a constant is no state")
+        ends = []
+        for word, value in (("initial", initial), ("final", final)):
+            end = limits if value is None else checks.fixed_or_interval(value, f"the {word} value of {what}")
+            ends.append(checks.within(end, limits, f"the {word} value of {what}"))
+        self._states[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0], what))
+        self._initial[name], self._final[name] = ends
+        return self._new_symbol(name)
+
+    def control(self, name: str, *, bounds: Any, unit: str = "", period: float | None = None, scale: float | None = None) -> ca.MX:
+        """Declare a control within finite bounds.
+
+        Parameters
+        ----------
+        period : float, optional
+            For an angle that wraps around: the bounds are then one period wide, and the ends are the same value.
+
+        Returns
+        -------
+        MX
+            Its symbol.
+        """
+        what = self._new_name("control", name)
+        limits = checks.interval(bounds, f"the bounds of {what}")
+        length = checks.period(period, limits, what)
+        self._controls[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0] or 1.0, what), length)
+        return self._new_symbol(name)
+
+    def dynamics(self, **rates: Any) -> None:
+        """Give the rate of every state, per `time_unit`: an expression of the phase's symbols and the parameters, or a number."""
+        place = f"phase '{self.name}'"
+        if self._rates:
+            raise ValueError(f"{place}: dynamics are given twice")
+        self._check_rates(rates)
+        self._rates = {name: self._expression(rates[name], f"{place}: the rate of '{name}'") for name in self._states}
+
+    def path(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
+        """Limit an expression all along the phase; an equality where both limits are the same."""
+        what = self._new_name("path", name)
+        limits = checks.one_sided(lower, upper, what)
+        span = limits[1] - limits[0]
+        default = span if 0 < span < float("inf") else 1.0
+        self._paths[name] = Limit(name, *limits, checks.scale(scale, default, what)), self._expression(expr, what)
+
+    def initial(self, expr: Any) -> ca.MX:
+        """The value of an expression of the phase's symbols at t0, for use in objectives and constraints."""
+        return self._quantity("initial", expr)
+
+    def final(self, expr: Any) -> ca.MX:
+        """The value of an expression of the phase's symbols at tf, for use in objectives and constraints."""
+        return self._quantity("final", expr)
+
+    def integral(self, expr: Any) -> ca.MX:
+        """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints."""
+        return self._quantity("integral", expr)
+
+    def peak(self, expr: Any) -> ca.MX:
+        """The maximum over time of an expression of the phase's symbols, for use in objectives and constraints.
+
+        It may be minimised or bounded above; a minimum over time is `-peak(-expr)`.
+        """
+        return self._quantity("peak", expr)
+
+    def guess(self, **values: Any) -> None:
+        """Say from where to start: states, controls, `t0` and `tf` by name. A number, a pair for a straight line, or (times, values)."""
+        for name, value in values.items():
+            what = f"phase '{self.name}': the guess of '{name}'"
+            if name not in self._symbols and name not in ("t0", "tf"):
+                raise ValueError(f"{what}: there is no such state, control or time; there are {', '.join((*self._symbols, 't0', 'tf'))}")
+            self._guesses[name] = checks.number(value, what) if name in ("t0", "tf") else checks.guess(value, what)
+
+    def _new_name(self, kind: str, name: str) -> str:
+        taken = {*self._symbols, *self._paths, "time", "t0", "tf"}
+        place = f"phase '{self.name}'"
+        return f"{kind} '{checks.name_of(kind, name, taken, place)}' of {place}"
+
+    def _new_symbol(self, name: str) -> ca.MX:
+        self._symbols[name] = ca.MX.sym(name)
+        return self._symbols[name]
+
+    def _known(self) -> dict[int, str]:
+        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._problem.parameters.values()]
+        return {symbol.__hash__(): symbol.name() for symbol in own}
+
+    def _expression(self, value: Any, what: str) -> ca.MX:
+        hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem.name}'"
+        return checks.expression(value, self._known(), what, hint)
+
+    def _quantity(self, kind: str, expr: Any) -> ca.MX:
+        inner = self._expression(expr, f"phase '{self.name}': the expression of {kind}(...)")
+        symbol = ca.MX.sym(f"{kind}({inner}) of {self.name}")
+        self._quantities[kind].append((symbol, inner))
+        return symbol
+
+    def _check_rates(self, given: Any) -> None:
+        if set(given) != set(self._states):
+            raise ValueError(f"phase '{self.name}': dynamics given for [{', '.join(given)}], states are [{', '.join(self._states)}]")
+
+    def _quantity_symbols(self) -> list[ca.MX]:
+        """What objectives and constraints may use of this phase, in the order of `CompiledPhase.n_quantities`."""
+        return [self.t0, self.tf, *(symbol for kind in _KINDS for symbol, _ in self._quantities[kind])]
+
+    def _compile(self) -> CompiledPhase:
+        """Plain data and Functions; ranges as stated, before links narrow them."""
+        if not self._states:
+            raise ValueError(f"phase '{self.name}' has no state")
+        self._check_rates(self._rates)
+        groups = {
+            "x": [self._symbols[name] for name in self._states],
+            "u": [self._symbols[name] for name in self._controls],
+            "t": [self.time],
+            "s": [self.t0, self.tf, *self._problem.parameters.values()],
+        }
+
+        def function(name: str, expressions: list[ca.MX]) -> ca.Function:
+            return vector_function(name, groups, expressions)
+
+        return CompiledPhase(
+            name=self.name,
+            time_unit=self._time_unit,
+            t0=Variable("t0", *self._t0_range, self._time_unit),
+            tf=Variable("tf", *self._tf_range, self._time_unit),
+            duration=self._duration,
+            states=tuple(self._states.values()),
+            controls=tuple(self._controls.values()),
+            initial=tuple(self._initial.values()),
+            final=tuple(self._final.values()),
+            paths=tuple(limit for limit, _ in self._paths.values()),
+            guesses=dict(self._guesses),
+            dynamics=function("dynamics", list(self._rates.values())),
+            path=function("path", [expr for _, expr in self._paths.values()]),
+            initials=function("initials", [expr for _, expr in self._quantities["initial"]]),
+            finals=function("finals", [expr for _, expr in self._quantities["final"]]),
+            integrands=function("integrands", [expr for _, expr in self._quantities["integral"]]),
+            peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
+        )
+

@@ -1,0 +1,258 @@
+"""The builder: a multi-objective optimal control problem, stated with CasADi expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from . import checks
+from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
+from .functions import vector_function
+from .phase import Phase
+
+
+class Problem:
+    """A multi-objective optimal control problem: phases, parameters, objectives, constraints and links.
+
+    Every mistake that can be seen at once raises a ValueError that names it; the rest is found by `compile`, before any work.
+
+    Attributes
+    ----------
+    default_transcription, default_evaluations, verify_tolerance : str, int, float
+        What the command line uses when it is told nothing else. A case may set its own.
+
+    Examples
+    --------
+    >>> problem = Problem("coast")
+    >>> phase = problem.phase("glide", t0=0.0, tf=(1.0, 2.0))
+    >>> x = phase.state("x", bounds=(0, 10), initial=0)
+    >>> phase.dynamics(x=1.0)
+    >>> problem.minimize("time", phase.tf, unit="s")
+    >>> problem.maximize("distance", phase.final(x))
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = checks.name_of("problem", name, (), "Problem")
+        self.address = ""
+        self.data: Mapping[str, Any] = {}
+        self.default_transcription = "dfet:8x3"
+        self.default_evaluations = 10_000
+        self.verify_tolerance = 1e-2
+        self._phases: dict[str, Phase] = {}
+        self._parameters: dict[str, tuple[Variable, ca.MX]] = {}
+        self._objectives: dict[str, tuple[Objective, ca.MX]] = {}
+        self._constraints: dict[str, tuple[Limit, ca.MX]] = {}
+        self._links: list[Link] = []
+        self._guesses: dict[str, float] = {}
+
+    def __repr__(self) -> str:
+        return f"Problem('{self.name}', phases=[{', '.join(self._phases)}], objectives=[{', '.join(self._objectives)}])"
+
+    @property
+    def phases(self) -> Mapping[str, Phase]:
+        """Phases by name."""
+        return MappingProxyType(self._phases)
+
+    @property
+    def parameters(self) -> Mapping[str, ca.MX]:
+        """Symbols of the parameters by name."""
+        return MappingProxyType({name: symbol for name, (_, symbol) in self._parameters.items()})
+
+    @property
+    def objectives(self) -> Mapping[str, ca.MX]:
+        """Expressions of the objectives by name, as the user stated them."""
+        return MappingProxyType({name: expr for name, (_, expr) in self._objectives.items()})
+
+    def phase(self, name: str, *, t0: Any, tf: Any, duration: Any = None, time_unit: str = "s") -> Phase:
+        """Add a phase.
+
+        Parameters
+        ----------
+        t0, tf : float or pair
+            Absolute times: a number is fixed, a pair is free within it.
+        duration : float or pair, optional
+            Limits of tf - t0, which is never negative.
+        time_unit : str
+            A label; the dynamics are rates per this unit.
+
+        Returns
+        -------
+        Phase
+        """
+        checks.name_of("phase", name, self._phases, f"problem '{self.name}'")
+        self._phases[name] = Phase(self, name, t0, tf, duration, time_unit)
+        return self._phases[name]
+
+    def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None) -> ca.MX:
+        """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase."""
+        place = f"problem '{self.name}'"
+        what = f"parameter '{checks.name_of('parameter', name, self._parameters, place)}' of {place}"
+        limits = checks.interval(bounds, f"the bounds of {what}")
+        symbol = ca.MX.sym(name)
+        default = limits[1] - limits[0] or 1.0
+        self._parameters[name] = Variable(name, *limits, unit, checks.scale(scale, default, what)), symbol
+        return symbol
+
+    def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
+        """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases."""
+        place = f"problem '{self.name}'"
+        what = f"constraint '{checks.name_of('constraint', name, self._constraints, place)}' of {place}"
+        limits = checks.one_sided(lower, upper, what)
+        span = limits[1] - limits[0]
+        default = span if 0 < span < float("inf") else 1.0
+        self._constraints[name] = Limit(name, *limits, checks.scale(scale, default, what)), self._expression(expr, what)
+
+    def link(self, first: Phase, second: Phase, *, states: Any = None) -> None:
+        """Make phase `second` begin when and where phase `first` ends.
+
+        Parameters
+        ----------
+        states : sequence of str, optional
+            The states that are continuous; by default all that have the same name in both. Time always is. For a jump, leave a state
+            out and state it with `constraint`.
+        """
+        numbers = []
+        for phase in (first, second):
+            if not isinstance(phase, Phase) or self._phases.get(phase.name) is not phase:
+                raise ValueError(f"problem '{self.name}': link takes two of its phases, not {phase!r}")
+            numbers.append(list(self._phases).index(phase.name))
+        place = f"the link from phase '{first.name}' to phase '{second.name}'"
+        common = [name for name in first._states if name in second._states]
+        chosen = common if states is None else [states] if isinstance(states, str) else list(states)
+        for name in chosen:
+            if name not in common:
+                raise ValueError(f"{place}: '{name}' is not a state of both; they share {', '.join(common) or 'none'}")
+        if any((link.first, link.second) == tuple(numbers) for link in self._links):
+            raise ValueError(f"{place} is given twice")
+        if numbers[0] == numbers[1] or numbers[0] in _after(self._links, numbers[1]):
+            raise ValueError(f"{place} would make time run in a circle; state a periodic condition with `constraint`")
+        self._links.append(Link(numbers[0], numbers[1], tuple(chosen)))
+
+    def minimize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
+        """Add an objective to be minimised: an expression of the same kind as a constraint's."""
+        self._objective(name, expr, unit, "minimize", scale)
+
+    def maximize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
+        """Add an objective to be maximised: an expression of the same kind as a constraint's."""
+        self._objective(name, expr, unit, "maximize", scale)
+
+    def guess(self, **parameters: float) -> None:
+        """Say from where to start: parameters by name."""
+        for name, value in parameters.items():
+            what = f"problem '{self.name}': the guess of parameter '{name}'"
+            if name not in self._parameters:
+                raise ValueError(f"{what}: there is no such parameter; there are {', '.join(self._parameters) or 'none'}")
+            self._guesses[name] = checks.number(value, what)
+
+    def compile(self) -> CompiledProblem:
+        """Check the whole and turn it into plain data and named CasADi Functions, which pickle.
+
+        Raises
+        ------
+        ValueError
+            No phase, no objective, a phase without states or dynamics, rates that are NaN, ranges or links that leave nothing.
+        """
+        place = f"problem '{self.name}'"
+        if not self._phases:
+            raise ValueError(f"{place} has no phase")
+        if not self._objectives:
+            raise ValueError(f"{place} has no objective; add one with minimize or maximize")
+        phases = _narrowed([phase._compile() for phase in self._phases.values()], self._links)
+        parameters = tuple(variable for variable, _ in self._parameters.values())
+        for phase in phases:
+            _check_rates_are_numbers(phase, parameters)
+        groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(self._phases.values())}
+        groups["p"] = list(self.parameters.values())
+        goals = tuple(goal for goal, _ in self._objectives.values())
+        minimised = [goal.sign * expr for goal, expr in self._objectives.values()]
+        return CompiledProblem(
+            name=self.name,
+            phases=tuple(phases),
+            parameters=parameters,
+            guesses=dict(self._guesses),
+            goals=goals,
+            limits=tuple(limit for limit, _ in self._constraints.values()),
+            links=tuple(self._links),
+            objectives=vector_function("objectives", groups, minimised),
+            constraints=vector_function("constraints", groups, [expr for _, expr in self._constraints.values()]),
+            address=self.address,
+            data=dict(self.data),
+        )
+
+    def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
+        place = f"problem '{self.name}'"
+        what = f"objective '{checks.name_of('objective', name, self._objectives, place)}' of {place}"
+        factor = None if scale is None else checks.scale(scale, 1.0, what)
+        self._objectives[name] = Objective(name, unit, sense, factor), self._expression(expr, what)
+
+    def _expression(self, value: Any, what: str) -> ca.MX:
+        known = {symbol.__hash__(): symbol.name() for phase in self._phases.values() for symbol in phase._quantity_symbols()}
+        known |= {symbol.__hash__(): name for name, symbol in self.parameters.items()}
+        hint = (
+            f"which is not of problem '{self.name}' or varies along a phase: "
+            "use initial(...), final(...), integral(...) or peak(...) of a phase, times and parameters"
+        )
+        return checks.expression(value, known, what, hint)
+
+
+def _after(links: list[Link], start: int) -> set[int]:
+    """Indices of the phases that follow phase `start`, directly or not."""
+    reached: set[int] = set()
+    frontier = [start]
+    while frontier:
+        current = frontier.pop()
+        following = {link.second for link in links if link.first == current} - reached
+        reached |= following
+        frontier.extend(following)
+    return reached
+
+
+def _narrowed(phases: list[CompiledPhase], links: list[Link]) -> list[CompiledPhase]:
+    """The phases with the ranges of their times and boundary states narrowed by durations and links; an error if nothing is left."""
+    for _ in range(len(phases) + 1):
+        for link in links:
+            first, second = phases[link.first], phases[link.second]
+            what = f"the link from phase '{first.name}' to phase '{second.name}'"
+            joint = checks.intersection((first.tf.lower, first.tf.upper), (second.t0.lower, second.t0.upper), f"{what}, time")
+            final, initial = list(first.final), list(second.initial)
+            names = [[state.name for state in phase.states] for phase in (first, second)]
+            for name in link.states:
+                i, j = names[0].index(name), names[1].index(name)
+                final[i] = initial[j] = checks.intersection(final[i], initial[j], f"{what}, state '{name}'")
+            phases[link.first] = replace(first, tf=_ranged(first.tf, joint), final=tuple(final))
+            phases[link.second] = replace(second, t0=_ranged(second.t0, joint), initial=tuple(initial))
+        phases = [_with_times_narrowed(phase) for phase in phases]
+    return phases
+
+
+def _with_times_narrowed(phase: CompiledPhase) -> CompiledPhase:
+    what, (shortest, longest) = f"phase '{phase.name}', duration", phase.duration
+    t0, tf = phase.t0, phase.tf
+    end = checks.intersection((tf.lower, tf.upper), (t0.lower + shortest, t0.upper + longest), what)
+    start = checks.intersection((t0.lower, t0.upper), (end[0] - longest, end[1] - shortest), what)
+    if end[1] <= start[0]:
+        raise ValueError(f"phase '{phase.name}' has no duration: t0 is at least {start[0]:g} and tf at most {end[1]:g}")
+    return replace(phase, t0=_ranged(t0, start), tf=_ranged(tf, end))
+
+
+def _ranged(variable: Variable, limits: tuple[float, float]) -> Variable:
+    return replace(variable, lower=limits[0], upper=limits[1], scale=limits[1] - limits[0] or 1.0)
+
+
+def _check_rates_are_numbers(phase: CompiledPhase, parameters: tuple[Variable, ...]) -> None:
+    """A rate that is NaN or infinite wherever we look is a mistake in its expression (a division by zero, a root of something negative)."""
+    rng = np.random.default_rng(0)
+    groups = [phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *parameters)]
+    share = rng.random((sum(len(group) for group in groups), 64))
+    variables = [variable for group in groups for variable in group]
+    lower = np.array([[v.lower] for v in variables])
+    samples = lower + share * (np.array([[v.upper] for v in variables]) - lower)
+    rates = np.array(phase.dynamics(*np.split(samples, np.cumsum([len(group) for group in groups])[:-1])))
+    for state, values in zip(phase.states, rates, strict=True):
+        if not np.isfinite(values).any():
+            raise ValueError(f"phase '{phase.name}': the rate of '{state.name}' is not a finite number anywhere within the bounds")
