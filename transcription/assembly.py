@@ -1,0 +1,215 @@
+"""From the phases that a method writes to one NLP: what every transcription shares.
+
+Times, parameters and links become variables, durations and the user's constraints rows, and the quantities of all phases meet in the
+objectives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase, CompiledProblem, Variable
+
+from .base import NLP, Transcription, expanded
+from .guess import along
+from .layout import Layout
+from .phase_writer import Ends, PhaseWriter, Rows
+from .trajectory import Trajectory
+
+WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
+
+
+class Assembly:
+    """Lays out the variables of a problem and lets a method write each phase.
+
+    Linked quantities share one variable, so that links hold exactly; only where several phases lead into the same one do the further links
+    become rows.
+    """
+
+    def __init__(self, problem: CompiledProblem, writer: WriterFactory) -> None:
+        self.problem = problem
+        self.layout = Layout()
+        self._joined: list[tuple[int, int, float, str]] = []
+        self.parameters = np.array([self.layout.add(v, free=True) for v in problem.parameters], dtype=int)
+        self._writers: dict[int, PhaseWriter] = {}
+        for i in _in_order_of_time(problem):
+            self._writers[i] = writer(problem.phases[i], self.layout, self._ends(i))
+        self._peaks = [self._add_peaks(phase) for phase in problem.phases]
+
+    def nlp(self, transcription: Transcription) -> NLP:
+        """The whole NLP."""
+        z = ca.MX.sym("z", len(self.layout.variables))
+        extended = self.layout.extended_symbol(z)
+        rows = Rows()
+        quantities, largest = [], []
+        for i in range(len(self.problem.phases)):
+            q, peaks = self._write_phase(i, extended, rows)
+            quantities.append(q)
+            largest.append(peaks)
+        self._write_problem(extended, quantities, rows)
+        p = self.layout.pick(extended, self.parameters)
+        F = ca.densify(self.problem.objectives(*quantities, p))
+        g = ca.densify(ca.vertcat(*rows.expressions))
+        self._largest = expanded(ca.Function("largest", [z], [ca.vertcat(*largest)], ["z"], ["peaks"]))
+        return NLP(
+            problem=self.problem,
+            transcription=transcription,
+            variables=tuple(self.layout.variables),
+            free=np.array(self.layout.free, dtype=int),
+            functions=expanded(ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])),
+            g_lower=np.concatenate(rows.lower),
+            g_upper=np.concatenate(rows.upper),
+            g_scale=np.concatenate(rows.scale),
+            g_labels=tuple(rows.labels),
+            guess=self.guess(),
+            first_guess=self.first_guess,
+            march=self.march,
+            marches_exactly=self._marches_exactly(rows),
+            tighten=self.tighten,
+            unpack=self.unpack,
+        )
+
+    def guess(self) -> np.ndarray:
+        """See `NLP.guess`."""
+        found = {int(slot): self.problem.guesses.get(v.name, np.nan) for v, slot in zip(self.problem.parameters, self.parameters, strict=True)}
+        for writer in self._writers.values():
+            times = []
+            for variable, slot in ((writer.phase.t0, writer.ends.t0), (writer.phase.tf, writer.ends.tf)):
+                given = writer.phase.guesses.get(variable.name)
+                if given is not None:
+                    found[slot] = float(np.clip(given, variable.lower, variable.upper))
+                times.append(found.get(slot, 0.5 * (variable.lower + variable.upper)))
+            for state, (low, high), slot in zip(writer.phase.states, writer.phase.initial, writer.ends.initial, strict=True):
+                if state.name in writer.phase.guesses:
+                    given = along(writer.phase.guesses[state.name], *(np.array([t]) for t in times), np.zeros(1))
+                    found.setdefault(int(slot), float(np.clip(given[0, 0], low, high)))
+            found |= writer.guess_controls(*times)
+        return np.array([found.get(slot, np.nan) for slot in self.layout.free])
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        """See `NLP.first_guess`."""
+        Z = np.zeros((len(candidates), len(self.layout.variables)))
+        Z[:, self.layout.free] = candidates
+        extended = self.layout.extended(Z)
+        for writer in self._writers.values():
+            writer.guess(extended)
+        return self.tighten(extended[:, : Z.shape[1]])
+
+    def march(self, Z: np.ndarray) -> np.ndarray:
+        """See `NLP.march`."""
+        extended = self.layout.extended(Z)
+        for writer in self._writers.values():
+            writer.march(extended)
+        return self.tighten(extended[:, : Z.shape[1]])
+
+    def tighten(self, Z: np.ndarray) -> np.ndarray:
+        """See `NLP.tighten`."""
+        slots = np.concatenate(self._peaks)
+        if not len(slots):
+            return Z
+        Z = Z.copy()
+        Z[:, slots] = np.array(self._largest(Z.T)).T
+        return Z
+
+    def unpack(self, z: np.ndarray) -> Trajectory:
+        """See `NLP.unpack`."""
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        phases = tuple(self._writers[i].unpack(extended) for i in range(len(self.problem.phases)))
+        return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in zip(self.problem.parameters, self.parameters, strict=True)})
+
+    def _ends(self, i: int) -> Ends:
+        """Slots of the ends of phase i: new variables, but for those that a link shares with a phase written before."""
+        phase = self.problem.phases[i]
+        prefix = f"{phase.name}."
+        shared: dict[str, int] = {}
+        for link in self.problem.links:
+            if link.second != i:
+                continue
+            before = self._writers[link.first]
+            finals = {v.name: int(slot) for v, slot in zip(before.phase.states, before.ends.final, strict=True)}
+            for name, slot in [("t0", before.ends.tf), *((state, finals[state]) for state in link.states)]:
+                if name in shared and shared[name] != slot:
+                    label = f"link from '{before.phase.name}' to '{phase.name}': {name}"
+                    scale = before.phase.tf.scale if name == "t0" else next(v.scale for v in phase.states if v.name == name)
+                    self._joined.append((shared[name], slot, scale, label))
+                shared.setdefault(name, slot)
+
+        def end(variable: Variable, word: str, limits: tuple[float, float], free: bool) -> int:
+            return self.layout.add(replace(variable, name=f"{prefix}{variable.name}{word}", lower=limits[0], upper=limits[1]), free=free)
+
+        t0, tf = phase.t0, phase.tf
+        slot_t0 = shared["t0"] if "t0" in shared else end(t0, "", (t0.lower, t0.upper), True)
+        slot_tf = end(tf, "", (tf.lower, tf.upper), True)
+        initial = [
+            shared[v.name] if v.name in shared else end(v, "(t0)", limits, True)
+            for v, limits in zip(phase.states, phase.initial, strict=True)
+        ]
+        final = [end(v, "(tf)", limits, False) for v, limits in zip(phase.states, phase.final, strict=True)]
+        return Ends(slot_t0, slot_tf, np.array(initial), np.array(final), self.parameters)
+
+    def _add_peaks(self, phase: CompiledPhase) -> np.ndarray:
+        """Slots of the phase's peaks: variables without bounds, of the size that the expression has in the middle of its range."""
+        count = phase.peaks.size1_out(0)
+        if not count:
+            return np.empty(0, dtype=int)
+        groups = [phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *self.problem.parameters)]
+        middle = [np.array([0.5 * (v.lower + v.upper) for v in group]) for group in groups]
+        sizes = np.abs(np.array(phase.peaks(*middle))).ravel()
+        scales = np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
+        names = [f"{phase.name}.peak[{k}]" for k in range(count)]
+        return np.array([self.layout.add(Variable(n, -np.inf, np.inf, "", float(s))) for n, s in zip(names, scales, strict=True)])
+
+    def _write_phase(self, i: int, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
+        """Rows of phase i; its quantities q and the largest samples of its peaks."""
+        phase, writer, peaks = self.problem.phases[i], self._writers[i], self._peaks[i]
+        written = writer.write(extended, rows)
+        pick = self.layout.pick
+        s = pick(extended, writer.ends.statics)
+        first, last = pick(extended, writer.ends.initial), pick(extended, writer.ends.final)
+        peak = pick(extended, peaks)
+        for k in range(len(peaks)):
+            samples = written.peak_samples[k, :]
+            rows.add(samples - peak[k], -np.inf, 0, self.layout.variables[peaks[k]].scale, f"peak of '{phase.name}'")
+        initials = phase.initials(first, written.first_control, s[0], s)
+        finals = phase.finals(last, written.last_control, s[1], s)
+        largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
+        return ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak), ca.vertcat(*largest) if largest else ca.MX(0, 1)
+
+    def _write_problem(self, extended: ca.MX, quantities: list[ca.MX], rows: Rows) -> None:
+        """Rows of durations, of links that could not be shared, and of the user's constraints."""
+        for i, phase in enumerate(self.problem.phases):
+            shortest, longest = phase.duration
+            times = self.layout.pick(extended, self._writers[i].ends.statics[:2])
+            if phase.tf.lower - phase.t0.upper < shortest or phase.tf.upper - phase.t0.lower > longest:
+                span = phase.tf.upper - phase.t0.lower
+                rows.add(times[1] - times[0], shortest, longest, span, f"duration of '{phase.name}'")
+        for first, second, scale, label in self._joined:
+            ends = self.layout.pick(extended, np.array([first, second]))
+            rows.add(ends[0] - ends[1], 0, 0, scale, label)
+        values = self.problem.constraints(*quantities, self.layout.pick(extended, self.parameters))
+        for k, limit in enumerate(self.problem.limits):
+            rows.add(values[k], limit.lower, limit.upper, limit.scale, f"constraint '{limit.name}'")
+
+    def _marches_exactly(self, rows: Rows) -> bool:
+        bare = all(label.startswith(("dynamics", "peak")) for label in rows.labels)
+        unbounded_ends = all(
+            limits == (v.lower, v.upper) for phase in self.problem.phases for v, limits in zip(phase.states, phase.final, strict=True)
+        )
+        return bare and unbounded_ends
+
+
+def _in_order_of_time(problem: CompiledProblem) -> list[int]:
+    """Indices of the phases, each after those that lead into it; otherwise as declared."""
+    order: list[int] = []
+    while len(order) < len(problem.phases):
+        ready = (
+            i
+            for i in range(len(problem.phases))
+            if i not in order and all(link.first in order for link in problem.links if link.second == i)
+        )
+        order.append(next(ready))
+    return order

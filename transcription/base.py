@@ -1,0 +1,149 @@
+"""The contract of this floor: a transcription turns a problem into an NLP, and the NLP's vectors into trajectories."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledProblem, Variable
+from problems.problem import Problem
+
+from .trajectory import Trajectory
+
+
+class Transcription(ABC):
+    """A way to write a continuous problem with finitely many numbers.
+
+    An implementation is a frozen dataclass of its settings, in a file of its own, with the one method below. Whatever solves NLPs,
+    searches over them or looks at trajectories needs nothing else.
+    """
+
+    @abstractmethod
+    def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
+        """Write `problem` as an NLP. Raises ValueError if the problem is stated wrongly or the method cannot express it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name and settings as plain data, for files."""
+        return {"method": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
+
+
+def expanded(function: ca.Function) -> ca.Function:
+    """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
+    try:
+        return function.expand()
+    except RuntimeError:
+        return function
+
+
+@dataclass(frozen=True, eq=False)
+class NLP:
+    """Objectives F(z) and constraints g_lower <= g(z) <= g_upper of a vector z of n variables, in the user's units.
+
+    Attributes
+    ----------
+    problem : CompiledProblem
+    transcription : Transcription
+    variables : tuple of Variable (n)
+        Names, bounds, units, scales and periods.
+    free : array (d,) of int
+        Variables that an outer search may alter: parameters, free times, free initial states, coefficients of controls. What the others
+        are follows from them.
+    functions : Function
+        z -> (F, g): all objectives minimised (m), all constraints (r). Exact sparse derivatives come from it.
+    g_lower, g_upper, g_scale : arrays (r,)
+        Limits of g, and what counts as one in each row.
+    g_labels : tuple of str (r)
+        What the row is, in the user's names. Rows of one thing share one label.
+    guess : array (d,)
+        What the user guessed of the free variables; NaN where nothing.
+    first_guess : callable
+        Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value.
+    march : callable
+        Vectors (k, n) -> vectors (k, n): the states that the dynamics give to the free variables, by propagation; not numbers, or short of
+        the equations, where that fails. Only the free entries matter.
+    marches_exactly : bool
+        After `march`, only bounds of states can be violated: there are no terminal or path constraints.
+    tighten : callable
+        Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound.
+    unpack : callable
+        A vector (n,) -> Trajectory.
+    """
+
+    problem: CompiledProblem
+    transcription: Transcription
+    variables: tuple[Variable, ...]
+    free: np.ndarray
+    functions: ca.Function
+    g_lower: np.ndarray
+    g_upper: np.ndarray
+    g_scale: np.ndarray
+    g_labels: tuple[str, ...]
+    guess: np.ndarray
+    first_guess: Callable[[np.ndarray], np.ndarray]
+    march: Callable[[np.ndarray], np.ndarray]
+    marches_exactly: bool
+    tighten: Callable[[np.ndarray], np.ndarray]
+    unpack: Callable[[np.ndarray], Trajectory]
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """Lower bounds (n,)."""
+        return np.array([v.lower for v in self.variables])
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """Upper bounds (n,)."""
+        return np.array([v.upper for v in self.variables])
+
+    @cached_property
+    def span(self) -> np.ndarray:
+        """Widths of the bounds (n,), always positive."""
+        return self.upper - self.lower
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """What counts as one in each variable (n,)."""
+        return np.array([v.scale for v in self.variables])
+
+    @cached_property
+    def period(self) -> np.ndarray:
+        """Periods (n,); 0 where a variable has none."""
+        return np.array([v.period or 0.0 for v in self.variables])
+
+    def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
+        F, residuals = self._evaluate(Z)
+        with np.errstate(invalid="ignore"):
+            violation = residuals.max(axis=1, initial=0.0)
+        return F, np.where(np.isfinite(violation), violation, np.inf)
+
+    def violations(self, z: np.ndarray) -> dict[str, float]:
+        """The largest scaled residual of each constraint of a vector (n,), by its label; bounds are labelled by phase and variable."""
+        _, residuals = self._evaluate(z[None])
+        worst: dict[str, float] = {}
+        for label, residual in zip((*self._bound_labels, *self.g_labels), residuals[0], strict=True):
+            worst[label] = float(np.fmax(worst.get(label, 0.0), residual if np.isfinite(residual) else np.inf))
+        return worst
+
+    def distance(self, Z: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Euclidean distance (k,) of the free variables of two sets of vectors (k, n), in spans of their bounds, periods taken round."""
+        difference = Z[:, self.free] - other[:, self.free]
+        period = self.period[self.free]
+        wrapped = difference - period * np.round(difference / np.where(period > 0, period, 1.0))
+        return np.linalg.norm(np.where(period > 0, wrapped, difference) / self.span[self.free], axis=1)
+
+    def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        F, g = (np.array(value).T for value in self.functions(Z.T))
+        outside = np.maximum(self.lower - Z, Z - self.upper) / self.scale
+        rows = np.maximum(self.g_lower - g, g - self.g_upper) / self.g_scale
+        return F, np.maximum(np.hstack([outside, rows]), 0.0)
+
+    @cached_property
+    def _bound_labels(self) -> tuple[str, ...]:
+        return tuple(f"bounds of {v.name.split('[')[0]}" for v in self.variables)

@@ -1,0 +1,215 @@
+"""One phase as finite elements in time: its variables, its rows, its propagation and its trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from .base import expanded
+from .dfet_tables import Tables
+from .guess import along, line
+from .layout import Layout
+from .phase_writer import Ends, PhaseWriter, Rows, Written
+from .trajectory import PhaseTrajectory, PiecewisePolynomial
+
+NEWTON_ITERATIONS = 30
+NEWTON_TOLERANCE = 1e-14
+
+
+class DFETPhase(PhaseWriter):
+    """One phase on N equal elements.
+
+    Slots: `X` (N, l + 1, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
+    elements, which are unknowns of their own.
+    """
+
+    def __init__(self, elements: int, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+        self.n, self.tables, self.phase, self.ends = elements, tables, phase, ends
+        self._layout = layout
+        prefix = f"{phase.name}."
+        self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
+        self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
+        at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
+        edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
+        self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
+        self._element = expanded(_element(tables, phase))
+        self._propagate = _propagation(self._element, elements, tables, len(phase.states), phase)
+
+    def write(self, extended: ca.MX, rows: Rows) -> Written:
+        """See `PhaseWriter.write`."""
+        n, tables, phase, pick = self.n, self.tables, self.phase, self._layout.pick
+        s = pick(extended, self.ends.statics)
+        left, right = pick(extended, self.B[:-1]), pick(extended, self.B[1:])
+        U = pick(extended, self.U)
+        h = (s[1] - s[0]) / n
+        starts = s[0] + h * ca.DM(np.arange(n)).T
+        weak, integrals, paths, peaks, ends = self._element.map(n)(
+            pick(extended, self.X), U, left, right, starts, ca.repmat(h, 1, n), ca.repmat(s, 1, n)
+        )
+        tests = tables.order + 2
+        residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
+        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests))
+        for k, limit in enumerate(phase.paths):
+            rows.add(paths[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
+        nu = len(phase.controls)
+        return Written(ends[:nu, 0], ends[nu:, -1], ca.sum2(integrals), peaks)
+
+    def guess(self, extended: np.ndarray) -> None:
+        """See `PhaseWriter.guess`."""
+        t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
+        edges = np.linspace(0.0, 1.0, self.n + 1)[1:]
+        inside = (np.arange(self.n)[:, None] + 0.5 * (1.0 + self.tables.state_nodes)) / self.n
+        for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
+            start = extended[:, self.ends.initial[i]]
+            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
+            for slots, share in ((self.B[1:, i], edges), (self.X[:, :, i], inside)):
+                given = self.phase.guesses.get(state.name)
+                values = line(start, end, share) if given is None else along(given, t0, tf, share)
+                self._layout.write(extended, slots, np.clip(values, state.lower, state.upper))
+            self._layout.write(extended, self.B[-1:, i], np.clip(extended[:, self.B[-1:, i]], *final))
+
+    def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
+        """See `PhaseWriter.guess_controls`."""
+        share = (np.arange(self.n)[:, None] + 0.5 * (1.0 + self.tables.control_nodes)) / self.n
+        found: dict[int, float] = {}
+        for i, control in enumerate(self.phase.controls):
+            if control.name in self.phase.guesses:
+                values = along(self.phase.guesses[control.name], np.array([t0]), np.array([tf]), share)[0]
+                found.update(zip(self.U[:, :, i].ravel().tolist(), np.clip(values, control.lower, control.upper).ravel(), strict=True))
+        return found
+
+    def march(self, extended: np.ndarray) -> None:
+        """See `PhaseWriter.march`."""
+        k, nx, nu = len(extended), len(self.phase.states), len(self.phase.controls)
+        s = extended[:, self.ends.statics]
+        h = (s[:, 1] - s[:, 0]) / self.n
+        U = extended[:, self.U].reshape(-1, nu).T
+        starts = s[:, :1] + h[:, None] * np.arange(self.n)
+        right, X = self._propagate(
+            extended[:, self.ends.initial].T, U, starts.reshape(1, -1), np.repeat(h, self.n)[None], np.repeat(s, self.n, axis=0).T
+        )
+        self._layout.write(extended, self.X, np.array(X).T.reshape(k, self.n, -1, nx))
+        self._layout.write(extended, self.B[1:], np.array(right).T.reshape(k, self.n, nx))
+
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """See `PhaseWriter.unpack`."""
+        phase, tables = self.phase, self.tables
+        s = extended[self.ends.statics]
+        edges = s[0] + (s[1] - s[0]) * np.arange(self.n + 1) / self.n
+        U = extended[self.U]
+        for i, control in enumerate(phase.controls):
+            if control.period:
+                U[:, :, i] = np.unwrap(U[:, :, i], axis=1, period=control.period)
+        state = PiecewisePolynomial(edges, extended[self.X], tables.state_basis)
+        control_law = PiecewisePolynomial(edges, U, tables.control_basis)
+        inside = edges[:-1, None] + 0.5 * (1.0 + tables.tau) * np.diff(edges)[:, None]
+        B = extended[self.B]
+        time = np.append(np.column_stack([edges[:-1], inside]).ravel(), edges[-1])
+        states = np.concatenate([B[:-1, None], state(inside)], axis=1).reshape(-1, len(phase.states))
+        states = np.vstack([states, B[-1:]])
+        controls = np.vstack([control_law(time[:-1]), control_law.on_element(self.n - 1, np.ones(1))])
+        paths = np.array(phase.path(states.T, controls.T, time[None], s)).T
+        return PhaseTrajectory(
+            name=phase.name,
+            time_unit=phase.time_unit,
+            time=time,
+            states=states,
+            controls=_wrapped(controls, phase),
+            paths=paths.reshape(len(time), len(phase.paths)),
+            edge_states=B,
+            state=state,
+            control=control_law,
+            state_variables=phase.states,
+            control_variables=phase.controls,
+            path_limits=phase.paths,
+        )
+
+    def _labels(self, tests: int) -> list[str]:
+        """What a miss of the dynamics is called. An imposed final value enters the last row of the last element, so that row bears its name."""
+        names = [f"dynamics of {self.phase.name}.{v.name}" for v in self.phase.states]
+        last = [
+            f"final value of {self.phase.name}.{v.name}" if low == high else name
+            for v, (low, high), name in zip(self.phase.states, self.phase.final, names, strict=True)
+        ]
+        return names * (tests * self.n - 1) + last
+
+
+def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, peaks, controls at both ends)."""
+    nx, nu = len(phase.states), len(phase.controls)
+    X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
+    left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
+    start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", phase.dynamics.size1_in(3))
+    law = _unwrapped(U, phase)
+
+    def over(function: ca.Function, tau: np.ndarray, states: ca.MX) -> ca.MX:
+        times = start + 0.5 * h * ca.DM(1.0 + tau).T
+        return function.map(len(tau))(states, law @ ca.DM(tables.control(tau)).T, times, ca.repmat(s, 1, len(tau)))
+
+    def with_ends(tau: np.ndarray) -> ca.MX:
+        return ca.horzcat(left, X @ ca.DM(tables.state(tau[1:-1])).T, right)
+
+    inside = X @ ca.DM(tables.state(tables.tau)).T
+    rates = over(phase.dynamics, tables.tau, inside)
+    first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
+    weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
+    integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
+    paths = over(phase.path, tables.points, with_ends(tables.points))
+    peaks = over(phase.peaks, tables.dense, with_ends(tables.dense))
+    ends = ca.vec(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T)
+    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
+    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)
+
+
+def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round, as `numpy.unwrap` has it."""
+    columns = ca.horzsplit(U) if U.shape[1] > 1 else [U]
+    period = np.array([v.period or 0.0 for v in phase.controls])
+    if not period.any():
+        return U
+    divisor = np.where(period > 0, period, 1.0)
+    law = [columns[0]]
+    for column in columns[1:]:
+        step = column - law[-1]
+        law.append(law[-1] + step - period * ca.floor(step / divisor + 0.5))
+    return ca.horzcat(*law)
+
+
+def _wrapped(controls: np.ndarray, phase: CompiledPhase) -> np.ndarray:
+    """Controls (k, nu) of which the periodic ones are brought back into their bounds."""
+    result = controls.copy()
+    for i, v in enumerate(phase.controls):
+        if v.period:
+            result[:, i] = v.lower + np.mod(controls[:, i] - v.lower, v.period)
+    return result
+
+
+def _propagation(element: ca.Function, n: int, tables: Tables, nx: int, phase: CompiledPhase) -> ca.Function:
+    """(initial states, U, starts, h, s), the last four a column or block for each element -> (states at the right ends, X).
+
+    On each element, Newton's method for the coefficients of the states from the first l + 1 tests; the last test gives the right end.
+    """
+    order = tables.order + 1
+    scale = ca.DM([v.scale for v in phase.states])
+    Y, left, U = ca.MX.sym("Y", nx * order), ca.MX.sym("left", nx), ca.MX.sym("U", *element.size_in(1))
+    start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", element.size1_in(6))
+    p = ca.MX.sym("p", nx + U.numel() + 2 + s.numel())
+    scales = ca.repmat(scale, order, 1)
+
+    def weak(Y: ca.MX, left: ca.MX, U: ca.MX, start: ca.MX, h: ca.MX, s: ca.MX) -> ca.MX:
+        return element(ca.reshape(Y * scales, nx, order), U, left, left, start, h, s)[0]
+
+    parts = ca.vertsplit(p, np.cumsum([0, nx, U.numel(), 1, 1, s.numel()]).tolist())
+    parts[1] = ca.reshape(parts[1], *U.shape)
+    residual = ca.vec(weak(Y, *parts)[:, :-1]) / scales
+    equations = expanded(ca.Function("equations", [Y, p], [residual], ["x", "p"], ["g"]))
+    options = {"error_on_fail": False, "max_iter": NEWTON_ITERATIONS, "abstol": NEWTON_TOLERANCE, "abstolStep": NEWTON_TOLERANCE}
+    newton = ca.rootfinder("newton", "fast_newton", equations, options)
+    root = newton(ca.repmat(left / scale, order, 1), ca.vertcat(left, ca.vec(U), start, h, s))
+    outputs = [weak(root, left, U, start, h, s)[:, -1], ca.reshape(root * scales, nx, order)]
+    step = ca.Function("step", [left, U, start, h, s], outputs)
+    return step.mapaccum("propagate", n)

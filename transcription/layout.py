@@ -1,0 +1,63 @@
+"""Where each quantity of a problem lives in the vector of the NLP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import Variable
+
+
+class Layout:
+    """Collects the variables of an NLP and hands out their slots.
+
+    A slot is the index of a variable, or a negative number for a constant: a quantity whose bounds coincide is no variable. Two quantities
+    that are always equal (a linked boundary state) share one slot. Slots index the *extended* vector: the variables, then the constants.
+    """
+
+    def __init__(self) -> None:
+        self.variables: list[Variable] = []
+        self.free: list[int] = []
+        self._constants: list[float] = []
+
+    def add(self, variable: Variable, *, free: bool = False) -> int:
+        """One quantity; `free` if the outer search may alter it. Returns its slot."""
+        if variable.lower == variable.upper:
+            self._constants.append(variable.lower)
+            return -len(self._constants)
+        self.variables.append(variable)
+        if free:
+            self.free.append(len(self.variables) - 1)
+        return len(self.variables) - 1
+
+    def add_table(self, prefix: str, variables: Sequence[Variable], rows: int, columns: int, *, free: bool = False) -> np.ndarray:
+        """The same quantities at rows x columns places (elements x coefficients); returns slots (rows, columns, len(variables))."""
+        slots = [
+            [[self.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)]
+            for j in range(rows)
+        ]
+        return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
+
+    def extended(self, Z: np.ndarray) -> np.ndarray:
+        """Extended vectors (k, n + constants) of variables (k, n): a copy, to be indexed by slots."""
+        constants = np.broadcast_to(self._constants[::-1], (len(Z), len(self._constants)))
+        return np.hstack([Z, constants])
+
+    def extended_symbol(self, z: ca.MX) -> ca.MX:
+        """The extended vector of a symbol of the variables."""
+        return ca.vertcat(z, ca.DM(self._constants[::-1])) if self._constants else z
+
+    def pick(self, extended: ca.MX, slots: np.ndarray) -> ca.MX:
+        """The entries of an extended symbol at slots of shape (a, b, ...), as a matrix (last axis, product of the others)."""
+        total = len(self.variables) + len(self._constants)
+        shape = slots.shape[-1], int(np.prod(slots.shape[:-1]))
+        return ca.reshape(extended[(slots.ravel() % total).tolist()], *shape) if slots.size else ca.MX(*shape)
+
+    @staticmethod
+    def write(extended: np.ndarray, slots: np.ndarray, values: np.ndarray) -> None:
+        """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape); constants stay what they are."""
+        flat, mask = slots.ravel(), slots.ravel() >= 0
+        extended[:, flat[mask]] = values.reshape(len(extended), -1)[:, mask]

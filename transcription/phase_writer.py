@@ -1,0 +1,86 @@
+"""What a method writes: one phase. The rest of an NLP is the same for all methods (`assembly.py`)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from .trajectory import PhaseTrajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Slots of a phase's times, of its initial and final states (nx,), and of the parameters."""
+
+    t0: int
+    tf: int
+    initial: np.ndarray
+    final: np.ndarray
+    parameters: np.ndarray
+
+    @property
+    def statics(self) -> np.ndarray:
+        """Slots of s = [t0, tf, *parameters]."""
+        return np.array([self.t0, self.tf, *self.parameters], dtype=int)
+
+
+@dataclass
+class Rows:
+    """Rows of constraints as they come together."""
+
+    expressions: list[ca.MX] = field(default_factory=list)
+    lower: list[np.ndarray] = field(default_factory=list)
+    upper: list[np.ndarray] = field(default_factory=list)
+    scale: list[np.ndarray] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
+
+    def add(self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str]) -> None:
+        """A matrix of rows, taken column by column; limits, scale and label one for each or one for all."""
+        count = expression.numel()
+        self.expressions.append(ca.vec(expression))
+        for target, value in ((self.lower, lower), (self.upper, upper), (self.scale, scale)):
+            target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
+        self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a phase gives to objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k)."""
+
+    first_control: ca.MX
+    last_control: ca.MX
+    integrals: ca.MX
+    peak_samples: ca.MX
+
+
+class PhaseWriter(ABC):
+    """One phase, written by one method. Made with the layout, in which it has put its variables, and with the phase's ends."""
+
+    phase: CompiledPhase
+    ends: Ends
+
+    @abstractmethod
+    def write(self, extended: ca.MX, rows: Rows) -> Written:
+        """Add the rows of dynamics and path constraints of an extended symbol."""
+
+    @abstractmethod
+    def guess(self, extended: np.ndarray) -> None:
+        """Fill in the states of extended vectors (k, ...), whose times, parameters, controls and initial states are set."""
+
+    @abstractmethod
+    def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
+        """The user's guess of the controls, where there is one, by slot."""
+
+    @abstractmethod
+    def march(self, extended: np.ndarray) -> None:
+        """Fill in the states of extended vectors by propagation from the initial ones."""
+
+    @abstractmethod
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """The phase's trajectory from one extended vector."""
