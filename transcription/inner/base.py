@@ -1,0 +1,86 @@
+"""The contract of the inner level: a batch of candidates in, the nearest feasible points out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base import NLP
+
+CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
+
+
+@dataclass(frozen=True, eq=False)
+class InnerResult:
+    """What became of k candidates.
+
+    Attributes
+    ----------
+    z : array (k, n)
+        Feasible vectors where the status is "converged", else the best that was found.
+    F : array (k, m)
+        Objectives there, all minimised; NaN where they are no numbers.
+    violation : array (k,)
+        Largest scaled residual there; infinite where it is no number.
+    status : array (k,) of str
+        "converged" (violation within the tolerance, whatever the solver said), "infeasible", "failed" or "timeout".
+    moved : array (k,)
+        Euclidean distance of the free variables from the candidate, in spans of their bounds.
+    iterations : array (k,) of int
+        Of the solver; a propagation counts as one.
+    """
+
+    z: np.ndarray
+    F: np.ndarray
+    violation: np.ndarray
+    status: np.ndarray
+    moved: np.ndarray
+    iterations: np.ndarray
+
+
+class InnerSolver(ABC):
+    """Makes candidates feasible. An implementation is a frozen dataclass of its settings; it keeps nothing between two calls.
+
+    The result for one candidate depends on that candidate, its warm start and the composition of the batch, and on nothing else.
+    """
+
+    @abstractmethod
+    def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
+        """Find feasible points near candidates.
+
+        Parameters
+        ----------
+        nlp : NLP
+        candidates : array (k, d)
+            Values of the free variables, within their bounds.
+        warm : array (k, n), optional
+            Vectors whose other entries (states) are good to start from; by default the NLP's first guess.
+        tolerance : float
+            Largest scaled residual of a feasible point.
+        """
+
+
+def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.ndarray:
+    """Vectors (k, n) to start from: the candidates with the states of `warm`, or with a first guess."""
+    if warm is None:
+        return nlp.first_guess(candidates)
+    Z = np.array(warm, dtype=float)
+    Z[:, nlp.free] = candidates
+    return Z
+
+
+def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
+    """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
+    F, violation = nlp.evaluate(Z)
+    finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
+    status = np.where(finite & (violation <= tolerance), CONVERGED, np.where(finite, said, FAILED))
+    return InnerResult(
+        z=Z,
+        F=np.where(finite[:, None], F, np.nan),
+        violation=np.where(finite, violation, np.inf),
+        status=status,
+        moved=np.where(finite, nlp.distance(Z, start), np.inf),
+        iterations=iterations,
+    )

@@ -1,0 +1,123 @@
+"""Feasibility by IPOPT: projection onto the candidate, or the paper's constant objective."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..base import NLP, expanded
+from .base import FAILED, INFEASIBLE, TIMEOUT, InnerResult, InnerSolver, result, started
+
+_SAID = {
+    "Infeasible_Problem_Detected": INFEASIBLE,
+    "Maximum_CpuTime_Exceeded": TIMEOUT,
+    "Maximum_WallTime_Exceeded": TIMEOUT,
+}
+
+
+@dataclass(frozen=True)
+class Ipopt(InnerSolver):
+    """A nonlinear program for each candidate.
+
+    Parameters
+    ----------
+    objective : "projection" or "constant"
+        Least squares distance of the free variables from the candidate, in spans of their bounds; or nothing, as in the paper, which lets
+        the barrier drag the candidate towards the middle of its bounds.
+    max_iterations : int
+        Limit of each solve.
+    seconds : float
+        Safety net for each solve; one that it stops has the status "timeout" and is not reproducible.
+    """
+
+    objective: str = "projection"
+    max_iterations: int = 300
+    seconds: float = 60.0
+
+    def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
+        """See `InnerSolver.solve`. A projection that does not converge is tried once more from propagated states."""
+        start = started(nlp, candidates, warm)
+        Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
+        first = result(nlp, Z, start, said, iterations, tolerance)
+        again = np.flatnonzero((first.violation > tolerance) & (said != TIMEOUT))
+        if self.objective == "constant" or not len(again):
+            return first
+        flown = nlp.march(start[again])
+        usable = np.isfinite(flown).all(axis=1)
+        again, flown = again[usable], flown[usable]
+        if not len(again):
+            return first
+        Z[again], said[again], more = self._solve_all(nlp, start[again], flown, tolerance)
+        iterations[again] += more
+        return result(nlp, Z, start, said, iterations, tolerance)
+
+    def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
+        solver, lower, upper = _program(nlp, self, tolerance)
+        scale = nlp.scale
+        Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
+        _, violation = nlp.evaluate(guess)
+        for row in range(len(start)):
+            if violation[row] <= tolerance and self.objective == "projection" and np.array_equal(start[row], guess[row]):
+                continue
+            y0 = np.clip(guess[row] / scale, lower, upper)
+            answer = solver(
+                x0=y0, p=start[row, nlp.free], lbx=lower, ubx=upper, lbg=nlp.g_lower / nlp.g_scale, ubg=nlp.g_upper / nlp.g_scale
+            )
+            stats = solver.stats()
+            Z[row] = _back_in_bounds(nlp, np.array(answer["x"]).ravel() * scale)
+            said[row] = _SAID.get(stats["return_status"], FAILED)
+            iterations[row] = stats["iter_count"]
+        return nlp.tighten(Z), said, iterations
+
+
+@lru_cache(maxsize=8)
+def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+    """The nonlinear program in scaled variables y = z / scale, with the candidate as its parameter, and the bounds of y.
+
+    Periodic variables get one more period on either side, so that a bound never stops them.
+    """
+    y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
+    z = y * nlp.scale
+    _, g = nlp.functions(z)
+    constant = settings.objective == "constant"
+    f = ca.MX(1) if constant else ca.sumsqr((z[nlp.free.tolist()] - candidate) / nlp.span[nlp.free])
+    parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
+    solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
+    return solver, (nlp.lower - nlp.period) / nlp.scale, (nlp.upper + nlp.period) / nlp.scale
+
+
+def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
+    options: dict[str, Any] = {
+        "print_time": False,
+        "error_on_fail": False,
+        "record_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.max_iter": settings.max_iterations,
+        "ipopt.max_wall_time": settings.seconds,
+        "ipopt.tol": 0.1 * tolerance,
+        "ipopt.constr_viol_tol": 0.1 * tolerance,
+    }
+    if settings.objective == "projection":
+        # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
+        options |= {
+            "ipopt.mu_init": 1e-6,
+            "ipopt.bound_push": 1e-8,
+            "ipopt.bound_frac": 1e-8,
+            "ipopt.bound_relax_factor": 0.0,
+            "ipopt.nlp_scaling_method": "none",
+            "ipopt.acceptable_iter": 0,
+        }
+    return options
+
+
+def _back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
+    period = nlp.period
+    wrapped = nlp.lower + np.mod(z - nlp.lower, np.where(period > 0, period, 1.0))
+    outside = (period > 0) & ((z < nlp.lower) | (z > nlp.upper))
+    return np.clip(np.where(outside, wrapped, z), nlp.lower, nlp.upper)
