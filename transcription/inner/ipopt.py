@@ -106,7 +106,8 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
     if settings.objective == "projection":
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
         options |= {
-            "ipopt.mu_init": 1e-6,
+            "ipopt.mu_init": 1e-8,
+            "ipopt.warm_start_init_point": "yes",
             "ipopt.bound_push": 1e-8,
             "ipopt.bound_frac": 1e-8,
             "ipopt.bound_relax_factor": 0.0,
