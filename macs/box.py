@@ -1,0 +1,67 @@
+"""The box a search moves in: a unit cube, each side the span of a free variable, some of whose sides close on themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds of the free variables, and the arithmetic of points and steps inside them.
+
+    Points are rows X in unit coordinates: 0 at the lower bound, 1 at the upper one. So a distance is in units of span, and no variable
+    weighs more than another for being measured in smaller units.
+
+    Attributes
+    ----------
+    lower, upper : arrays (d,)
+        Bounds in the user's units.
+    wraps : array (d,) of bool
+        Where the variable is periodic: its bounds are one period wide, and a point that leaves at one comes in at the other.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    wraps: np.ndarray
+
+    @property
+    def span(self) -> np.ndarray:
+        """Sides of the box, (d,), in the user's units."""
+        return self.upper - self.lower
+
+    def to_unit(self, values: np.ndarray) -> np.ndarray:
+        """Unit coordinates of values (..., d) in the user's units."""
+        return (values - self.lower) / self.span
+
+    def to_values(self, X: np.ndarray) -> np.ndarray:
+        """Values (..., d) in the user's units, inside the bounds to the last bit."""
+        return np.clip(self.lower + X * self.span, self.lower, self.upper)
+
+    def put_back(self, X: np.ndarray) -> np.ndarray:
+        """The points X (..., d), wrapped where periodic and clipped elsewhere."""
+        return np.where(self.wraps, X - np.floor(X), np.clip(X, 0.0, 1.0))
+
+    def difference(self, X: np.ndarray, origin: np.ndarray) -> np.ndarray:
+        """The step (..., d) from `origin` to X, the short way round where periodic."""
+        step = X - origin
+        return np.where(self.wraps, step - np.round(step), step)
+
+    def stop_outward(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """`step` (..., d) without the components that push a point on a bound out of the box."""
+        outward = ((X <= 0.0) & (step < 0.0)) | ((X >= 1.0) & (step > 0.0))
+        return np.where(outward & ~self.wraps, 0.0, step)
+
+    def reach(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """The largest fraction (...,), at most 1, of `step` (..., d) that stays in the box; periodic variables do not shorten it."""
+        bound = np.where(step > 0.0, 1.0 - X, X)
+        size = np.abs(step)
+        limited = (size > 0.0) & ~self.wraps
+        fraction = np.divide(bound, size, out=np.ones_like(size), where=limited)
+        return np.clip(fraction.min(axis=-1, initial=1.0), 0.0, 1.0)
+
+    def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """A Latin hypercube of `count` points, (count, d) (McKay, Beckman and Conover 1979)."""
+        strata = rng.permuted(np.tile(np.arange(count), (len(self.lower), 1)), axis=1).T
+        return (strata + rng.random(strata.shape)) / count

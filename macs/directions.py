@@ -1,0 +1,81 @@
+"""Search directions: the weights of the scalar sub-problems that social agents own (Ricciardi and Vasile 2015)."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+
+def simplex_lattice(m: int, divisions: int) -> np.ndarray:
+    """Points with coordinates that are multiples of 1/divisions and sum to 1, (comb(divisions + m - 1, m - 1), m) (Das and Dennis 1998)."""
+    bars = np.array(list(combinations(range(divisions + m - 1), m - 1)), dtype=int).reshape(-1, m - 1)
+    edges = np.hstack([np.full((len(bars), 1), -1), bars, np.full((len(bars), 1), divisions + m - 1)])
+    return (np.diff(edges, axis=1) - 1) / divisions
+
+
+def pool(m: int, size: int) -> np.ndarray:
+    """Unit directions, evenly spread over the positive orthant, the m orthogonal ones first.
+
+    Parameters
+    ----------
+    m : int
+        Number of objectives.
+    size : int
+        How many are wanted. For m = 2 this is how many there are; for m = 1 there is one; for m >= 3 the finest simplex lattice that has no
+        more is taken (with one division at least), and its centre added if it lacks it.
+
+    Returns
+    -------
+    array (k, m)
+        Rows of Euclidean length 1, none negative, all different.
+    """
+    if m == 1:
+        return np.ones((1, 1))
+    if m == 2:
+        angle = np.linspace(0.0, np.pi / 2, max(size, 2))[1:-1]
+        return np.vstack([np.eye(2), np.stack([np.sin(angle), np.cos(angle)], axis=1)])
+    divisions = 1
+    while comb(divisions + m, m - 1) <= size:
+        divisions += 1
+    lattice = simplex_lattice(m, divisions)
+    inner = lattice[lattice.max(axis=1) < 1.0]
+    if divisions % m:
+        inner = np.vstack([inner, np.full(m, 1.0 / m)])
+    return np.vstack([np.eye(m), inner / np.linalg.norm(inner, axis=1, keepdims=True)])
+
+
+def draw(directions: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Rows of active directions, (count,) of int: the m orthogonal ones always, others at random, none twice unless there are too few."""
+    m = directions.shape[1]
+    others = np.arange(m, len(directions))
+    wanted = max(count - m, 0)
+    chosen = rng.permutation(others)[:wanted] if wanted <= len(others) else rng.choice(len(directions), wanted)
+    return np.concatenate([np.arange(m), chosen])[:count]
+
+
+def normalised(F: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
+    """F (..., m) with the ideal point at 0 and the nadir at 1; an objective whose range is zero is only shifted."""
+    span = nadir - ideal
+    return (F - ideal) / np.where(span > 0.0, span, 1.0)
+
+
+def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
+    """Tchebycheff scalarisation: the largest weighted objective, of those that have a weight (Miettinen 1999, section 3.4).
+
+    Values better than the ideal point count as negative, so that a new best of one objective is better for the direction that owns it.
+
+    Parameters
+    ----------
+    F, directions : arrays (..., m)
+        Objectives and weights; leading axes broadcast.
+    ideal, nadir : arrays (m,)
+        Where the objectives are scaled to 0 and 1.
+
+    Returns
+    -------
+    array (...,)
+    """
+    weighted = directions * normalised(F, ideal, nadir)
+    return np.where(directions > 0.0, weighted, -np.inf).max(axis=-1)

@@ -1,0 +1,156 @@
+"""MACS: Multi-Agent Collaborative Search, its settings and its hooks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from macs import search
+from macs.evaluation import Evaluator
+from macs.search import SearchState
+
+
+@dataclass(frozen=True)
+class MACS:
+    """Multi-Agent Collaborative Search (Ricciardi and Vasile 2015; Ricciardi, Vasile and Maddock 2016).
+
+    A few agents look for better points, each by itself and then with what all have found; an archive keeps the best trade-offs,
+    evenly spread.
+
+    Parameters
+    ----------
+    agents : int, default 10
+        Number of agents, at least 3: differential evolution takes its parents among the others.
+    archive : int, default 10
+        Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
+    refine : bool, default True
+        Accepted, and without effect yet.
+    mesh : str, default "fixed"
+        How the discretisation of a trajectory is chosen. "adaptive" is not available yet.
+    rho : float, default 1.0
+        Radius of the pattern search to begin with, in (0, 1], as a fraction of half the span of each variable (Table I: 1).
+    F : float, default 0.9
+        Weight of the differences in differential evolution, in (0, 2] (Table I: 0.9).
+    CR : float, default 0.9
+        Probability that a coordinate takes part in a step of differential evolution, in [0, 1] (Table I: 0.9).
+    social : float, default 1.0
+        Fraction of the agents that own a direction and act socially, in [0, 1] (Table I: 1). Fewer than there are objectives: none do.
+    contraction : float, default 0.5
+        By how much the radius shrinks when everything an agent tried failed, in (0, 1) (Table I: 0.5).
+    max_contractions : int, default 5
+        After how many contractions the radius starts anew, at least 0 (Table I: 5).
+    coordinates : float, default 1.0
+        Fraction of the coordinates that pattern search goes through, in (0, 1]; used if `adaptive_coordinates` is off (Table I: 1).
+    adaptive_coordinates : bool, default True
+        Go through all coordinates while the archive is empty and through one when it is full (the authors' later code).
+    directions : int, optional
+        How many directions the agents' own are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
+    redraw : bool, default True
+        Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
+    momentum : float, default 0.7
+        How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
+
+    Raises
+    ------
+    ValueError
+        Where a setting is out of its range; the message names it.
+    """
+
+    agents: int = 10
+    archive: int = 10
+    refine: bool = True
+    mesh: str = "fixed"
+    rho: float = 1.0
+    F: float = 0.9
+    CR: float = 0.9
+    social: float = 1.0
+    contraction: float = 0.5
+    max_contractions: int = 5
+    coordinates: float = 1.0
+    adaptive_coordinates: bool = True
+    directions: int | None = None
+    redraw: bool = True
+    momentum: float = 0.7
+
+    def __post_init__(self) -> None:
+        self._check_count("agents", self.agents, 3)
+        self._check_count("archive", self.archive, 1)
+        self._check_count("max_contractions", self.max_contractions, 0)
+        if self.directions is not None:
+            self._check_count("directions", self.directions, 1)
+        for name in ("refine", "adaptive_coordinates", "redraw"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
+        if self.mesh == "adaptive":
+            raise ValueError("MACS: mesh='adaptive' is not available yet")
+        if self.mesh != "fixed":
+            raise ValueError(f"MACS: mesh must be 'fixed', not {self.mesh!r}")
+        self._check_range("rho", "(0, 1]", lambda x: 0 < x <= 1)
+        self._check_range("F", "(0, 2]", lambda x: 0 < x <= 2)
+        self._check_range("CR", "[0, 1]", lambda x: 0 <= x <= 1)
+        self._check_range("social", "[0, 1]", lambda x: 0 <= x <= 1)
+        self._check_range("contraction", "(0, 1)", lambda x: 0 < x < 1)
+        self._check_range("coordinates", "(0, 1]", lambda x: 0 < x <= 1)
+        self._check_range("momentum", "[0, 1)", lambda x: 0 <= x < 1)
+
+    @classmethod
+    def paper(cls, **overrides: Any) -> MACS:
+        """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself."""
+        settings: dict[str, Any] = {"refine": False, "adaptive_coordinates": False, "redraw": False, "momentum": 0.0}
+        return cls(**{**settings, **overrides})
+
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
+        """Sample, evaluate and archive the first population.
+
+        Parameters
+        ----------
+        evaluator : Evaluator
+        budget : int
+            How many evaluations the evaluator may have counted in the end; never exceeded.
+        rng : numpy.random.Generator
+            The one source of chance; it becomes part of the state.
+        start : array (k, D), optional
+            Full vectors to begin with, evaluated first. Missing agents are sampled, and of too many the best become agents.
+
+        Returns
+        -------
+        SearchState
+
+        Raises
+        ------
+        ValueError
+            Where the archive is smaller than the number of objectives, or the budget leaves nothing to evaluate.
+        """
+        return search.begin(self, evaluator, budget, rng, start)
+
+    def advance(self, state: SearchState, evaluator: Evaluator, budget: int) -> None:
+        """One iteration, of some tens of evaluations; changes `state`. With the budget spent it does nothing."""
+        search.advance(self, state, evaluator, budget)
+
+    def check_objectives(self, m: int) -> None:
+        """Refuse an archive that could not keep the best points of all m objectives."""
+        if self.archive < m:
+            raise ValueError(f"MACS: archive must hold at least one point for each of the {m} objectives, not {self.archive}")
+
+    def coordinates_to_scan(self, d: int, archived: int) -> int:
+        """How many of d coordinates pattern search goes through with `archived` points in the archive."""
+        ratio = 1.0 - (1.0 - 1.0 / d) * archived / self.archive if self.adaptive_coordinates else self.coordinates
+        return max(1, ceil(d * ratio - 1e-9))
+
+    def social_agents(self, m: int) -> int:
+        """How many agents own a direction, with m objectives: none, if they could not own all the orthogonal ones."""
+        count = round(self.social * self.agents)
+        return count if count >= m else 0
+
+    def _check_count(self, name: str, value: Any, least: int) -> None:
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+            raise ValueError(f"MACS: {name} must be a whole number of at least {least}, not {value!r}")
+
+    def _check_range(self, name: str, interval: str, inside: Any) -> None:
+        value = getattr(self, name)
+        if not isinstance(value, Real) or isinstance(value, bool) or not inside(value):
+            raise ValueError(f"MACS: {name} must be in {interval}, not {value!r}")
