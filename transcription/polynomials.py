@@ -46,24 +46,26 @@ def nodes(basis: str, degree: int) -> np.ndarray:
     return points
 
 
-def lagrange_matrix(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Values of the Lagrange functions on `points` (k,) at `tau` (n,), shape (n, k)."""
-    weights = _barycentric_weights(points)
-    difference = np.asarray(tau, dtype=float)[:, None] - points[None, :]
+def lagrange_matrix(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Values of the Lagrange functions on `points` (k,), of barycentric `weights` (k,), at `tau` (n,), shape (n, k)."""
+    difference = np.asarray(tau, dtype=float)[:, None] - points
     hit = np.abs(difference) < 1e-15
-    terms = weights / np.where(hit, 1.0, difference)
-    values = terms / terms.sum(axis=1, keepdims=True)
-    return np.where(hit.any(axis=1, keepdims=True), hit.astype(float), values)
+    if hit.any():
+        difference[hit] = 1.0
+        values = weights / difference
+        values /= values.sum(axis=1, keepdims=True)
+        return np.where(hit.any(axis=1, keepdims=True), hit, values)
+    values = weights / difference
+    return values / values.sum(axis=1, keepdims=True)
 
 
-def lagrange_derivative(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Derivatives of the Lagrange functions on `points` (k,) at `tau` (n,), shape (n, k)."""
-    weights = _barycentric_weights(points)
-    difference = points[:, None] - points[None, :] + np.eye(len(points))
-    at_points = (weights[None, :] / weights[:, None]) / difference
+def lagrange_derivative(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Derivatives of the Lagrange functions on `points` (k,), of barycentric `weights` (k,), at `tau` (n,), shape (n, k)."""
+    difference = points[:, None] - points + np.eye(len(points))
+    at_points = (weights / weights[:, None]) / difference
     np.fill_diagonal(at_points, 0.0)
     np.fill_diagonal(at_points, -at_points.sum(axis=1))
-    return lagrange_matrix(points, tau) @ at_points
+    return lagrange_matrix(points, weights, tau) @ at_points
 
 
 def bernstein_matrix(degree: int, tau: np.ndarray) -> np.ndarray:
@@ -84,16 +86,19 @@ def bernstein_derivative(degree: int, tau: np.ndarray) -> np.ndarray:
 
 def basis_matrix(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Values of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
-    points = nodes(basis, degree)
-    return bernstein_matrix(degree, tau) if basis == "bernstein" else lagrange_matrix(points, tau)
+    if basis == "bernstein":
+        return bernstein_matrix(degree, tau)
+    return lagrange_matrix(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
 
 
 def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Derivatives of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
+    if basis == "bernstein":
+        return bernstein_derivative(degree, tau)
+    return lagrange_derivative(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
+
+
+@lru_cache(maxsize=None)
+def _barycentric_weights(basis: str, degree: int) -> np.ndarray:
     points = nodes(basis, degree)
-    return bernstein_derivative(degree, tau) if basis == "bernstein" else lagrange_derivative(points, tau)
-
-
-def _barycentric_weights(points: np.ndarray) -> np.ndarray:
-    difference = points[:, None] - points[None, :] + np.eye(len(points))
-    return 1.0 / np.prod(difference, axis=1)
+    return 1.0 / np.prod(points[:, None] - points + np.eye(degree + 1), axis=1)

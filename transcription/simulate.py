@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
+from .base import expanded
 from .sampling import DENSE, excess
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
@@ -189,27 +192,42 @@ def _element(
 ) -> np.ndarray:
     """States and integrals (len(DENSE), ny) on element j from `y` at its beginning; NaN if the integration breaks down."""
     t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
-    nx = len(phase.states)
     if not np.isfinite(y).all() or t1 <= t0:
         return np.broadcast_to(y if t1 <= t0 else np.full_like(y, np.nan), (len(DENSE), len(y)))
-    right_hand_side = _right_hand_side(phase, planned, j, nx, s)
+    right_hand_side = _right_hand_side(phase, planned, j, s)
     times = t0 + 0.5 * (1.0 + DENSE) * (t1 - t0)
     times[-1] = t1
     solution = solve_ivp(right_hand_side, (t0, t1), y, method=method, rtol=max(rtol, 3e-14), atol=atol, t_eval=times)
     return solution.y.T if solution.success else np.full((len(DENSE), len(y)), np.nan)
 
 
-def _right_hand_side(
-    phase: CompiledPhase, planned: PhaseTrajectory, j: int, nx: int, s: np.ndarray
-) -> Callable[[float, np.ndarray], np.ndarray]:
+def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: np.ndarray) -> Callable[[float, np.ndarray], np.ndarray]:
+    """Rates of states and integrals on element j, called through buffers: some thousand calls a trajectory."""
     t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
+    nx, function = len(phase.states), _rates(phase)
+    x, u, time, out = np.zeros(nx), np.zeros(len(phase.controls)), np.zeros(1), np.zeros(function.size1_out(0))
+    arguments = x, u, time, np.array(s, dtype=float)
+    buffer, trigger = function.buffer()
+    for i, argument in enumerate(arguments):
+        buffer.set_arg(i, memoryview(argument))
+    buffer.set_res(0, memoryview(out))
 
-    def rates(t: float, y: np.ndarray) -> np.ndarray:
-        u = planned.control.on_element(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
-        inputs = y[:nx], u, t, s
-        return np.concatenate([np.array(phase.dynamics(*inputs)).ravel(), np.array(phase.integrands(*inputs)).ravel()])
+    def rates(t: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
+        # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
+        x[:], time[0] = y[:nx], t
+        u[:] = planned.control.on_element(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
+        trigger()
+        return out.copy()
 
     return rates
+
+
+@lru_cache(maxsize=64)
+def _rates(phase: CompiledPhase) -> ca.Function:
+    """(x, u, t, s) -> rates of the states and of the integrals."""
+    inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
+    rates = ca.vertcat(phase.dynamics(*inputs), phase.integrands(*inputs))
+    return expanded(ca.Function("rates", inputs, [ca.densify(rates)]))
 
 
 def _or_infinite(value: float) -> float:
