@@ -1,0 +1,237 @@
+"""A front as labelled arrays and back: the root Dataset, and one for each phase's trajectories.
+
+Nothing here knows files. Floats go through untouched. Points whose meshes differ in size are padded with NaN; their true lengths stand
+beside them (`nodes`, `elements`, ...). A Dataset's attributes are strings and integers; what has structure is JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import Limit, Objective
+
+from .columns import document, named_columns, read_named, read_variables, variable_columns, words
+from .front import Front
+from .source import Source
+
+if TYPE_CHECKING:
+    import xarray
+
+    from transcription.trajectory import PhaseTrajectory, Trajectory
+
+FORMAT = "MACS front"
+VERSION = 1
+
+ARRAYS = {
+    "time": ("node",),
+    "states": ("node", "state"),
+    "controls": ("node", "control"),
+    "paths": ("node", "path"),
+    "edges": ("edge",),
+    "edge_states": ("edge", "state"),
+    "state_coefficients": ("element", "state_function", "state"),
+    "control_edges": ("control_edge",),
+    "control_coefficients": ("control_element", "control_function", "control"),
+}
+"""What a phase holds of each point. The states at `edges`, the ends of the elements, are `edge_states`; within, states and controls are the
+sums of their coefficients times the functions of their basis (`state_basis`, `control_basis`) on [-1, 1]."""
+LENGTHS = ("node", "edge", "element", "state_function", "control_edge", "control_element", "control_function")
+"""The dimensions in which points may differ; `<dimension>_count` (point) are the true lengths."""
+
+
+def root_dataset(front: Front) -> xarray.Dataset:
+    """Everything of a front but its trajectories."""
+    import xarray
+
+    names = list(dict.fromkeys(name for point in front for name in point.parameters))
+    parameters = [[point.parameters.get(name, np.nan) for name in names] for point in front]
+    variables: dict[str, Any] = {
+        "objectives": (("point", "objective"), front.objectives),
+        "violation": (("point",), front.violation),
+        "status": (("point",), front.status),
+        "parameters": (("point", "parameter"), np.array(parameters, dtype=float).reshape(len(front), len(names))),
+        "decision": (("point", "variable"), front.decision),
+        "decision_length": (("point",), front.lengths),
+        "optimality": (("point",), np.array([np.nan if point.optimality is None else point.optimality for point in front])),
+        "objective_unit": (("objective",), words(front.units)),
+        "objective_sense": (("objective",), words(front.senses)),
+        "objective_scale": (("objective",), np.array([np.nan if goal.scale is None else goal.scale for goal in front.goals])),
+        **named_columns(front._violations, "violations", "constraint"),
+        **named_columns(front._excursions, "excursions", "quantity"),
+        **variable_columns(front.variables, "variable"),
+    }
+    labels = {"objective": words(front.names), "parameter": words(names)}
+    return xarray.Dataset(variables, labels, _attributes(front))
+
+
+def root_columns(root: xarray.Dataset) -> dict[str, Any]:
+    """What `Front` is made of, but its trajectories, from `root_dataset`. Raises KeyError or ValueError where something is missing."""
+    signs = np.where(root["objective_sense"].values == "minimize", 1.0, -1.0)
+    scales = root["objective_scale"].values
+    transcription, solver, stats = (json.loads(str(root.attrs[key])) for key in ("transcription", "solver", "stats"))
+    return {
+        "F": root["objectives"].values * signs,
+        "decision": [row[:length] for row, length in zip(root["decision"].values, root["decision_length"].values, strict=True)],
+        "violation": root["violation"].values,
+        "status": root["status"].values,
+        "goals": [
+            Objective(str(name), str(unit), str(sense), None if np.isnan(scale) else float(scale))
+            for name, unit, sense, scale in zip(
+                root["objective"].values, root["objective_unit"].values, root["objective_sense"].values, scales, strict=True
+            )
+        ],
+        "variables": read_variables(root, "variable"),
+        "violations": read_named(root, "violations", "constraint"),
+        "excursions": read_named(root, "excursions", "quantity"),
+        "optimality": root["optimality"].values,
+        "problem": _read_source(root.attrs),
+        "transcription": transcription,
+        "solver": solver,
+        "stats": stats,
+        "message": str(root.attrs["message"]),
+        "sort": False,
+    }
+
+
+def phase_names(front: Front) -> list[str]:
+    """The phases that the trajectories of a front have; none for a black box."""
+    return next((list(point.trajectory) for point in front if point.trajectory is not None), [])
+
+
+def phase_dataset(front: Front, name: str) -> xarray.Dataset:
+    """The trajectories of one phase, all points. Raises KeyError if there is no such phase, ValueError if bases differ."""
+    import xarray
+
+    phases = [None if point.trajectory is None else point.trajectory[name] for point in front]
+    first = next((phase for phase in phases if phase is not None), None)
+    if first is None:
+        raise KeyError(f"no point has a phase '{name}'")
+    if any(phase is not None and (phase.state.basis, phase.control.basis) != (first.state.basis, first.control.basis) for phase in phases):
+        raise ValueError(f"phase '{name}': the points' trajectories are in different bases")
+    rows = [None if phase is None else _arrays(phase) for phase in phases]
+    variables: dict[str, Any] = {
+        array: (("point", *dimensions), _padded([None if row is None else row[array] for row in rows], _arrays(first)[array].shape))
+        for array, dimensions in ARRAYS.items()
+    }
+    variables |= {f"{dimension}_count": (("point",), _counts(rows, dimension)) for dimension in LENGTHS}
+    variables |= variable_columns(first.state_variables, "state") | variable_columns(first.control_variables, "control")
+    variables |= variable_columns(first.path_limits, "path")
+    attributes = {
+        "phase": name,
+        "time_unit": first.time_unit,
+        "state_basis": first.state.basis,
+        "control_basis": first.control.basis,
+    }
+    return xarray.Dataset(variables, attrs=attributes)
+
+
+def trajectories(root: xarray.Dataset, phases: Sequence[xarray.Dataset]) -> list[Trajectory | None] | None:
+    """The points' trajectories from `root_dataset` and `phase_dataset`; None if there are no phases."""
+    from transcription.trajectory import Trajectory
+
+    if not phases:
+        return None
+    columns = [_read_phase(phase) for phase in phases]
+    names = [str(name) for name in root["parameter"].values]
+    found: list[Trajectory | None] = []
+    for parameters, *flight in zip(root["parameters"].values.tolist(), *columns, strict=True):
+        known = [phase for phase in flight if phase is not None]
+        found.append(Trajectory(tuple(known), dict(zip(names, parameters, strict=True))) if known else None)
+    return found
+
+
+def _read_phase(data: xarray.Dataset) -> list[PhaseTrajectory | None]:
+    from transcription.trajectory import PhaseTrajectory, PiecewisePolynomial
+
+    states, controls = read_variables(data, "state"), read_variables(data, "control")
+    limits = tuple(Limit(v.name, v.lower, v.upper, v.scale) for v in read_variables(data, "path"))
+    found: list[PhaseTrajectory | None] = []
+    for i in range(data.sizes["point"]):
+        length = {dimension: int(data[f"{dimension}_count"].values[i]) for dimension in LENGTHS}
+        if not length["node"]:
+            found.append(None)
+            continue
+        array = {
+            name: data[name].values[i][tuple(slice(length.get(dimension)) for dimension in dimensions)].copy()
+            for name, dimensions in ARRAYS.items()
+        }
+        phase = PhaseTrajectory(
+            name=str(data.attrs["phase"]),
+            time_unit=str(data.attrs["time_unit"]),
+            time=array["time"],
+            states=array["states"],
+            controls=array["controls"],
+            paths=array["paths"],
+            edge_states=array["edge_states"],
+            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data.attrs["state_basis"])),
+            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data.attrs["control_basis"])),
+            state_variables=states,
+            control_variables=controls,
+            path_limits=limits,
+        )
+        found.append(phase)
+    return found
+
+
+def _arrays(phase: PhaseTrajectory) -> dict[str, np.ndarray]:
+    return {
+        "time": phase.time,
+        "states": phase.states,
+        "controls": phase.controls,
+        "paths": phase.paths,
+        "edges": phase.state.edges,
+        "edge_states": phase.edge_states,
+        "state_coefficients": phase.state.coefficients,
+        "control_edges": phase.control.edges,
+        "control_coefficients": phase.control.coefficients,
+    }
+
+
+def _padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
+    """Arrays of the same rank in one, NaN where they end; `like` is the shape to take where there is none."""
+    shapes = [row.shape for row in rows if row is not None] or [like]
+    padded = np.full((len(rows), *np.max(shapes, axis=0)), np.nan)
+    for i, row in enumerate(rows):
+        if row is not None:
+            padded[i][tuple(slice(length) for length in row.shape)] = row
+    return padded
+
+
+def _counts(rows: Sequence[Mapping[str, np.ndarray] | None], dimension: str) -> np.ndarray:
+    array, axis = next((name, dims.index(dimension)) for name, dims in ARRAYS.items() if dimension in dims)
+    return np.array([0 if row is None else row[array].shape[axis] for row in rows], dtype=int)
+
+
+def _attributes(front: Front) -> dict[str, Any]:
+    stats = front.stats
+    return {
+        "format": FORMAT,
+        "format_version": VERSION,
+        **_source(front.source),
+        **{key: document(stats[key]) for key in ("seed", "evaluations", "tolerance", "wall_time", "versions")},
+        "transcription": document(front.transcription),
+        "solver": document(front.solver),
+        "stats": document(stats),
+        "message": front.message,
+    }
+
+
+def _source(source: Source | None) -> dict[str, str]:
+    """Without the address if the data that it takes cannot be written down: then the problem has to be passed again."""
+    if source is None:
+        return {"problem": "", "fingerprint": "", "address": "", "data": "{}"}
+    try:
+        address, data = source.address, document(dict(source.data), strict=True)
+    except TypeError:
+        address, data = "", "{}"
+    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data}
+
+
+def _read_source(attributes: Mapping[Any, Any]) -> Source | None:
+    """None for a black box, which has no fingerprint."""
+    name, fingerprint, address = (str(attributes[key]) for key in ("problem", "fingerprint", "address"))
+    return Source(name, fingerprint, address, json.loads(attributes["data"])) if fingerprint else None

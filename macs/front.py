@@ -1,0 +1,310 @@
+"""What a search hands back: a front of points, each of them a trajectory that can be looked at, checked, drawn and saved.
+
+A `Front` is arrays and plain data, one row a point; a `Point` is a light view of one row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Objective, Variable
+
+from .point import Point
+from .source import Source
+from .stats import STATS, versions
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+    from transcription.trajectory import Trajectory
+
+
+class Front:
+    """A set of points, in the user's words.
+
+    Parameters
+    ----------
+    F : array (n, m)
+        Objectives, all minimised.
+    decision : array (n, D), or n arrays of different lengths
+        Decision vectors in the user's units.
+    violation, status : (n,)
+        Largest scaled residual of any constraint; "converged", "infeasible", "failed" or "timeout".
+    goals : tuple of Objective
+        The m objectives as the user stated them.
+    variables : tuple of Variable
+        The D entries of the decision vector.
+    violations : n dicts, optional
+        Scaled residual by constraint.
+    trajectories : n Trajectories, optional
+        None for black boxes; an entry may be None where a point has none.
+    excursions : n dicts or None, optional
+        What leaves its bounds between nodes, scaled, by name.
+    optimality : n floats or None, optional
+    problem : CompiledProblem or Source, optional
+        None for black boxes.
+    transcription, solver : dict, optional
+        `{"method": ..., "settings": {...}}` and `{"name": ..., "settings": {...}}`.
+    stats : dict, optional
+        What the front cost; missing entries of `STATS` are added.
+    message : str
+        What there is to say of an empty front: the most violated constraint.
+    closest : Point, optional
+        The least infeasible point of a search that found nothing feasible.
+    sort : bool
+        By the first objective, in the user's value; else the order given is kept.
+
+    Attributes
+    ----------
+    F, violation, status, goals, variables, transcription, solver, stats, message, source
+        As above; `source` says which problem it is, None for a black box.
+    decision : array (n, D)
+        Padded with NaN beyond `lengths` (n,), should the points' meshes differ in size.
+    """
+
+    def __init__(
+        self,
+        *,
+        F: Any,
+        decision: Any,
+        violation: Any,
+        status: Any,
+        goals: Sequence[Objective],
+        variables: Sequence[Variable] = (),
+        violations: Sequence[Mapping[str, float] | None] | None = None,
+        trajectories: Sequence[Trajectory | None] | None = None,
+        excursions: Sequence[Mapping[str, float] | None] | None = None,
+        optimality: Sequence[float | None] | None = None,
+        problem: CompiledProblem | Source | None = None,
+        transcription: Mapping[str, Any] | None = None,
+        solver: Mapping[str, Any] | None = None,
+        stats: Mapping[str, Any] | None = None,
+        message: str = "",
+        closest: Point | None = None,
+        sort: bool = True,
+    ):
+        self.goals = tuple(goals)
+        self.variables = tuple(variables)
+        self.transcription = None if transcription is None else dict(transcription)
+        self.solver = dict(solver or {})
+        self.stats: dict[str, Any] = {**STATS, "failures": {}, "versions": versions(), **(stats or {})}
+        self.stats["failures"] = dict(self.stats["failures"])
+        self.message = message
+        self._closest = closest
+        self.source = Source.of(problem) if isinstance(problem, CompiledProblem) else problem
+        self._problem = problem if isinstance(problem, CompiledProblem) else None
+
+        rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
+        n = len(rows)
+        order = _order(rows * self._signs) if sort else np.arange(n)
+        self.F = _frozen(rows[order])
+        self.violation = _frozen(np.asarray(_column(violation, n, "violation"), dtype=float)[order])
+        self.status = _frozen(np.asarray(_column(status, n, "status"), dtype=str)[order])
+        self.decision, self.lengths = _decisions([_column(decision, n, "decision")[i] for i in order], len(self.variables))
+        self._violations = [_column(violations, n, "violations")[i] for i in order]
+        self._trajectories = [_column(trajectories, n, "trajectories")[i] for i in order]
+        self._excursions = [_column(excursions, n, "excursions")[i] for i in order]
+        self._optimality = [_number(_column(optimality, n, "optimality")[i]) for i in order]
+
+    # What it holds
+
+    @property
+    def _signs(self) -> np.ndarray:
+        return np.array([goal.sign for goal in self.goals])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objectives."""
+        return tuple(goal.name for goal in self.goals)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the objectives."""
+        return tuple(goal.unit for goal in self.goals)
+
+    @property
+    def senses(self) -> tuple[str, ...]:
+        """ "minimize" or "maximize", for each objective."""
+        return tuple(goal.sense for goal in self.goals)
+
+    @property
+    def objectives(self) -> np.ndarray:
+        """Objectives (n, m) in the user's units and senses."""
+        return self.F * self._signs
+
+    @property
+    def closest(self) -> Point | None:
+        """The least infeasible point. None only if not one evaluation gave a number."""
+        if self._closest is not None or not len(self):
+            return self._closest
+        return self[int(np.argmin(np.where(np.isnan(self.violation), np.inf, self.violation)))]
+
+    @property
+    def problem(self) -> CompiledProblem | None:
+        """The problem, if it is here; a front from a file has it once `compiled` found it."""
+        return self._problem
+
+    def compiled(self) -> CompiledProblem:
+        """The problem: what the front was made with, else what its address loads (which runs the code there).
+
+        Raises
+        ------
+        ValueError
+            For a black box, and where the problem is not found or is another one.
+        """
+        if self.source is None:
+            raise ValueError("this front is of a black box: there are no dynamics to simulate")
+        if self._problem is None:
+            self._problem = self.source.load()
+        return self._problem
+
+    def __len__(self) -> int:
+        return len(self.F)
+
+    def __iter__(self) -> Iterator[Point]:
+        return (Point(self, i) for i in range(len(self)))
+
+    @overload
+    def __getitem__(self, key: int) -> Point: ...
+    @overload
+    def __getitem__(self, key: slice | Sequence[int] | np.ndarray) -> Front: ...
+    def __getitem__(self, key: Any) -> Point | Front:
+        """A Point for a number; a Front, in that order, for a slice, a list of numbers or a mask."""
+        if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
+            if not -len(self) <= key < len(self):
+                raise IndexError(f"point {key} of a front of {len(self)}" + (f": {self.message}" if self.message and not len(self) else ""))
+            return Point(self, int(key) % len(self))
+        return self._take(np.arange(len(self))[key])
+
+    def __repr__(self) -> str:
+        return f"<Front: {self.table().splitlines()[0]}>"
+
+    def _take(self, rows: Sequence[int] | np.ndarray) -> Front:
+        """The front of some of the points, in the order given, with everything else as it is here."""
+        front = Front.__new__(Front)
+        front.__dict__.update(self.__dict__)
+        index = np.asarray(rows, dtype=int)
+        for name in ("F", "violation", "status", "decision", "lengths"):
+            setattr(front, name, _frozen(getattr(self, name)[index]))
+        for name in ("_violations", "_trajectories", "_excursions", "_optimality"):
+            setattr(front, name, [getattr(self, name)[i] for i in index])
+        front.stats = dict(self.stats)
+        return front
+
+    # What it becomes
+
+    def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+        """The front as plain text: a headline, a row for each point, and what there is to beware of.
+
+        Parameters
+        ----------
+        defects : n floats, optional
+            Largest defect of each point's simulation, for a column of its own.
+        columns : mapping, optional
+            More columns: header -> n values.
+        """
+        from .tables import front_table
+
+        return front_table(self, defects, columns)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the objectives: two as a scatter, three with the third as colour, more as parallel coordinates. Returns the Axes."""
+        from .plotting import draw_front
+
+        return draw_front(self, ax)
+
+    def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
+        """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group."""
+        from .dataset import phase_dataset, root_dataset
+
+        return root_dataset(self) if phase is None else phase_dataset(self, phase)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write objectives, violation, status and decisions, one row a point, under a header that names units."""
+        from .storage import save_csv
+
+        save_csv(self, path)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write everything to one netCDF-4 file, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the folder is missing or cannot be written to, or the disk is full; a file that was there before is still there.
+        """
+        from .storage import save
+
+        save(self, path)
+
+    @staticmethod
+    def load(path: str | PathLike[str], problem: Any = None) -> Front:
+        """Read a front that `save` wrote. No code is run: the problem that it names is loaded when a point is first simulated.
+
+        Parameters
+        ----------
+        path : path
+        problem : Problem or CompiledProblem, optional
+            The problem the front is of; needed to simulate the points of one that was stated in a script.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        ValueError
+            If it is not a front, is damaged, of a newer format, or of another problem.
+        """
+        from .storage import load
+
+        return load(path, problem)
+
+    @staticmethod
+    def merge(fronts: Sequence[Front]) -> Front:
+        """The non-dominated feasible points of several fronts of one problem and transcription; what they cost is summed.
+
+        Raises
+        ------
+        ValueError
+            If there is none, or they differ in problem, objectives or variables.
+        """
+        from .merging import merge
+
+        return merge(fronts)
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    array = np.array(array)
+    array.setflags(write=False)
+    return array
+
+
+def _order(objectives: np.ndarray) -> np.ndarray:
+    """By the first objective, ties by the next ones; NaN last."""
+    return np.lexsort(objectives.T[::-1])
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None or np.isnan(value) else float(value)
+
+
+def _column(values: Any, n: int, name: str) -> Any:
+    """`values` if there are n of them; n times None for None."""
+    if values is None:
+        return [None] * n
+    if len(values) != n:
+        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
+    return values
+
+
+def _decisions(rows: Sequence[Any], width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of any lengths as one array, padded with NaN to at least `width`, and their lengths."""
+    lengths = np.array([len(row) for row in rows], dtype=int)
+    decision = np.full((len(rows), max([width, *lengths])), np.nan)
+    for row, values, length in zip(decision, rows, lengths, strict=True):
+        row[:length] = values
+    return _frozen(decision), _frozen(lengths)

@@ -1,0 +1,133 @@
+"""Fronts built by hand: two phases with jumps in their controls, a black box, and their parts."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from macs.front import Front
+from problems import Problem
+from problems.compiled import CompiledProblem, Objective, Variable
+from transcription.polynomials import nodes
+from transcription.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+
+
+def state_problem(name: str = "two legs", speed: float = 3.0) -> Problem:
+    """Two linked phases, three objectives' worth of quantities of which two are stated; `speed` is the bound of v."""
+    problem = Problem(name)
+    mass = problem.parameter("mass", bounds=(1.0, 5.0), unit="kg")
+    climb = problem.phase("climb", t0=0.0, tf=(5.0, 20.0))
+    climb.state("h", bounds=(0.0, 40.0), initial=0.0, unit="km")
+    v = climb.state("v", bounds=(-speed, speed), initial=0.0, unit="km/s")
+    u = climb.control("u", bounds=(-1.0, 1.0), unit="km/s²")
+    climb.dynamics(h=v, v=u / mass)
+    climb.path("load", u * v, upper=2.0)
+    coast = problem.phase("coast", t0=(5.0, 20.0), tf=(6.0, 40.0))
+    g = coast.state("h", bounds=(0.0, 40.0), unit="km")
+    coast.dynamics(h=-0.1)
+    problem.link(climb, coast, states=["h"])
+    problem.minimize("time", coast.tf, unit="s")
+    problem.maximize("height", coast.final(g), unit="km")
+    return problem
+
+
+@lru_cache(maxsize=1)
+def compiled() -> CompiledProblem:
+    return state_problem().compile()
+
+
+def trajectory(rng: np.random.Generator, elements: int = 3, order: int = 4) -> Trajectory:
+    problem = compiled()
+    phases = []
+    t0 = 0.0
+    for phase in problem.phases:
+        tf = t0 + rng.uniform(8.0, 15.0)
+        edges = np.linspace(t0, tf, elements + 1)
+        points = nodes("lobatto", order)
+        middle = 0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * np.diff(edges)[:, None] * points
+        rates = rng.normal(size=len(phase.states))
+        states = 10 + 4 * np.sin(rates * middle[..., None] / 5 + 1)
+        controls = rng.uniform(-0.8, 0.8, size=(elements, order, len(phase.controls)))
+        state = PiecewisePolynomial(edges, states, "lobatto")
+        control = PiecewisePolynomial(edges, controls, "legendre")
+        time = np.unique(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
+        paths = np.tile(np.linspace(0, 2.0, len(time))[:, None], len(phase.paths))
+        phases.append(
+            PhaseTrajectory(
+                phase.name,
+                phase.time_unit,
+                time,
+                state(time),
+                control(time),
+                paths,
+                state(edges),
+                state,
+                control,
+                phase.states,
+                phase.controls,
+                phase.paths,
+            )
+        )
+        t0 = tf
+    return Trajectory(tuple(phases), {"mass": float(rng.uniform(1, 5))})
+
+
+def flights(n: int = 5, seed: int = 0, elements: int | list[int] = 3, **changes) -> Front:
+    """A front of n trajectories; `elements` may differ from point to point."""
+    rng = np.random.default_rng(seed)
+    each = [elements] * n if isinstance(elements, int) else elements
+    times = np.sort(rng.uniform(10, 30, n))
+    columns = {
+        "F": np.column_stack([times, -np.sqrt(times) - 3]),
+        "decision": rng.normal(size=(n, 4)),
+        "violation": rng.uniform(0, 1e-7, n),
+        "status": ["converged"] * n,
+        "violations": [{"climb.load": float(rng.uniform()), "link": 0.0} for _ in range(n)],
+        "trajectories": [trajectory(rng, k) for k in each],
+        "excursions": [{"u": 0.125 * i} if i else {} for i in range(n)],
+        "variables": [Variable(f"climb.u[{i}]", -1.0, 1.0, "km/s²", 2.0) for i in range(4)],
+        "goals": compiled().goals,
+        "problem": compiled(),
+        "transcription": {"method": "DFET", "settings": {"elements": 3, "order": 4, "basis": None}},
+        "solver": {"name": "MACS", "settings": {"agents": 10, "archive": 10}},
+        "stats": {"evaluations": 1000, "inner_iterations": 321, "failures": {"infeasible": 3}, "wall_time": 1.25, "seed": 7},
+    }
+    return Front(**{**columns, **changes})
+
+
+def black_box(n: int = 6, m: int = 2, seed: int = 0, **changes) -> Front:
+    rng = np.random.default_rng(seed)
+    directions = np.abs(rng.normal(size=(n, m)))
+    columns = {
+        "F": directions / np.linalg.norm(directions, axis=1, keepdims=True),
+        "decision": rng.uniform(size=(n, 3)),
+        "violation": np.zeros(n),
+        "status": ["converged"] * n,
+        "goals": [Objective(f"f{i}", "kg" if i == 0 else "", "minimize") for i in range(m)],
+        "variables": [Variable(name, 0.0, 1.0, unit) for name, unit in (("span", "m"), ("chord", "m"), ("twist", ""))],
+        "solver": {"name": "MACS", "settings": {}},
+        "stats": {"evaluations": 200, "wall_time": 0.01},
+    }
+    return Front(**{**columns, **changes})
+
+
+def empty(**changes) -> Front:
+    """A search that found nothing feasible."""
+    least = flights(1, violation=[0.25], status=["infeasible"])
+    return Front(
+        **{
+            "F": np.empty((0, 2)),
+            "decision": [],
+            "violation": [],
+            "status": [],
+            "goals": compiled().goals,
+            "variables": least.variables,
+            "problem": compiled(),
+            "transcription": least.transcription,
+            "solver": least.solver,
+            "message": "no feasible point: 'climb.load' is violated most",
+            "closest": least[0],
+            **changes,
+        }
+    )

@@ -1,0 +1,214 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_fronts import black_box, compiled, empty, flights, state_problem
+
+from macs.dominance import nondominated
+from macs.front import Front
+from macs.point import Point
+from macs.source import Source
+from macs.tables import duration, numbers
+
+
+def test_a_front_is_sorted_by_its_first_objective_in_the_users_value():
+    front = flights(6, F=[[3, -1], [1, -5], [2, -3], [6, -9], [5, -8], [4, -2]])
+    assert front.objectives[:, 0].tolist() == [1, 2, 3, 4, 5, 6]
+    assert front.objectives[:, 1].tolist() == [5, 3, 1, 2, 8, 9]
+    assert np.array_equal(front.F, front.objectives * [1, -1])
+    assert front.names == ("time", "height") and front.units == ("s", "km") and front.senses == ("minimize", "maximize")
+
+
+def test_a_maximised_first_objective_sorts_upwards_too():
+    goals = compiled().goals[::-1]
+    front = flights(3, F=[[-1, 0], [-3, 0], [-2, 0]], goals=goals)
+    assert front.objectives[:, 0].tolist() == [1, 2, 3]
+
+
+def test_payoff_order_is_kept_and_nan_sorts_last():
+    F = [[3.0, 0.0], [np.nan, np.nan], [1.0, 0.0]]
+    assert flights(3, F=F, sort=False).F[:, 0].tolist()[::2] == [3, 1]
+    assert np.isnan(flights(3, F=F).F[2, 0])
+
+
+def test_every_column_follows_the_sorting():
+    front = flights(
+        3, F=[[3, 0], [1, 0], [2, 0]], violation=[0.3, 0.1, 0.2], status=["c", "a", "b"], excursions=[{"u": 3}, {"u": 1}, {"u": 2}]
+    )
+    assert [p.violation for p in front] == [0.1, 0.2, 0.3]
+    assert [p.status for p in front] == ["a", "b", "c"]
+    assert [p.excursions for p in front] == [{"u": 1}, {"u": 2}, {"u": 3}]
+
+
+def test_indexing_gives_points_and_fronts():
+    front = flights(5)
+    assert isinstance(front[0], Point) and isinstance(front[np.int64(-1)], Point)
+    assert front[-1].objectives == {"time": front.objectives[4, 0], "height": front.objectives[4, 1]}
+    for part, rows in ((front[1:4], [1, 2, 3]), (front[::-1], [4, 3, 2, 1, 0]), (front[[2, 0]], [2, 0]), (front[front.F[:, 0] > 15], None)):
+        rows = np.flatnonzero(front.F[:, 0] > 15) if rows is None else rows
+        assert isinstance(part, Front)
+        assert np.array_equal(part.F, front.F[rows])
+        assert [p.trajectory for p in part] == [front[i].trajectory for i in rows]
+    with pytest.raises(IndexError, match="point 5 of a front of 5"):
+        front[5]
+    assert len(list(front)) == len(front) == 5
+
+
+def test_a_point_of_a_trajectory_front():
+    point = flights()[2]
+    assert point.parameters == dict(point.trajectory.parameters)
+    assert point.decision.shape == (4,)
+    assert point.violations.keys() == {"climb.load", "link"}
+    assert point.optimality is None and flights(1, optimality=[1e-9])[0].optimality == 1e-9
+    assert np.array_equal(point.alone().F, point.F[None])
+    assert "time" in repr(point)
+
+
+def test_results_cannot_be_overwritten_by_accident():
+    front = flights()
+    for array in (front.F, front.decision, front.violation, front[0].decision):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+
+
+def test_a_black_box_has_no_trajectory_and_says_so():
+    point = black_box()[0]
+    assert point.trajectory is None and point.excursions is None
+    assert point.parameters.keys() == {"span", "chord", "twist"}
+    with pytest.raises(ValueError, match="black box"):
+        point.simulate()
+
+
+def test_an_unknown_problem_says_what_to_pass():
+    front = flights(problem=Source("two legs", "0" * 32))
+    with pytest.raises(ValueError, match=r"'two legs' was stated in a script.*problem=problem"):
+        front[0].simulate()
+
+
+def test_a_problem_that_changed_is_not_simulated(monkeypatch):
+    monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
+    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs"))
+    with pytest.raises(ValueError, match="belongs to problem 'two legs'"):
+        front[0].simulate()
+
+
+def test_the_problem_is_found_by_its_address_once(monkeypatch):
+    calls = []
+    monkeypatch.setattr("problems.load", lambda name, **data: calls.append((name, data)) or state_problem())
+    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", {"a": 1}))
+    assert front.problem is None
+    assert front.compiled() is front.compiled()
+    assert calls == [("two_legs", {"a": 1})]
+
+
+def test_an_empty_front_has_a_message_and_the_closest_point():
+    front = empty()
+    assert len(front) == 0 and front.F.shape == (0, 2) and front.objectives.shape == (0, 2)
+    assert front.closest.violation == 0.25
+    text = front.table()
+    assert "no feasible point" in text and "climb.load" in text and "2.5e-01" in text
+    with pytest.raises(IndexError, match=r"climb\.load"):
+        front[0]
+
+
+def test_stats_are_always_whole():
+    stats = Front(F=np.empty((0, 2)), decision=[], violation=[], status=[], goals=compiled().goals).stats
+    keys = ["evaluations", "inner_iterations", "gradient_solves", "failures", "wall_time", "seed", "tolerance", "versions", "reproducible"]
+    assert set(keys) <= set(stats)
+    assert {"python", "numpy", "casadi"} <= set(stats["versions"])
+
+
+def test_columns_of_wrong_length_are_named():
+    with pytest.raises(ValueError, match="violation has 2 entries, F has 5 rows"):
+        flights(5, violation=[0, 0])
+
+
+# Merging
+
+
+def test_merging_keeps_what_nothing_dominates():
+    fronts = [flights(7, seed) for seed in range(3)]
+    merged = Front.merge(fronts)
+    F = np.vstack([front.F for front in fronts])
+    expected = F[nondominated(F)]
+    assert np.array_equal(merged.F, expected[np.argsort(expected[:, 0])])
+    assert merged[0].trajectory is not None and merged.problem is compiled()
+
+
+def test_merging_sums_what_was_spent():
+    merged = Front.merge([flights(3, stats={"evaluations": 10, "failures": {"failed": 1}, "seed": 4, "wall_time": 1.0, "tolerance": 1e-6}),
+                          flights(3, 1, stats={"evaluations": 32, "failures": {"failed": 2, "infeasible": 1}, "seed": 5, "wall_time": 0.5,
+                                               "tolerance": 1e-8, "reproducible": False})])  # fmt: skip
+    assert merged.stats["evaluations"] == 42 and merged.stats["wall_time"] == 1.5
+    assert merged.stats["failures"] == {"failed": 3, "infeasible": 1}
+    assert merged.stats["seed"] == [4, 5] and merged.stats["tolerance"] == 1e-6 and merged.stats["reproducible"] is False
+    assert Front.merge([merged, merged]).stats["seed"] == [4, 5, 4, 5]
+
+
+def test_merging_drops_what_did_not_converge():
+    bad = flights(2, F=[[0.0, -100.0], [np.nan, np.nan]], status=["infeasible", "failed"], sort=False)
+    good = flights(3)
+    assert np.array_equal(Front.merge([bad, good]).F, Front.merge([good]).F)
+
+
+def test_merging_only_empty_fronts_keeps_the_closest():
+    merged = Front.merge([empty(closest=flights(1, violation=[0.5])[0], message="far"), empty()])
+    assert len(merged) == 0 and merged.closest.violation == 0.25 and "climb.load" in merged.message
+    assert Front.merge([black_box(0), black_box(0)]).closest is None
+
+
+def test_fronts_of_different_things_do_not_merge():
+    other = state_problem(speed=4.0).compile()
+    with pytest.raises(ValueError, match="'two legs' and 'two legs': the same name, but other bounds"):
+        Front.merge([flights(), flights(problem=other)])
+    with pytest.raises(ValueError, match="'two legs' and a black box"):
+        Front.merge([flights(), black_box()])
+    with pytest.raises(ValueError, match=r"minimize f0 \[kg\].*minimize f2"):
+        Front.merge([black_box(m=2), black_box(m=3)])
+    with pytest.raises(ValueError, match=r"different decision vectors.*'elements': 3.*Radau"):
+        Front.merge([flights(), flights(transcription={"method": "Radau", "settings": {}})])
+    with pytest.raises(ValueError, match="no front"):
+        Front.merge([])
+
+
+# Tables
+
+
+def test_a_table_has_a_row_for_each_point_and_says_what_to_beware_of():
+    front = flights(5)
+    lines = front.table(defects=[1e-9] * 5, columns={"note": list("abcde")}).split("\n")
+    assert lines[0] == "two legs: 5 points, DFET(elements=3, order=4), MACS, 1 000 evaluations, seed 7, 1.2 s"
+    assert "min [s]" in lines[3] and "max [km]" in lines[3] and "defect" in lines[2] and "note" in lines[2]
+    assert len([line for line in lines if "converged" in line]) == 5
+    assert "4 of 5 points leave their bounds between nodes: u of point 4 by 0.5" in lines[-1]
+    assert max(map(len, lines)) < 140 and all(line == line.rstrip() for line in lines)
+    with pytest.raises(ValueError, match="'defect' has 2 entries"):
+        front.table(defects=[0, 1])
+
+
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=6))
+def test_any_number_can_be_shown(values):
+    shown = numbers(values)
+    assert len(shown) == len(values) and all(len(text) < 30 for text in shown)
+
+
+def test_numbers_show_what_differs():
+    assert numbers([1000.00001, 1000.00002]) == ["1000.00001000", "1000.00002000"]
+    assert numbers([109.09461, 250]) == ["109.095", "250.000"]
+    assert numbers([-0.0, 0.0]) == ["0.00000", "0.00000"]
+    assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
+
+
+def test_durations_are_for_people():
+    assert [duration(s) for s in (0.0123, 3.61, 59.7, 61, 7384)] == ["0.012 s", "3.6 s", "60 s", "1 min 01 s", "2 h 03 min"]
+
+
+def test_importing_fronts_imports_nothing_heavy():
+    code = "import sys, macs.front; print([m for m in ('matplotlib', 'xarray', 'pandas', 'h5netcdf') if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import warnings
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from synthetic_fronts import black_box, empty, flights
+
+from macs.drawing import _dense
+from macs.plotting import blank_figure
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+def draw(figure: Figure) -> bytes:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png", dpi=50)
+    return picture.getvalue()
+
+
+@pytest.mark.parametrize(
+    "front",
+    [
+        flights(6),
+        flights(1),
+        flights(3, status=["converged", "infeasible", "failed"]),
+        empty(),
+        empty(closest=None),
+        black_box(9, 1),
+        black_box(9, 2),
+        black_box(9, 3),
+        black_box(9, 5),
+        black_box(0, 2),
+        black_box(0, 3),
+        black_box(0, 4),
+        black_box(2, 4, F=np.ones((2, 4))),
+    ],
+)
+def test_every_front_can_be_drawn(front):
+    ax = front.plot()
+    assert draw(ax.figure).startswith(b"\x89PNG")
+
+
+def test_axes_are_labelled_with_units_and_senses():
+    ax = flights().plot()
+    assert ax.get_xlabel() == "\N{LEFTWARDS ARROW} time [s]" and ax.get_ylabel() == "height [km] \N{RIGHTWARDS ARROW}"
+    assert "best height" in ax.get_legend().get_texts()[1].get_text()
+    offsets = ax.collections[0].get_offsets()
+    assert np.array_equal(offsets, flights().objectives)
+
+
+def test_given_axes_are_used_and_style_does_not_leak():
+    before = dict(matplotlib.rcParams)
+    ax = blank_figure().add_subplot()
+    assert flights().plot(ax=ax) is ax
+    space = blank_figure().add_subplot(projection="3d")
+    assert black_box(5, 3).plot(space) is space and space.get_zlabel()
+    assert {k: v for k, v in matplotlib.rcParams.items() if before[k] != v} == {}
+
+
+def test_a_point_is_drawn_with_all_it_has():
+    point = flights()[1]
+    axes = point.plot()
+    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load"]
+    draw(axes[0].figure)
+    figure = blank_figure()
+    assert point.plot(figure)[0].figure is figure
+
+
+def test_controls_jump_where_their_polynomials_do():
+    control = flights()[0].trajectory["climb"].control
+    times, values = _dense(control, 0)
+    assert np.isnan(values).sum() == len(control.edges) - 1
+    first = values[: np.flatnonzero(np.isnan(values))[0]]
+    assert first[-1] == pytest.approx(control.on_element(0, np.array([1.0]))[0, 0])
+    assert times[np.flatnonzero(np.isnan(values))[0] + 1] == control.edges[1]
+
+
+def test_a_black_box_point_has_nothing_to_draw():
+    with pytest.raises(ValueError, match="no trajectory to draw"):
+        black_box()[0].plot()
+
+
+def test_pictures_need_no_display(tmp_path):
+    code = "from synthetic_fronts import flights; f = flights(); f.plot().figure.savefig('a.png'); f[0].plot()[0].figure.savefig('b.png')"
+    environment = {"PATH": "", "PYTHONPATH": ":".join(sys.path), "MPLBACKEND": "TkAgg", "MPLCONFIGDIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True, timeout=60)
+    assert (tmp_path / "a.png").stat().st_size > 1000 and (tmp_path / "b.png").stat().st_size > 1000
