@@ -1,0 +1,10 @@
+"""Floor 3: the search over several objectives, and the fronts that it finds."""
+
+from .evaluation import Evaluation, Evaluator
+from .front import Front
+from .macs import MACS
+from .monitor import Progress
+from .point import Point
+from .solver import Solver
+
+__all__ = ["MACS", "Evaluation", "Evaluator", "Front", "Point", "Progress", "Solver"]

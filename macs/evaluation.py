@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,6 +69,8 @@ class Evaluator(ABC):
     tolerance : float
         A point whose violation is at most this is feasible.
     counts : Counts
+    before_batch : callable
+        Called without arguments before each batch; it may end the search by raising an exception.
     """
 
     m: int
@@ -77,6 +80,7 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     counts: Counts
+    before_batch: Callable[[], None] = staticmethod(lambda: None)
 
     @abstractmethod
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
@@ -88,6 +92,7 @@ class Evaluator(ABC):
 
     def evaluate(self, Z: np.ndarray) -> Evaluation:
         """Evaluate full vectors (k, D): their free entries are the candidates, the others what to start from. Each row counts as one."""
+        self.before_batch()
         evaluation, iterations = self._evaluate(Z)
         self.counts.evaluations += len(Z)
         self.counts.inner_iterations += iterations

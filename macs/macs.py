@@ -12,10 +12,11 @@ import numpy as np
 from macs import search
 from macs.evaluation import Evaluator
 from macs.search import SearchState
+from macs.solver import Solver
 
 
 @dataclass(frozen=True)
-class MACS:
+class MACS(Solver):
     """Multi-Agent Collaborative Search (Ricciardi and Vasile 2015; Ricciardi, Vasile and Maddock 2016).
 
     A few agents look for better points, each by itself and then with what all have found; an archive keeps the best trade-offs,

@@ -1,0 +1,102 @@
+"""Watching a search: progress, callbacks, and the ways in which it may end before its budget does."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .front import Front
+
+
+class Stopped(Exception):  # noqa: N818 - an end, not an error
+    """The search is to end with what it has. The text says why."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How a search stands.
+
+    Attributes
+    ----------
+    evaluations, budget : int
+    elapsed : float
+        Seconds.
+    archive : int
+        Points in the archive.
+    ideal : mapping
+        The best value of each objective in the archive, by name, in the user's senses; empty as long as nothing feasible was found.
+    failures : mapping
+        Evaluations that did not converge, by status.
+    """
+
+    evaluations: int
+    budget: int
+    elapsed: float
+    archive: int
+    ideal: Mapping[str, float]
+    failures: Mapping[str, int]
+    make_front: Callable[[], Front] = field(repr=False)
+
+    @property
+    def front(self) -> Front:
+        """The front found so far; made when it is asked for."""
+        return self.make_front()
+
+
+class Monitor(AbstractContextManager["Monitor"]):
+    """Ends a search on Ctrl-C, after a time limit or when a callback says so, always with what it has.
+
+    While it is entered in the main thread, the first Ctrl-C only asks the search to stop, before its next batch; a second one interrupts
+    at once, as usual.
+    """
+
+    def __init__(self, time_limit: float | None, callback: Callable[[Progress], Any] | None, display: Callable[[Progress], None] | None):
+        self._time_limit, self._callback, self._display = time_limit, callback, display
+        self._interrupted = False
+        self._previous: Any = None
+        self.started = time.perf_counter()
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self.started
+
+    def __enter__(self) -> Monitor:
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def before_batch(self, progress: Progress) -> None:
+        """Pass progress on to the display; raise `Stopped` if the search is to end here."""
+        self.show(progress)
+        if self._interrupted:
+            raise Stopped("interrupted")
+        if self._time_limit is not None and self.elapsed > self._time_limit:
+            raise Stopped("time limit")
+
+    def show(self, progress: Progress) -> None:
+        """Pass progress on to the display."""
+        if self._display is not None:
+            self._display(progress)
+
+    def after_iteration(self, progress: Progress) -> None:
+        """Pass progress on to display and callback; raise `Stopped` if the callback returns True."""
+        self.show(progress)
+        if self._callback is not None and self._callback(progress) is True:
+            raise Stopped("callback")
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        if self._interrupted:
+            raise KeyboardInterrupt
+        self._interrupted = True

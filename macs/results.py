@@ -1,0 +1,84 @@
+"""From what a search ends with to a Front in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective, Variable
+from transcription.base import NLP
+from transcription.sampling import excursions
+
+from .archive import Archive
+from .evaluation import CONVERGED, INFEASIBLE
+from .front import Front
+
+
+def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Front:
+    """A front of trajectories; violations are taken anew from the NLP, not from whoever found the points."""
+
+    def of(points: Archive, **more: Any) -> Front:
+        F, violation = nlp.evaluate(points.Z) if len(points) else (points.F, points.violation)
+        flights = [nlp.unpack(z) for z in points.Z]
+        return Front(
+            F=F,
+            decision=points.Z,
+            violation=violation,
+            status=_status(violation, stats["tolerance"]),
+            goals=nlp.problem.goals,
+            variables=nlp.variables,
+            violations=[nlp.violations(z) for z in points.Z],
+            trajectories=flights,
+            excursions=[excursions(nlp.problem, flight) for flight in flights],
+            problem=nlp.problem,
+            transcription=nlp.transcription.to_dict(),
+            solver=solver,
+            stats=stats,
+            **more,
+        )
+
+    if len(archive) or not len(closest) or not np.isfinite(closest.Z).all():
+        return of(archive, message="" if len(archive) else _nothing(stats))
+    nearest = of(closest)[0]
+    label, amount = max(nearest.violations.items(), key=lambda item: item[1])
+    message = f"{_nothing(stats)}; the nearest misses {label} by {amount:.2g} of its scale"
+    return of(archive, message=message, closest=nearest)
+
+
+def black_box_front(
+    archive: Archive,
+    closest: Archive,
+    goals: Sequence[Objective],
+    variables: Sequence[Variable],
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+) -> Front:
+    """A front of plain decisions."""
+
+    def of(points: Archive, **more: Any) -> Front:
+        return Front(
+            F=points.F,
+            decision=points.Z,
+            violation=points.violation,
+            status=_status(points.violation, stats["tolerance"]),
+            goals=goals,
+            variables=variables,
+            solver=solver,
+            stats=stats,
+            **more,
+        )
+
+    if len(archive) or not len(closest):
+        return of(archive, message="" if len(archive) else _nothing(stats))
+    message = f"{_nothing(stats)}; the nearest violates the constraints by {closest.violation[0]:.2g}"
+    return of(archive, message=message, closest=of(closest)[0])
+
+
+def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
+    return np.where(violation <= tolerance, CONVERGED, INFEASIBLE)
+
+
+def _nothing(stats: Mapping[str, Any]) -> str:
+    return f"nothing feasible in {stats['evaluations']} evaluations"

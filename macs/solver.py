@@ -1,0 +1,175 @@
+"""The contract of this floor: a solver has settings, begins and advances a search, and so solves problems and minimises functions."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Objective, Variable
+from problems.problem import Problem
+from transcription.base import Transcription
+from transcription.inner import InnerSolver, inner_solver
+
+from .bilevel import Bilevel
+from .blackbox import BlackBox
+from .evaluation import Evaluator
+from .front import Front
+from .inputs import beginning, check_problem, check_run, decisions
+from .monitor import Progress
+from .results import black_box_front, trajectory_front
+from .running import Run
+
+Callback = Callable[[Progress], Any]
+
+
+class Solver(ABC):
+    """A search over several objectives.
+
+    An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state is all that it knows
+    between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
+    """
+
+    @abstractmethod
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """Evaluate a first population, of which the full vectors `start` (k, D) are the first; returns the state."""
+
+    @abstractmethod
+    def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
+        """One iteration, within the budget of evaluations."""
+
+    def solve(
+        self,
+        problem: Problem | CompiledProblem,
+        transcription: Transcription,
+        *,
+        evaluations: int,
+        seed: int | None = None,
+        inner: str | InnerSolver = "auto",
+        tolerance: float = 1e-6,
+        start: Any = None,
+        time_limit: float | None = None,
+        progress: bool = False,
+        callback: Callback | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Front:
+        """Search an optimal control problem for its Pareto front.
+
+        Parameters
+        ----------
+        problem : Problem
+        transcription : Transcription
+        evaluations : int
+            How many candidates may be sent to the inner level; never exceeded.
+        seed : int, optional
+            The same one gives the same bits. None draws one, which `stats` record.
+        inner : str or InnerSolver
+            "auto", "march", "ipopt", "ipopt-feasibility", or one of your own.
+        tolerance : float
+            Largest scaled residual of a feasible point.
+        start : Front, Points or array (k, n), optional
+            Decisions to begin with: all variables, or the free ones only.
+        time_limit : float, optional
+            Seconds after which the search ends with what it has. A safety net: a run that it ends is recorded as not reproducible.
+        progress : bool
+            Show how the search stands on the terminal.
+        callback : callable, optional
+            Called with a `Progress` after every iteration; the search ends if it returns True.
+        checkpoint : path, optional
+            Not available yet.
+
+        Returns
+        -------
+        Front
+            Feasible, mutually non-dominated points. Empty if none was found: then `message` says why, and `closest` is the nearest.
+
+        Raises
+        ------
+        ValueError
+            If the problem is stated wrongly or an argument makes no sense, before any work.
+        """
+        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        check_problem(problem, transcription)
+        solver = inner_solver(inner)
+        nlp = transcription.transcribe(problem)
+        about = {"inner": inner if isinstance(inner, str) else repr(inner)}
+        run = Run(
+            self,
+            Bilevel(nlp, solver, float(tolerance)),
+            goals=lambda: nlp.problem.goals,
+            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, self._about(), stats | about),
+            budget=evaluations,
+            seed=seed,
+            start=beginning(start, nlp),
+        )
+        return run.go(time_limit, progress, callback)
+
+    def minimize(
+        self,
+        function: Any,
+        bounds: Any = None,
+        *,
+        evaluations: int,
+        seed: int | None = None,
+        constraints: Callable[[np.ndarray], np.ndarray] | None = None,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        senses: Sequence[str] | None = None,
+        tolerance: float = 1e-6,
+        start: Any = None,
+        time_limit: float | None = None,
+        progress: bool = False,
+        callback: Callback | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Front:
+        """Search a plain vector function, or a pymoo Problem, for its Pareto front.
+
+        Parameters
+        ----------
+        function : callable or pymoo Problem
+            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)` with G <= 0 where feasible. A row with NaN is a failed evaluation.
+        bounds : pairs, pair of arrays, or mapping
+            d pairs; (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
+        evaluations : int
+            How many rows of X may be evaluated; never exceeded.
+        constraints : callable, optional
+            `constraints(X) -> G`, G <= 0 where feasible.
+        names, units, senses : sequences of str, optional
+            Of the objectives; senses are "minimize" or "maximize".
+        seed, tolerance, start, time_limit, progress, callback, checkpoint
+            As for `solve`.
+
+        Returns
+        -------
+        Front
+
+        Raises
+        ------
+        ValueError
+            If an argument, or what the function returns, makes no sense.
+        """
+        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
+        sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
+        variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
+
+        def goals() -> tuple[Objective, ...]:
+            return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
+
+        run = Run(
+            self,
+            box,
+            goals=goals,
+            make_front=lambda state, stats: black_box_front(state.archive, state.closest, goals(), variables, self._about(), stats),
+            budget=evaluations,
+            seed=seed,
+            start=None if start is None else decisions(start, variables),
+        )
+        return run.go(time_limit, progress, callback)
+
+    def _about(self) -> dict[str, Any]:
+        return {"name": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
