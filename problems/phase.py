@@ -56,9 +56,7 @@ class Phase:
             raise KeyError(f"phase '{self.name}' has no '{name}'; it has {', '.join(self._symbols) or 'nothing yet'}")
         return self._symbols[name]
 
-    def state(
-        self, name: str, *, bounds: Any, initial: Any = None, final: Any = None, unit: str = "", scale: float | None = None
-    ) -> ca.MX:
+    def state(self, name: str, *, bounds: Any, initial: Any = None, final: Any = None, unit: str = "", scale: float | None = None) -> ca.MX:
         """Declare a state.
 
         Parameters
@@ -216,4 +214,3 @@ class Phase:
             integrands=function("integrands", [expr for _, expr in self._quantities["integral"]]),
             peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
         )
-

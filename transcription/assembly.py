@@ -75,7 +75,8 @@ class Assembly:
 
     def guess(self) -> np.ndarray:
         """See `NLP.guess`."""
-        found = {int(slot): self.problem.guesses.get(v.name, np.nan) for v, slot in zip(self.problem.parameters, self.parameters, strict=True)}
+        slots = zip(self.problem.parameters, self.parameters, strict=True)
+        found = {int(slot): self.problem.guesses.get(v.name, np.nan) for v, slot in slots}
         for writer in self._writers.values():
             times = []
             for variable, slot in ((writer.phase.t0, writer.ends.t0), (writer.phase.tf, writer.ends.tf)):
@@ -85,7 +86,8 @@ class Assembly:
                 times.append(found.get(slot, 0.5 * (variable.lower + variable.upper)))
             for state, (low, high), slot in zip(writer.phase.states, writer.phase.initial, writer.ends.initial, strict=True):
                 if state.name in writer.phase.guesses:
-                    given = along(writer.phase.guesses[state.name], *(np.array([t]) for t in times), np.zeros(1))
+                    t0, tf = np.array(times[:1]), np.array(times[1:])
+                    given = along(writer.phase.guesses[state.name], t0, tf, np.zeros(1))
                     found.setdefault(int(slot), float(np.clip(given[0, 0], low, high)))
             found |= writer.guess_controls(*times)
         return np.array([found.get(slot, np.nan) for slot in self.layout.free])
@@ -119,7 +121,8 @@ class Assembly:
         """See `NLP.unpack`."""
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         phases = tuple(self._writers[i].unpack(extended) for i in range(len(self.problem.phases)))
-        return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in zip(self.problem.parameters, self.parameters, strict=True)})
+        slots = zip(self.problem.parameters, self.parameters, strict=True)
+        return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
 
     def _ends(self, i: int) -> Ends:
         """Slots of the ends of phase i: new variables, but for those that a link shares with a phase written before."""

@@ -14,7 +14,7 @@ from .dfet_tables import Tables
 from .guess import along, line
 from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows, Written
-from .trajectory import PhaseTrajectory, PiecewisePolynomial
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
 
 NEWTON_ITERATIONS = 30
 NEWTON_TOLERANCE = 1e-14
@@ -37,7 +37,7 @@ class DFETPhase(PhaseWriter):
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
         self._element = expanded(_element(tables, phase))
-        self._propagate = _propagation(self._element, elements, tables, len(phase.states), phase)
+        self._propagate = _propagation(self._element, elements, tables, phase)
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
@@ -104,32 +104,32 @@ class DFETPhase(PhaseWriter):
         for i, control in enumerate(phase.controls):
             if control.period:
                 U[:, :, i] = np.unwrap(U[:, :, i], axis=1, period=control.period)
-        state = PiecewisePolynomial(edges, extended[self.X], tables.state_basis)
-        control_law = PiecewisePolynomial(edges, U, tables.control_basis)
-        inside = edges[:-1, None] + 0.5 * (1.0 + tables.tau) * np.diff(edges)[:, None]
+        control = PiecewisePolynomial(edges, U, tables.control_basis)
         B = extended[self.B]
-        time = np.append(np.column_stack([edges[:-1], inside]).ravel(), edges[-1])
-        states = np.concatenate([B[:-1, None], state(inside)], axis=1).reshape(-1, len(phase.states))
-        states = np.vstack([states, B[-1:]])
-        controls = np.vstack([control_law(time[:-1]), control_law.on_element(self.n - 1, np.ones(1))])
+        inside = tables.state(tables.tau) @ extended[self.X]
+        closed = np.concatenate([B[:-1, None], inside, B[1:, None]], axis=1)
+        time = (edges[:-1, None] + 0.5 * (1.0 + tables.points[:-1]) * np.diff(edges)[:, None]).ravel()
+        time = np.append(time, edges[-1])
+        states = np.vstack([closed[:, :-1].reshape(-1, len(phase.states)), B[-1:]])
+        controls = np.vstack([control(time[:-1]), control.on_element(self.n - 1, np.ones(1))])
         paths = np.array(phase.path(states.T, controls.T, time[None], s)).T
         return PhaseTrajectory(
             name=phase.name,
             time_unit=phase.time_unit,
             time=time,
             states=states,
-            controls=_wrapped(controls, phase),
+            controls=wrapped(controls, phase.controls),
             paths=paths.reshape(len(time), len(phase.paths)),
             edge_states=B,
-            state=state,
-            control=control_law,
+            state=PiecewisePolynomial(edges, closed, "closed-legendre"),
+            control=control,
             state_variables=phase.states,
             control_variables=phase.controls,
             path_limits=phase.paths,
         )
 
     def _labels(self, tests: int) -> list[str]:
-        """What a miss of the dynamics is called. An imposed final value enters the last row of the last element, so that row bears its name."""
+        """What a miss is called: an imposed final value enters the last row of the last element, which therefore bears its name."""
         names = [f"dynamics of {self.phase.name}.{v.name}" for v in self.phase.states]
         last = [
             f"final value of {self.phase.name}.{v.name}" if low == high else name
@@ -150,16 +150,14 @@ def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
         times = start + 0.5 * h * ca.DM(1.0 + tau).T
         return function.map(len(tau))(states, law @ ca.DM(tables.control(tau)).T, times, ca.repmat(s, 1, len(tau)))
 
-    def with_ends(tau: np.ndarray) -> ca.MX:
-        return ca.horzcat(left, X @ ca.DM(tables.state(tau[1:-1])).T, right)
-
     inside = X @ ca.DM(tables.state(tables.tau)).T
+    closed = ca.horzcat(left, inside, right)
     rates = over(phase.dynamics, tables.tau, inside)
     first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
     weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
-    paths = over(phase.path, tables.points, with_ends(tables.points))
-    peaks = over(phase.peaks, tables.dense, with_ends(tables.dense))
+    paths = over(phase.path, tables.points, closed)
+    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown).T)
     ends = ca.vec(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T)
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
     return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)
@@ -179,21 +177,12 @@ def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
     return ca.horzcat(*law)
 
 
-def _wrapped(controls: np.ndarray, phase: CompiledPhase) -> np.ndarray:
-    """Controls (k, nu) of which the periodic ones are brought back into their bounds."""
-    result = controls.copy()
-    for i, v in enumerate(phase.controls):
-        if v.period:
-            result[:, i] = v.lower + np.mod(controls[:, i] - v.lower, v.period)
-    return result
-
-
-def _propagation(element: ca.Function, n: int, tables: Tables, nx: int, phase: CompiledPhase) -> ca.Function:
+def _propagation(element: ca.Function, n: int, tables: Tables, phase: CompiledPhase) -> ca.Function:
     """(initial states, U, starts, h, s), the last four a column or block for each element -> (states at the right ends, X).
 
     On each element, Newton's method for the coefficients of the states from the first l + 1 tests; the last test gives the right end.
     """
-    order = tables.order + 1
+    nx, order = len(phase.states), tables.order + 1
     scale = ca.DM([v.scale for v in phase.states])
     Y, left, U = ca.MX.sym("Y", nx * order), ca.MX.sym("left", nx), ca.MX.sym("U", *element.size_in(1))
     start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", element.size1_in(6))

@@ -7,13 +7,13 @@ centennial retrospective", CAGD 29(6), 2012).
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import comb
 
-BASES = ("lobatto", "legendre", "bernstein")
+BASES = ("lobatto", "legendre", "closed-legendre", "bernstein")
 
 
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -30,14 +30,19 @@ def lobatto_nodes(n: int) -> np.ndarray:
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
-@lru_cache(maxsize=None)
+@cache
 def nodes(basis: str, degree: int) -> np.ndarray:
-    """Where the basis' coefficients live on [-1, 1], shape (degree + 1,): the nodes of a Lagrange basis, the abscissae of the Bernstein
-    control points (equally spaced). Raises ValueError for an unknown basis."""
+    """Where a basis' coefficients live on [-1, 1], shape (degree + 1,).
+
+    Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends), those of Bernstein's the equally spaced
+    abscissae of the control points. Raises ValueError for an unknown basis.
+    """
     if basis == "lobatto":
         points = lobatto_nodes(degree + 1)
     elif basis == "legendre":
         points = gauss_legendre(degree + 1)[0]
+    elif basis == "closed-legendre":
+        points = np.array([-1.0, *gauss_legendre(degree - 1)[0], 1.0])
     elif basis == "bernstein":
         points = np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1)
     else:
@@ -98,7 +103,7 @@ def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     return lagrange_derivative(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _barycentric_weights(basis: str, degree: int) -> np.ndarray:
     points = nodes(basis, degree)
     return 1.0 / np.prod(points[:, None] - points + np.eye(degree + 1), axis=1)

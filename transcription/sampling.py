@@ -45,7 +45,9 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
         states, controls, paths = _dense(phase.path, flown, parameters)
         bounded = tuple(v for v in phase.controls if v.period is None)
         columns = [i for i, v in enumerate(phase.controls) if v.period is None]
-        for values, limits in ((states, phase.states), (controls[:, columns], bounded), (paths, phase.paths)):
+        groups: list[tuple[np.ndarray, Sequence[Variable | Limit]]]
+        groups = [(states, phase.states), (controls[:, columns], bounded), (paths, phase.paths)]
+        for values, limits in groups:
             for limit, amount in zip(limits, excess(values, limits), strict=True):
                 if amount > NEGLIGIBLE:
                     found[f"{phase.name}.{limit.name}"] = float(amount)

@@ -209,8 +209,8 @@ def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: 
     arguments = x, u, time, np.array(s, dtype=float)
     buffer, trigger = function.buffer()
     for i, argument in enumerate(arguments):
-        buffer.set_arg(i, memoryview(argument))
-    buffer.set_res(0, memoryview(out))
+        buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
+    buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
 
     def rates(t: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
         # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.

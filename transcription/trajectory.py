@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,8 +50,9 @@ class PhaseTrajectory:
     """One phase of a flight, at nodes and between them.
 
     `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
-    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there. `edge_states` (N + 1, nx) are the states at the ends
-    of the elements, the most accurate the method knows; inside, `state` and `control` interpolate. All in the user's units.
+    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there. `state` and `control` interpolate; at the ends of the
+    elements `state` takes the `edge_states` (N + 1, nx), the most accurate that the method knows. A periodic control is continued beyond
+    its bounds inside an element, so that it interpolates the short way round. All in the user's units.
     """
 
     name: str
@@ -78,7 +79,8 @@ class PhaseTrajectory:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the states, controls and path constraints, in that order."""
-        return tuple(v.name for v in (*self.state_variables, *self.control_variables, *self.path_limits))
+        limits: tuple[Variable | Limit, ...] = (*self.state_variables, *self.control_variables, *self.path_limits)
+        return tuple(limit.name for limit in limits)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Values at the nodes (`time`) of the state, control or path constraint called `name`."""
@@ -89,7 +91,7 @@ class PhaseTrajectory:
     def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
         """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.
 
-        At an end of an element the states are the edge states, and a control that jumps there has its value just after the jump.
+        Where a control jumps, at an end of an element, it has its value just after the jump.
 
         Raises
         ------
@@ -100,12 +102,17 @@ class PhaseTrajectory:
         slack = 1e-12 * max(1.0, abs(self.t0), abs(self.tf))
         if not np.all((times >= self.t0 - slack) & (times <= self.tf + slack)):
             raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
-        states = self.state(times)
-        edge = np.minimum(np.searchsorted(self.state.edges, times - slack), len(self.state.edges) - 1)
-        on_edge = np.abs(self.state.edges[edge] - times) <= slack
-        states = np.where(on_edge[..., None], self.edge_states[edge], states)
-        values = np.concatenate([states, self.control(times)], axis=-1)
-        return {name: values[..., i] if times.ndim else float(values[..., i]) for i, name in enumerate(self.names[: values.shape[-1]])}
+        values = np.concatenate([self.state(times), wrapped(self.control(times), self.control_variables)], axis=-1)
+        return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
+
+
+def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
+    result = np.array(controls, dtype=float)
+    for i, v in enumerate(variables):
+        if v.period:
+            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +128,7 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
                 return phase
         raise KeyError(f"no phase '{name}'; there are {', '.join(self)}")
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return (phase.name for phase in self.phases)
 
     def __len__(self) -> int:

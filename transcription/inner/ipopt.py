@@ -118,7 +118,7 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
 
 
 def _back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    period = nlp.period
-    wrapped = nlp.lower + np.mod(z - nlp.lower, np.where(period > 0, period, 1.0))
-    outside = (period > 0) & ((z < nlp.lower) | (z > nlp.upper))
-    return np.clip(np.where(outside, wrapped, z), nlp.lower, nlp.upper)
+    """Periodic variables wrapped, the others clipped."""
+    out = np.flatnonzero((nlp.period > 0) & ((z < nlp.lower) | (z > nlp.upper)))
+    z[out] = nlp.lower[out] + np.mod(z[out] - nlp.lower[out], nlp.period[out])
+    return np.clip(z, nlp.lower, nlp.upper)
