@@ -40,7 +40,7 @@ class Problem:
         self.name = checks.name_of("problem", name, (), "Problem")
         self.address = ""
         self.data: Mapping[str, Any] = {}
-        self.default_transcription = "dfet:8x3"
+        self.default_transcription = "dfet:8x3:bernstein"
         self.default_evaluations = 10_000
         self.verify_tolerance = 1e-2
         self._phases: dict[str, Phase] = {}

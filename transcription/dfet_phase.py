@@ -101,9 +101,9 @@ class DFETPhase(PhaseWriter):
         s = extended[self.ends.statics]
         edges = s[0] + (s[1] - s[0]) * np.arange(self.n + 1) / self.n
         U = extended[self.U]
-        for i, control in enumerate(phase.controls):
-            if control.period:
-                U[:, :, i] = np.unwrap(U[:, :, i], axis=1, period=control.period)
+        for i, variable in enumerate(phase.controls):
+            if variable.period:
+                U[:, :, i] = np.unwrap(U[:, :, i], axis=1, period=variable.period)
         control = PiecewisePolynomial(edges, U, tables.control_basis)
         B = extended[self.B]
         inside = tables.state(tables.tau) @ extended[self.X]
