@@ -147,9 +147,8 @@ def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, poi
     for i, ax in enumerate(axes):
         for phase in flight.phases[1:]:
             ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
-        if i >= len(axes) - columns:
-            ax.set_xlabel(label("time", unit))
-            ax.tick_params(labelbottom=True)
+        ax.tick_params(labelbottom=i >= len(axes) - columns)
+    figure.supxlabel(label("time", unit), fontsize=9)
     ax = axes[0]
     first, last = flight.phases[0].t0, max(phase.tf for phase in flight.phases)
     ax.set_xlim(first - 0.015 * (last - first), last + 0.015 * (last - first))

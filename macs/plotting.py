@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import io
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from problems.compiled import Objective
+
+from .point import Point
+from .storage import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +37,6 @@ STYLE = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 6),
-    "savefig.dpi": 200,
 }
 
 
@@ -55,6 +60,27 @@ def blank_figure() -> Any:
     return Figure(figsize=(5.5, 4.0), layout="constrained")
 
 
+def save_picture(what: Front | Point, path: str | PathLike[str]) -> None:
+    """Draw a front, or the flight of a point, into a file whose suffix says its kind."""
+    import matplotlib
+
+    figure = blank_figure()
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        if isinstance(what, Point):
+            what.plot(figure)
+        else:
+            figure.set_size_inches(*_size(what))
+            what.plot(figure.add_subplot())
+    suffix = Path(path).suffix.lstrip(".").lower()
+    picture = io.BytesIO()
+    figure.savefig(picture, format=suffix, dpi=200)
+    write_whole(path, picture.getvalue())
+
+
+def _size(front: Front) -> tuple[float, float]:
+    return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
+
+
 def draw_front(front: Front, ax: Axes | None = None) -> Axes:
     """Draw the objectives of a front.
 
@@ -75,7 +101,7 @@ def draw_front(front: Front, ax: Axes | None = None) -> Axes:
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if ax is None:
-            ax = new_figure(7.0 if len(front.goals) > 3 else 5.5, 4.0).add_subplot()
+            ax = new_figure(*_size(front)).add_subplot()
         if len(front.goals) > 3:
             _parallel(front, ax)
         else:

@@ -151,7 +151,7 @@ def _group_names(phases: list[str], taken: set[str]) -> dict[str, str]:
 
 def _write_group(group: Any, data: xarray.Dataset) -> None:
     """One Dataset, as it is: no fill values, no packing, no time decoding."""
-    import h5py  # type: ignore[import-untyped]
+    import h5py
 
     group.dimensions = dict(data.sizes)
     for name, variable in data.variables.items():

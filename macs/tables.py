@@ -130,7 +130,9 @@ def _footer(front: Front) -> list[str]:
     if bad:
         lines.append(f"{bad} of {len(front)} points did not converge.")
     if not front.stats["reproducible"]:
-        lines.append("A time limit was hit: the same seed need not give this front again.")
+        why = front.stats.get("stopped", "budget")
+        ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"
+        lines.append(f"{ended}: the same seed need not give this front again.")
     if front.message:
         lines.append(front.message)
     return lines

@@ -1,0 +1,155 @@
+"""The command line: what can be called, and how a call ends.
+
+Exit codes: 0 done; 1 the answer is no (nothing feasible, a point that does not verify); 2 the call was wrong: one line on stderr says how,
+and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+DONE, NO, WRONG, INTERRUPTED = 0, 1, 2, 130
+
+EPILOG = """\
+examples:
+  macs list
+  macs solve goddard
+  macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
+  macs show front.nc --point 3 --plot flight.png
+  macs verify front.nc
+
+exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
+
+
+class Parser(argparse.ArgumentParser):
+    """One line for a wrong call, not a page of usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise SystemExit(complain(message, self.prog))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns its exit code."""
+    parser = build_parser()
+    arguments, unknown = parser.parse_known_args(argv)
+    if unknown:
+        arguments.parser.error(_unknown_option(unknown[0], arguments.parser))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A unit that the terminal cannot show is no reason to fail.
+        sys.stdout.reconfigure(errors="replace")
+    from . import commands
+
+    try:
+        code = commands.COMMANDS[arguments.command](arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except commands.WrongCall as error:
+        return complain(str(error), arguments.parser.prog)
+    except OSError as error:
+        return complain(error.strerror or str(error), arguments.parser.prog)
+    except KeyboardInterrupt:
+        complain("interrupted", arguments.parser.prog)
+        return INTERRUPTED
+    return int(code)
+
+
+def complain(message: str, program: str) -> int:
+    """One line on stderr."""
+    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    return WRONG
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Everything that can be called."""
+    parser = Parser(
+        prog="macs",
+        description="Multi-objective optimal control: search for fronts of verified trajectories.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    _add(commands, "list", "the problems there are, one line each")
+    _add_solve(commands)
+    _add_show(commands)
+    _add_verify(commands)
+    return parser
+
+
+def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> Parser:
+    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".", allow_abbrev=False)
+    command.set_defaults(parser=command)
+    return command
+
+
+def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
+    solve = _add(commands, "solve", "search a problem for its front, fly every point, save the front")
+    solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
+    solve.add_argument("--transcription", metavar="T", help="such as dfet:4x6, 4 elements of order 6 (default: the problem's own)")
+    solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
+    solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
+    solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
+    solve.add_argument("--inner", metavar="NAME", default="auto", help="the inner level: auto, march, ipopt, ... (default: auto)")
+    solve.add_argument("--no-refine", action="store_true", help="search without derivatives, as the paper does")
+    solve.add_argument("--checkpoint", metavar="FILE", help="save the search there as it goes, and resume from it")
+    solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
+    solve.add_argument("--plot", metavar="FRONT.png", help="draw the front too")
+
+
+def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
+    show = _add(commands, "show", "a saved front: its table, a picture, an export")
+    show.add_argument("front", metavar="FRONT.nc")
+    show.add_argument("--point", metavar="I", type=int, help="only this point, in detail; --plot draws its flight")
+    show.add_argument("--plot", metavar="FILE.png", help="draw it")
+    show.add_argument("--csv", metavar="FILE", help="export objectives and decisions")
+
+
+def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
+    verify = _add(commands, "verify", "check every point of a saved front and fly it anew; exit 1 if any fails")
+    verify.add_argument("front", metavar="FRONT.nc")
+    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not say where to find it")
+    verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
+    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+
+
+def _unknown_option(word: str, parser: Parser) -> str:
+    options = [option for option in parser._option_string_actions if option.startswith("--")]
+    near = difflib.get_close_matches(word.split("=")[0], options, n=1)
+    if near:
+        return f"unknown option {word}; did you mean {near[0]}?"
+    return f"unknown argument '{word}'; there are {', '.join(options)}"
+
+
+def _positive(text: str) -> int:
+    return _number(text, int, "a whole number above 0", lambda value: value > 0)
+
+
+def _natural(text: str) -> int:
+    return _number(text, int, "a whole number, 0 or above", lambda value: value >= 0)
+
+
+def _tolerance(text: str) -> float:
+    return _number(text, float, "a number above 0", lambda value: 0 < value < float("inf"))
+
+
+def _number(text: str, kind: Callable[[str], Any], what: str, fits: Callable[[Any], bool]) -> Any:
+    try:
+        value = kind(text)
+    except ValueError:
+        value = None
+    if value is None or not fits(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not {what}")
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

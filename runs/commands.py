@@ -1,0 +1,253 @@
+"""The commands behind the command line: each takes the parsed arguments, prints, and returns an exit code."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from argparse import Namespace
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import macs
+import problems
+import transcription
+from macs.front import Front
+from macs.plotting import label, save_picture
+from macs.point import Point
+from macs.solver import Solver
+from macs.storage import check_target
+from macs.tables import text_table
+from macs.verification import Check
+from macs.verification import verify as verify_front
+from problems import Problem
+from transcription.inner import NAMED
+
+from .cli import DONE, NO
+
+PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
+
+
+class WrongCall(Exception):  # noqa: N818 - whoever called is to be told, in one line
+    """What the user asked for makes no sense. The text says why, in their words."""
+
+
+def list_problems(arguments: Namespace) -> int:
+    """The problems there are."""
+    names = problems.names()
+    width = max(map(len, names))
+    for name in names:
+        print(f"{name:{width}}  {problems.describe(name)}")
+    return DONE
+
+
+def solve(arguments: Namespace) -> int:
+    """Search, fly every point, print, save, draw."""
+    problem = load_problem(arguments.problem)
+    method = problem.default_transcription if arguments.transcription is None else arguments.transcription
+    with refused():
+        scheme = transcription.parse(method) if isinstance(method, str) else method
+    solver = make_solver(arguments.solver, arguments.no_refine)
+    choose(arguments.inner, NAMED, "inner level")
+    out = Path(arguments.out) if arguments.out else free_name(problem.name)
+    check_target(out)
+    check_picture(arguments.plot)
+    with refused():
+        front = solver.solve(
+            problem,
+            scheme,
+            evaluations=arguments.evaluations or problem.default_evaluations,
+            seed=arguments.seed,
+            inner=arguments.inner,
+            checkpoint=arguments.checkpoint,
+            progress=True,
+        )
+    try:
+        front.save(out)
+    except OSError:
+        # The disk filled up while the search went on: what it found is shown at least.
+        print(front.table())
+        raise
+    print(front.table(defects=[defect(point) for point in front]))
+    print(f"\nfront saved in {out}")
+    if arguments.plot:
+        draw(front, arguments.plot)
+    return DONE if len(front) else NO
+
+
+def show(arguments: Namespace) -> int:
+    """A saved front, or one of its points."""
+    check_picture(arguments.plot)
+    if arguments.csv:
+        check_target(arguments.csv)
+    with refused():
+        front = Front.load(arguments.front)
+    point = None if arguments.point is None else find_point(front, arguments.point)
+    if arguments.plot and point is not None and point.trajectory is None:
+        raise WrongCall(f"point {arguments.point} has no trajectory to draw")
+    print(front.table() if point is None else describe(front, point))
+    if arguments.plot:
+        draw(front if point is None else point, arguments.plot)
+    if arguments.csv:
+        (front if point is None else point.alone()).to_csv(arguments.csv)
+        print(f"values in {arguments.csv}")
+    return DONE
+
+
+def verify(arguments: Namespace) -> int:
+    """Check every point of a saved front."""
+    with refused():
+        front = Front.load(arguments.front)
+    if front.source is None:
+        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to fly")
+    if not arguments.problem and not front.source.address:
+        raise WrongCall(f"problem '{front.source.name}' was stated in a script; say where: --problem file.py:function")
+    problem = load_problem(arguments.problem) if arguments.problem else load_problem(front.source.address, **front.source.data)
+    tolerance = arguments.tolerance or problem.verify_tolerance
+    with refused():
+        front = Front.load(arguments.front, problem=problem)
+        checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
+    print(verification_table(front, checks))
+    failed = [check for check in checks if not check.ok]
+    if not checks:
+        print(f"There is no point to verify. {front.message}".rstrip())
+    elif failed:
+        print(f"\n{len(failed)} of {len(checks)} points fail.")
+    else:
+        print(f"\nAll {len(checks)} points verify: flown anew, they stay within {tolerance:g}.")
+    return DONE if checks and not failed else NO
+
+
+# What the arguments mean
+
+
+class refused:  # noqa: N801 - reads as a statement
+    """A ValueError inside is the caller's mistake."""
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, ValueError):
+            raise WrongCall(str(error)) from error
+
+
+def load_problem(address: str, **data: Any) -> Problem:
+    """A problem by name or address; whatever goes wrong in the user's own file is told in one line."""
+    try:
+        problem = problems.load(address, **data)
+        problem.compile()
+    except ValueError as error:
+        raise WrongCall(str(error)) from error
+    except (Exception, SystemExit) as error:
+        raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}") from error
+    return problem
+
+
+def make_solver(name: str, plain: bool) -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives."""
+    exported = (getattr(macs, item) for item in macs.__all__)
+    known: dict[str, Any] = {
+        item.__name__.lower(): item for item in exported if inspect.isclass(item) and issubclass(item, Solver) and item is not Solver
+    }
+    solver = known[choose(name.lower(), known, "solver")]
+    if not plain:
+        return solver()
+    if "refine" not in inspect.signature(solver).parameters:
+        raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
+    return solver(refine=False)
+
+
+def choose(word: str, known: Iterable[str], what: str) -> str:
+    """`word`, if it is known; else WrongCall with the ones that are."""
+    words = [*known]
+    if word not in words:
+        near = difflib.get_close_matches(word, words, n=1)
+        raise WrongCall(f"unknown {what} '{word}'{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}")
+    return word
+
+
+def find_point(front: Front, index: int) -> Point:
+    """A point by its number."""
+    try:
+        return front[index]
+    except IndexError:
+        last = f"points 0 to {len(front) - 1}" if len(front) else "no points"
+        raise WrongCall(f"there is no point {index}: the front has {last}") from None
+
+
+def free_name(problem: str) -> Path:
+    """A file of the problem's name, here, that does not exist yet."""
+    stem = "".join(c if c.isalnum() or c in "-_." else "_" for c in problem).strip(".") or "front"
+    names = (Path(f"{stem}{f'-{i}' if i > 1 else ''}.nc") for i in range(1, 10**6))
+    return next(name for name in names if not name.exists())
+
+
+def check_picture(path: str | None) -> None:
+    """Refuse a picture that could not be written, before any work."""
+    if path:
+        check_target(path)
+        suffix = Path(path).suffix.lower().lstrip(".")
+        if suffix not in PICTURES:
+            raise WrongCall(f"cannot draw '{path}': a picture is one of .{', .'.join(PICTURES[:5])}")
+
+
+# What is printed
+
+
+def defect(point: Point) -> float:
+    """Largest defect of a point's flight."""
+    return np.inf if point.trajectory is None else point.simulate().max_defect
+
+
+def draw(what: Front | Point, path: str) -> None:
+    """Draw a front, or a point's flight."""
+    save_picture(what, path)
+    print(f"picture in {path}")
+
+
+def describe(front: Front, point: Point) -> str:
+    """One point, in full."""
+    objectives = {label(goal.name, goal.unit): f"{point.objectives[goal.name]:.10g}" for goal in front.goals}
+    excursions = {name: f"{value:.2g}" for name, value in (point.excursions or {}).items()}
+    groups = {
+        f"point {point.index} of {len(front)}, {point.status}": objectives,
+        "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
+        f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
+        "leaves bounds between nodes, by this much of the scale": excursions,
+    }
+    lines = [front.table().splitlines()[0], ""]
+    for title, values in groups.items():
+        width = max(map(len, values), default=0)
+        lines += [title, *(f"  {name:{width}}  {value}" for name, value in values.items()), ""] if values else []
+    for name, phase in (point.trajectory or {}).items():
+        lines += [f"phase {name}: {phase.t0:.6g} to {phase.tf:.6g} {phase.time_unit}", _ends(phase), ""]
+    return "\n".join(lines).rstrip()
+
+
+def _ends(phase: Any) -> str:
+    rows = [
+        [f"  {v.name} [{v.unit}]" if v.unit else f"  {v.name}", *(f"{value:.6g}" for value in (a, b, column.min(), column.max()))]
+        for v, a, b, column in zip(phase.state_variables, phase.edge_states[0], phase.edge_states[-1], phase.states.T, strict=True)
+    ]
+    return text_table([["  state", "initial", "final", "least", "greatest"]], rows, [True, False, False, False, False])
+
+
+def verification_table(front: Front, checks: Iterable[Check]) -> str:
+    """A row for each point, and the reasons of those that fail."""
+    rows = [
+        [str(c.point), *(f"{value:.1e}" for value in (c.mismatch, c.objectives, c.violation, c.defect, c.flown)), "ok" if c.ok else "FAILS"]
+        for c in checks
+    ]
+    headers = [
+        ["#", "trajectory", "objectives", "violation", "defect", "violation", ""],
+        ["", "stored - decision", "stored - anew", "anew", "flown", "flown", ""],
+    ]
+    table = text_table(headers, rows, [False, False, False, False, False, False, True])
+    reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]
+    return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
+
+
+COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify}

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from synthetic_fronts import black_box, flights
+
+import problems
+from macs import MACS, Front
+from macs.verification import verify
+from transcription import parse
+
+
+@pytest.fixture(scope="module")
+def front() -> Front:
+    return MACS(agents=4, archive=4).solve(problems.load("goddard"), parse("dfet:4x6"), evaluations=60, seed=1)
+
+
+def altered(front: Front, **changes) -> Front:
+    columns = {
+        "F": front.F, "decision": front.decision, "violation": front.violation, "status": front.status, "goals": front.goals,
+        "variables": front.variables, "trajectories": [p.trajectory for p in front], "problem": front.problem,
+        "transcription": front.transcription, "stats": front.stats, "sort": False, **changes,
+    }  # fmt: skip
+    return Front(**columns)
+
+
+def test_an_honest_front_verifies(front, tmp_path):
+    checks = verify(front, tolerance=1.0)
+    assert len(checks) == len(front) > 0 and all(check.ok for check in checks)
+    assert all(check.mismatch == 0 and check.objectives <= 1e-12 and check.violation <= 1e-6 for check in checks)
+    front.save(tmp_path / "front.nc")
+    assert verify(Front.load(tmp_path / "front.nc"), tolerance=1.0) == checks
+
+
+def test_flights_are_held_against_the_tolerance(front):
+    checks = verify(front, tolerance=1e-12)
+    assert not any(check.ok for check in checks) and all("flown, it ends" in check.reasons[0] for check in checks)
+
+
+def test_objectives_that_were_touched_up_are_found(front):
+    checks = verify(altered(front, F=front.F - [[0.5, 0.0]]), tolerance=1.0)
+    assert all(check.reasons == (f"stored objectives differ from recomputed ones by {check.objectives:.1e}",) for check in checks)
+
+
+def test_decisions_that_were_touched_up_are_found(front):
+    decision = np.array(front.decision)
+    decision[:, 3] += 0.25 * np.array([v.span for v in front.variables])[3]
+    for check in verify(altered(front, decision=decision), tolerance=1.0):
+        assert any("differ from the decision vector" in reason for reason in check.reasons)
+        assert any("violates '" in reason for reason in check.reasons)
+
+
+def test_trajectories_of_other_points_are_found(front):
+    swapped = [p.trajectory for p in front][::-1]
+    checks = verify(altered(front, trajectories=swapped), tolerance=1.0)
+    assert any("phase 'ascent'" in reason for check in checks for reason in check.reasons)
+    assert all("stored phases" in check.reasons[0] for check in verify(altered(front, trajectories=None), tolerance=1.0))
+
+
+def test_one_state_at_one_node_is_enough(front):
+    flight = front[0].trajectory
+    states = flight["ascent"].states.copy()
+    states[5, 2] += 1e-4
+    phase = dataclasses.replace(flight["ascent"], states=states)
+    checks = verify(altered(front[:1], trajectories=[dataclasses.replace(flight, phases=(phase,))]), tolerance=1.0)
+    assert checks[0].reasons == ("stored states of phase 'ascent' differ from the decision vector by 8.3e-06",)
+
+
+def test_what_cannot_be_verified_says_why(front):
+    with pytest.raises(ValueError, match="black box"):
+        verify(black_box(), tolerance=1.0)
+    with pytest.raises(ValueError, match="does not say how"):
+        verify(flights(transcription=None), tolerance=1.0)
+    other = {"method": "DFET", "settings": {"elements": 3, "order": 4}}
+    with pytest.raises(ValueError, match="not those of its transcription"):
+        verify(altered(front, transcription=other), tolerance=1.0)

@@ -1,0 +1,215 @@
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from macs import Front
+from runs.cli import main
+
+MACS = [sys.executable, "-m", "runs.cli"]
+SCRIPT = """
+from problems import Problem
+
+def build(speed=3.0):
+    problem = Problem("glide")
+    phase = problem.phase("leg", t0=0.0, tf=(1.0, 5.0))
+    x = phase.state("x", bounds=(0, 20), initial=0, unit="km")
+    u = phase.control("u", bounds=(0, speed), unit="km/s")
+    phase.dynamics(x=u)
+    problem.minimize("time", phase.tf, unit="s")
+    problem.maximize("distance", phase.final(x), unit="km")
+    problem.default_transcription = "dfet:2x2"
+    problem.default_evaluations = 40
+    return problem
+
+def impossible():
+    problem = build()
+    problem.constraint("twice", problem.phases["leg"].tf, lower=100.0)
+    return problem
+
+def broken():
+    return undefined_name
+
+def nothing():
+    return 7
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "glide.py").write_text(SCRIPT, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("saved")
+    call = [*MACS, "solve", "goddard", "--evaluations", "60", "--seed", "1", "--out", "front.nc", "--plot", "front.png"]
+    return folder, subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=120)
+
+
+def wrong(capsys, *call: str) -> str:
+    """The one line that a wrong call is answered with."""
+    before = {path.name for path in Path.cwd().iterdir()} - {"__pycache__"}
+    try:
+        code = main(call)
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr()
+    assert code == 2
+    assert said.out == ""
+    assert said.err.count("\n") == 1 and "Traceback" not in said.err
+    assert {path.name for path in Path.cwd().iterdir()} - {"__pycache__"} == before
+    return said.err.strip()
+
+
+# Help and lists
+
+
+def test_help_is_instant():
+    code = (
+        "import sys\nfrom runs.cli import main\n"
+        "for call in (['--help'], ['solve', '--help']):\n"
+        "    try: main(call)\n    except SystemExit as end: assert end.code == 0\n"
+        "heavy = ('casadi', 'matplotlib', 'xarray', 'numpy', 'scipy', 'rich', 'pandas', 'h5netcdf', 'pymoo')\n"
+        "sys.exit(str([m for m in heavy if m in sys.modules]) if any(m in sys.modules for m in heavy) else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    for word in ("list", "solve", "show", "verify", "--transcription", "--no-refine", "exit codes"):
+        assert word in done.stdout
+
+
+def test_list_names_every_case_on_a_line(capsys):
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines][:2] == ["goddard", "orbit_rise"] and all(len(line.split()) > 3 for line in lines)
+
+
+# Solving
+
+
+def test_solve_prints_defects_and_leaves_a_front_and_a_picture(saved):
+    folder, done = saved
+    assert done.returncode == 0, done.stderr
+    front = Front.load(folder / "front.nc")
+    assert "defect" in done.stdout and "flight time" in done.stdout and "km/s" in done.stdout
+    assert done.stdout.count("converged") == len(front) > 0
+    assert "front saved in front.nc" in done.stdout and "picture in front.png" in done.stdout
+    assert front.stats["seed"] == 1 and front.stats["evaluations"] == 60
+    assert {path.name for path in folder.iterdir()} == {"front.nc", "front.png"}
+    assert "60 / 60 evaluations" in done.stderr
+
+
+def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
+    assert main(["solve", "glide.py:build", "--no-refine"]) == 0
+    assert main(["solve", "glide.py:build", "--no-refine"]) == 0
+    assert "front saved in glide-2.nc" in capsys.readouterr().out
+    assert Front.load("glide.nc").stats["evaluations"] <= 40
+    assert main(["verify", "glide.nc"]) == 0
+
+
+def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
+    assert main(["solve", "glide.py:impossible", "--out", "no.nc"]) == 1
+    assert "twice" in capsys.readouterr().out
+    assert len(Front.load("no.nc")) == 0
+    assert main(["show", "no.nc"]) == 0 and main(["verify", "no.nc"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (["solve", "godard"], ["'godard'", "did you mean 'goddard'", "orbit_rise"]),
+        (["solve", "goddard", "--solver", "mcas"], ["'mcas'", "did you mean macs?"]),
+        (["solve", "goddard", "--transcription", "dfet:4"], ["'dfet:4'", "dfet:4x6"]),
+        (["solve", "goddard", "--transcription", "shot:4x4"], ["'shot:4x4'", "dfet:4x6"]),
+        (["solve", "goddard", "--inner", "marsh"], ["'marsh'", "did you mean march?", "ipopt"]),
+        (["solve", "goddard", "--evaluations", "ten"], ["--evaluations", "'ten' is not a whole number above 0"]),
+        (["solve", "goddard", "--evaluations", "0"], ["'0' is not a whole number above 0"]),
+        (["solve", "goddard", "--seed", "-1"], ["'-1' is not"]),
+        (["solve", "goddard", "--seeed", "3"], ["--seeed", "did you mean --seed?"]),
+        (["solve", "goddard", "--out", "nowhere/front.nc"], ["nowhere/front.nc", "there is no folder"]),
+        (["solve", "goddard", "--out", "."], ["it is a folder"]),
+        (["solve", "goddard", "--plot", "nowhere/front.png"], ["nowhere/front.png", "there is no folder"]),
+        (["solve", "goddard", "--plot", "front.docx"], ["front.docx", ".png"]),
+        (["solve", "missing.py:build"], ["no file 'missing.py'"]),
+        (["solve", "glide.py:missing"], ["no function 'missing'"]),
+        (["solve", "glide.py:broken"], ["NameError", "undefined_name"]),
+        (["solve", "glide.py:nothing"], ["must return a Problem"]),
+        (["show", "missing.nc"], ["no file 'missing.nc'"]),
+        (["show", "glide.py"], ["not a netCDF-4 file"]),
+        (["verify", "missing.nc"], ["no file 'missing.nc'"]),
+        (["sovle"], ["'sovle'", "solve"]),
+        (["list", "everything"], ["'everything'"]),
+        ([], ["COMMAND"]),
+    ],
+)
+def test_a_wrong_call_is_answered_in_one_line(capsys, call, words):
+    line = wrong(capsys, *call)
+    assert line.startswith("macs") and all(word in line for word in words), line
+
+
+def test_a_folder_that_cannot_be_written_to_is_found_first(capsys, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr("macs.solver.Solver.solve", lambda *_, **__: pytest.fail("the work started"))
+    assert "not writable" in wrong(capsys, "solve", "goddard")
+
+
+def test_a_wrong_call_in_a_process(here):
+    done = subprocess.run([*MACS, "solve", "godard"], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_keeps_what_was_found(here):
+    call = [*MACS, "solve", "goddard", "--evaluations", "10000000", "--out", "front.nc"]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "ended early (interrupted)" in out and "front saved in front.nc" in out
+    assert Front.load("front.nc").stats["stopped"] == "interrupted"
+
+
+# Looking at what was saved
+
+
+def test_show_prints_draws_and_exports(saved, capsys):
+    path = str(saved[0] / "front.nc")
+    assert main(["show", path, "--plot", "a.pdf", "--csv", "a.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "flight time" in out and "picture in a.pdf" in out and "values in a.csv" in out
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("flight time [s],")
+
+
+def test_show_one_point(saved, capsys):
+    path = str(saved[0] / "front.nc")
+    assert main(["show", path, "--point", "-1", "--plot", "b.png", "--csv", "b.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "phase ascent" in out and "final value of ascent.y" in out
+    assert Path("b.png").read_bytes().startswith(b"\x89PNG") and len(Path("b.csv").read_text().splitlines()) == 2
+    assert "there is no point 99: the front has points 0 to" in wrong(capsys, "show", path, "--point", "99")
+
+
+def test_verify_says_which_point_fails_and_why(saved, capsys):
+    path = str(saved[0] / "front.nc")
+    assert main(["verify", path, "--tolerance", "10"]) == 0
+    assert "points verify" in capsys.readouterr().out
+    assert main(["verify", path, "--tolerance", "1e-13", "--rtol", "1e-9"]) == 1
+    out = capsys.readouterr().out
+    assert "FAILS" in out and "point 0: flown, it ends" in out
+    assert "belongs to problem 'goddard'" in wrong(capsys, "verify", path, "--problem", "orbit_rise")
+
+
+def test_a_cut_file_is_one_line(saved):
+    whole = (saved[0] / "front.nc").read_bytes()
+    Path("cut.nc").write_bytes(whole[: len(whole) // 2])
+    for command in ("show", "verify"):
+        done = subprocess.run([*MACS, command, "cut.nc"], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and "cut.nc" in done.stderr
