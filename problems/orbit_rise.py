@@ -8,7 +8,10 @@ published implementation and belong to the problem: without them a coarse mesh h
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import casadi as ca
+import numpy as np
 
 from .problem import Problem
 
@@ -24,6 +27,26 @@ def problem() -> Problem:
 def problem_full() -> Problem:
     """The case with the thrust angle in [-pi, pi], as the paper has it: any direction, declared periodic."""
     return _orbit_rise("orbit_rise_full", (-ca.pi, ca.pi), 2 * ca.pi)
+
+
+def reference() -> np.ndarray:
+    """The true front by indirect shooting on the necessary conditions, one solve for each flight time from 20 to 80 in steps of 0.25.
+
+    The table beside this file also holds the initial costates, from which anyone can check each row by integrating state and costate: at
+    the end the costate is the gradient of the energy.
+
+    Returns
+    -------
+    array (241, 2)
+        Flight time and final energy, as the user sees them.
+    """
+    return reference_with_costates()[:, :2]
+
+
+def reference_with_costates() -> np.ndarray:
+    """The rows of `reference` with the initial costates of r, vr and vt, shape (241, 5)."""
+    with files("problems").joinpath("orbit_rise_front.csv").open() as file:
+        return np.loadtxt(file, delimiter=",", skiprows=1)
 
 
 def _orbit_rise(name: str, angles: tuple[float, float], period: float | None) -> Problem:

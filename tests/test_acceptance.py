@@ -1,0 +1,45 @@
+"""What the searches have to reach, against the true fronts: whole runs, over several seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fronts import distance_to_curve, inverted_distance
+
+from macs import MACS, Front
+from problems import goddard, load, orbit_rise
+from transcription import DFET
+
+pytestmark = pytest.mark.slow
+
+
+def indicators(front: Front, reference: np.ndarray) -> tuple[float, float]:
+    return float(distance_to_curve(front.objectives, reference).mean()), inverted_distance(front.objectives, reference)
+
+
+def test_goddard_on_the_papers_mesh() -> None:
+    reference = goddard.reference()
+    distances, defects = [], []
+    for seed in range(1, 6):
+        front = MACS(agents=10, archive=10, refine=False).solve(load("goddard"), DFET(4, 6), evaluations=10_000, seed=seed)
+        assert front.stats["evaluations"] <= 10_000
+        assert len(front) == 10
+        assert (front.violation <= 1e-6).all()
+        distance, inverted = indicators(front, reference)
+        assert distance <= 1.2e-2
+        assert inverted <= 0.044
+        distances.append(distance)
+        defects += [point.simulate(rtol=1e-10).max_defect for point in front]
+        print(f"goddard, seed {seed}: GD {distance:.2e}, IGD {inverted:.4f}, median defect {np.median(defects[-10:]):.1e}")
+    assert np.mean(distances) <= 8e-3
+    assert np.median(defects) <= 2e-3
+
+
+def test_orbit_rise_on_the_papers_mesh() -> None:
+    for seed in range(1, 4):
+        front = MACS(agents=10, archive=10, refine=False).solve(load("orbit_rise"), DFET(30, 1), evaluations=10_000, seed=seed)
+        distance, inverted = indicators(front, orbit_rise.reference())
+        print(f"orbit rise, seed {seed}: GD {distance:.2e}, IGD {inverted:.4f}")
+        assert len(front) == 10
+        assert distance <= 6e-3
+        assert inverted <= 0.043
