@@ -11,14 +11,17 @@ import numpy as np
 from macs.box import Box
 
 
-def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Go on along the last successful displacement, by a random fraction that stays in the box.
+def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:
+    """Go on along the velocity, by a random fraction of it.
 
     Parameters
     ----------
     X, velocity : arrays (k, d)
     rho : array (k,)
         Relative radius of each agent.
+    shorten : bool
+        Whether the step is shortened until it stays in the box, as in the paper. Otherwise its end is put back into the box: one variable
+        close to a bound does not stop all the others.
 
     Returns
     -------
@@ -26,7 +29,7 @@ def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, rng:
         The proposals. A row equals that of X where the velocity is zero or pushes out of the box.
     """
     step = box.stop_outward(X, rho[:, None] * velocity)
-    fraction = rng.random(len(X)) * box.reach(X, step)
+    fraction = rng.random(len(X)) * (box.reach(X, step) if shorten else 1.0)
     return box.put_back(X + fraction[:, None] * step)
 
 
@@ -62,7 +65,7 @@ def differential(box: Box, X: np.ndarray, donors: np.ndarray, F: float, CR: floa
 
 
 def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.random.Generator) -> np.ndarray:
-    """For each of k agents, `count` different others of a population, (count, k) of int."""
+    """For each of k agents, `count` different others of a population, (count, k) of int; too few others are repeated in turn."""
     scores = rng.random((len(agents), population))
     scores[np.arange(len(agents)), agents] = np.inf
-    return np.argsort(scores, axis=1)[:, :count].T
+    return np.argsort(scores, axis=1)[:, np.arange(count) % max(population - 1, 1)].T

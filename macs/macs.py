@@ -54,6 +54,8 @@ class MACS(Solver):
         Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
     momentum : float, default 0.7
         How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
+    shorten : bool, default False
+        Shorten inertia's steps until they stay in the box, as in the paper; otherwise they are clipped to it, variable by variable.
 
     Raises
     ------
@@ -76,6 +78,7 @@ class MACS(Solver):
     directions: int | None = None
     redraw: bool = True
     momentum: float = 0.7
+    shorten: bool = False
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
@@ -83,7 +86,7 @@ class MACS(Solver):
         self._check_count("max_contractions", self.max_contractions, 0)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
-        for name in ("refine", "adaptive_coordinates", "redraw"):
+        for name in ("refine", "adaptive_coordinates", "redraw", "shorten"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
         if self.mesh == "adaptive":
@@ -101,7 +104,7 @@ class MACS(Solver):
     @classmethod
     def paper(cls, **overrides: Any) -> MACS:
         """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself."""
-        settings: dict[str, Any] = {"refine": False, "adaptive_coordinates": False, "redraw": False, "momentum": 0.0}
+        settings: dict[str, Any] = {"refine": False, "adaptive_coordinates": False, "redraw": False, "momentum": 0.0, "shorten": True}
         return cls(**{**settings, **overrides})
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
@@ -137,9 +140,10 @@ class MACS(Solver):
         if self.archive < m:
             raise ValueError(f"MACS: archive must hold at least one point for each of the {m} objectives, not {self.archive}")
 
-    def coordinates_to_scan(self, d: int, archived: int) -> int:
-        """How many of d coordinates pattern search goes through with `archived` points in the archive."""
-        ratio = 1.0 - (1.0 - 1.0 / d) * archived / self.archive if self.adaptive_coordinates else self.coordinates
+    def coordinates_to_scan(self, d: int, archived: int, m: int) -> int:
+        """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""
+        limit = self.archive if m > 1 else 1
+        ratio = 1.0 - (1.0 - 1.0 / d) * archived / limit if self.adaptive_coordinates else self.coordinates
         return max(1, ceil(d * ratio - 1e-9))
 
     def social_agents(self, m: int) -> int:

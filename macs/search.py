@@ -87,6 +87,8 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
 
 def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: int) -> None:
     """One iteration (see `MACS.advance`)."""
+    if state.evaluations >= budget:
+        return
     box = box_of(evaluator)
     attempts = Attempts(settings, state, evaluator, box, budget)
     individual_actions(state, settings, box, attempts)
@@ -160,18 +162,16 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
             X = attempts.positions(waiting)
             waiting = waiting[~attempts.try_out(waiting, X, propose(waiting, X))]
 
-    attempt(lambda who, X: individual.inertia(box, X, agents.velocity[who], agents.rho[who], rng))
+    attempt(lambda who, X: individual.inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng))
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive))]:
+    for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1])]:
         step = rng.uniform(-1.0, 1.0, count) * agents.rho / 2
         back = -np.sign(step) * rng.random(count) * agents.rho / 2
         attempt(lambda who, X, c=coordinate, s=step: individual.coordinate_step(box, X, c[who], s[who]))
         attempt(lambda who, X, c=coordinate, s=back: individual.coordinate_step(box, X, c[who], s[who]))
 
     def differential(who: np.ndarray, X: np.ndarray) -> np.ndarray:
-        donors = attempts.positions(np.arange(count))[individual.distinct_others(who, count, 3 if count > 3 else 2, rng)]
-        if count == 3:
-            donors = np.concatenate([donors, donors[:1]])
+        donors = attempts.positions(np.arange(count))[individual.distinct_others(who, count, 3, rng)]
         return individual.differential(box, X, donors, settings.F, settings.CR, rng)
 
     attempt(differential)

@@ -37,6 +37,8 @@ def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: fl
     array (k, d)
         Proposals; with only two parents near there is no p3, with fewer the agent stays.
     """
+    if not len(pool):
+        return X.copy()
     rows = nearest(box, X, pool, count)
     scores = np.where(rows >= 0, rng.random(rows.shape), np.inf)
     K = rng.random((len(X), 1))

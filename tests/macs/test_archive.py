@@ -1,0 +1,91 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs.archive import Archive, insert, pair_energies, spread
+from macs.dominance import dominates
+
+
+def empty(m):
+    return Archive(np.empty((0, 1)), np.empty((0, m)), np.empty(0))
+
+
+def offer(archive, F, limit=10, violation=None):
+    F = np.atleast_2d(np.asarray(F, dtype=float))
+    violation = np.zeros(len(F)) if violation is None else np.asarray(violation)
+    return insert(archive, np.zeros((len(F), 1)), F, violation, limit=limit, tolerance=1e-6)
+
+
+def total(F):
+    return pair_energies(F).sum() / 2
+
+
+def quarter_circle(count):
+    angle = np.linspace(0, np.pi / 2, count)
+    return 1 - np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+@given(st.integers(1, 4), st.integers(4, 12), st.integers(0, 2**32 - 1))
+def test_members_are_few_feasible_different_and_mutually_nondominated_and_extremes_stay(m, limit, seed):
+    rng = np.random.default_rng(seed)
+    archive, seen = empty(m), []
+    for _ in range(5):
+        F, violation = rng.integers(0, 30, (20, m)).astype(float), rng.choice([0.0, 1.0, np.inf], 20)
+        F[violation == np.inf] = np.nan
+        archive = offer(archive, F, limit, violation)
+        seen.append(F[violation <= 1e-6])
+        every = np.vstack(seen)
+        assert len(archive) <= limit
+        assert not dominates(archive.F[:, None], archive.F[None]).any()
+        assert len(np.unique(archive.F, axis=0)) == len(archive)
+        if len(every):
+            assert np.array_equal(archive.F.min(axis=0), every.min(axis=0))
+
+
+def test_nothing_infeasible_failed_or_equal_comes_in():
+    archive = offer(empty(2), [[1.0, 2.0]])
+    assert len(offer(archive, [[0.0, 0.0]], violation=[1.0])) == 1
+    assert len(offer(archive, [[np.nan, 0.0]], violation=[np.inf])) == 1
+    assert offer(archive, [[1.0, 2.0]]).F.tolist() == [[1.0, 2.0]]
+    assert offer(archive, [[1.0, 1.0]]).F.tolist() == [[1.0, 1.0]]
+
+
+def test_energy_never_rises_when_members_are_exchanged():
+    rng = np.random.default_rng(0)
+    F = quarter_circle(40)
+    members = np.zeros(40, dtype=bool)
+    members[[0, 39]] = True
+    members[1 + rng.permutation(38)[:8]] = True
+    chosen = spread(F, 10, members)
+    assert total(F[chosen] / np.ptp(F, axis=0)) <= total(F[members] / np.ptp(F, axis=0))
+    assert chosen[[0, 39]].all()
+    assert chosen.sum() == 10
+
+
+def test_the_archive_spreads_evenly_and_keeps_the_ends():
+    rng = np.random.default_rng(1)
+    F, archive = quarter_circle(2000), empty(2)
+    for rows in rng.permutation(2000).reshape(-1, 20):
+        archive = offer(archive, F[rows])
+    gaps = np.linalg.norm(np.diff(archive.F[np.argsort(archive.F[:, 0])], axis=0), axis=1)
+    assert archive.F.min(axis=0).tolist() == [0.0, 0.0]
+    assert gaps.max() / gaps.min() < 1.25
+
+
+def test_a_new_extreme_makes_room_for_itself():
+    archive = offer(empty(2), quarter_circle(40)[5:35], limit=5)
+    archive = offer(archive, [[-0.5, 3.0]], limit=5)
+    assert len(archive) == 5
+    assert archive.F.min(axis=0)[0] == -0.5
+
+
+def test_an_objective_without_range_adds_no_distance():
+    F = np.stack([np.linspace(0, 1, 5), np.linspace(1, 0, 5), np.full(5, 7.0)], axis=1)
+    assert np.array_equal(pair_energies(F), pair_energies(F[:, :2]))
+    assert np.isfinite(pair_energies(np.ones((3, 2)))).all()
+
+
+def test_one_objective_keeps_the_best():
+    archive = offer(empty(1), [[3.0], [1.0], [2.0]])
+    assert archive.F.tolist() == [[1.0]]
+    assert offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]

@@ -1,0 +1,137 @@
+import numpy as np
+import pytest
+from pymoo.core.problem import ElementwiseProblem
+from pymoo.problems import get_problem
+
+from macs.blackbox import BlackBox, read_bounds
+
+
+def two(X):
+    return np.stack([X[:, 0], 1 - X[:, 0]], axis=1)
+
+
+def middle(box, count=3):
+    return np.tile((box.lower + box.upper) / 2, (count, 1))
+
+
+def test_bounds_in_every_form():
+    pairs = [(0, 1), (-1, 2), (3, 4)]
+    for bounds in (pairs, np.array(pairs), ([0, -1, 3], [1, 2, 4]), (np.array([0, -1, 3]), np.array([1, 2, 4]))):
+        names, lower, upper = read_bounds(bounds)
+        assert names == ("x1", "x2", "x3")
+        assert (lower.tolist(), upper.tolist()) == ([0, -1, 3], [1, 2, 4])
+    assert read_bounds({"mass": (1, 2), "tf": (3, 4)})[0] == ("mass", "tf")
+    assert read_bounds([[0, 1], [2, 3]])[1].tolist() == [0, 2]  # two short ones are two pairs
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [
+        (None, "missing"),
+        ([], "empty"),
+        ({"mass": (2, 1)}, "'mass' has lower 2 >= upper 1"),
+        ([(0, 1), (1, 1)], "'x2' has lower 1 >= upper 1"),
+        ([(0, np.inf)], "'x1' has .*finite"),
+        ([(0, np.nan)], "'x1' has .*finite"),
+        ([(0, 1, 2), (0, 1)], "'x1' has .*pair"),
+        ({"mass": "heavy"}, "'mass' has 'heavy'"),
+        (([0, 0, 0], [1, 1, 1, 1]), "3 lower and 4 upper"),
+    ],
+)
+def test_bounds_that_cannot_be_meant(bounds, message):
+    with pytest.raises(ValueError, match=message):
+        BlackBox(two, bounds)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"senses": ["minimise", "maximize"]}, "senses: .*'minimise'"),
+        ({"senses": "minimize"}, "senses"),
+        ({"names": ["a"], "senses": ["minimize"] * 2}, "senses has 2, 1 expected"),
+        ({"names": ["a", "a"]}, "holds a name twice"),
+        ({"names": []}, "names has 0"),
+        ({"constraints": 3}, "constraints: must be callable"),
+        ({"tolerance": -1.0}, "tolerance"),
+    ],
+)
+def test_other_arguments_that_cannot_be_meant(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        BlackBox(two, [(0, 1)], **arguments)
+    with pytest.raises(ValueError, match="function"):
+        BlackBox(3, [(0, 1)])
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda X: two(X)[:1], r"shape \(1, 2\) for 3 points"),
+        (lambda X: 7.0, r"shape \(\) for 3 points"),
+        (lambda X: ["a"] * len(X), "no array of numbers"),
+        (lambda X: (two(X), two(X)[:2]), "constraints have shape"),
+        (lambda X: np.empty((len(X), 0)), "returned 0"),
+    ],
+)
+def test_outputs_that_cannot_be_meant(function, message):
+    box = BlackBox(function, [(0, 1)])
+    with pytest.raises(ValueError, match=message):
+        box.evaluate(middle(box))
+
+
+def test_the_number_of_objectives_may_not_contradict_the_names():
+    box = BlackBox(two, [(0, 1)], names=["a", "b", "c"])
+    assert box.m == 3
+    with pytest.raises(ValueError, match="returned 2, 3 expected"):
+        box.evaluate(middle(box))
+
+
+def test_the_number_of_objectives_comes_from_the_first_batch_and_asking_before_is_counted():
+    box = BlackBox(two, [(0, 1)])
+    box.evaluate(middle(box))
+    assert (box.m, box.counts.evaluations) == (2, 3)
+    asked = BlackBox(two, [(0, 1)])
+    assert (asked.m, asked.counts.evaluations) == (2, 1)
+    assert (asked.names, asked.units, asked.senses) == (("f1", "f2"), ("", ""), ("minimize",) * 2)
+
+
+def test_failed_rows_constraints_and_senses():
+    def function(X):
+        F = two(X)
+        F[1] = np.nan
+        return F, np.array([[-1.0], [0.0], [0.5]])
+
+    box = BlackBox(function, [(0, 1)], senses=["minimize", "maximize"], constraints=lambda X: X - 2.0)
+    result = box.evaluate(np.array([[0.0], [0.5], [1.0]]))
+    assert result.status.tolist() == ["converged", "failed", "infeasible"]
+    assert result.violation.tolist() == [0.0, np.inf, 0.5]
+    assert np.isnan(result.F[1]).all()
+    assert result.F[0].tolist() == [0.0, -1.0]
+    assert box.counts.failures == {"failed": 1, "infeasible": 1}
+
+
+def test_one_objective_may_come_as_a_vector_and_the_function_may_not_change_its_points():
+    def function(X):
+        X *= 2
+        return X.sum(axis=1)
+
+    box = BlackBox(function, [(0, 1), (0, 1)])
+    result = box.evaluate(np.ones((4, 2)))
+    assert (result.F.shape, result.Z.max()) == ((4, 1), 1.0)
+
+
+def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
+    tnk = BlackBox(get_problem("tnk"))
+    result = tnk.evaluate(middle(tnk))
+    assert (tnk.m, result.F.shape) == (2, (3, 2))
+    assert (result.violation > 0).all()
+
+    class OnCircle(ElementwiseProblem):
+        def __init__(self):
+            super().__init__(n_var=2, n_obj=2, n_ieq_constr=1, n_eq_constr=1, xl=-1.0, xu=1.0)
+
+        def _evaluate(self, x, out, *args, **kwargs):
+            out["F"], out["G"], out["H"] = [x[0], x[1]], [x[0] - 0.5], [x[0] ** 2 + x[1] ** 2 - 1]
+
+    circle = BlackBox(OnCircle())
+    assert circle.lower.tolist() == [-1, -1]
+    assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation.tolist() == [0.0, 0.75, 0.5]

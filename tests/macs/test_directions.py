@@ -1,0 +1,62 @@
+from math import comb
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs.directions import draw, normalised, pool, simplex_lattice, tchebycheff
+
+
+@given(st.integers(1, 6), st.integers(1, 300))
+def test_directions_are_unit_nonnegative_different_and_begin_with_the_orthogonal_ones(m, size):
+    directions = pool(m, size)
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1.0)
+    assert (directions >= 0.0).all()
+    assert np.array_equal(directions[:m], np.eye(m))
+    assert len(np.unique(np.round(directions, 12), axis=0)) == len(directions)
+    assert len(directions) <= max(size, m) + 1
+
+
+def test_two_objectives_have_equal_angles():
+    directions = pool(2, 9)
+    angles = np.sort(np.arctan2(directions[:, 0], directions[:, 1]))
+    assert np.allclose(np.diff(angles), np.pi / 2 / 8)
+
+
+@given(st.integers(2, 5), st.integers(1, 6))
+def test_lattice_is_whole_and_sums_to_one(m, divisions):
+    lattice = simplex_lattice(m, divisions)
+    assert lattice.shape == (comb(divisions + m - 1, m - 1), m)
+    assert np.allclose(lattice.sum(axis=1), 1.0)
+
+
+@given(st.integers(1, 4), st.integers(0, 30), st.integers(0, 2**32 - 1))
+def test_the_orthogonal_directions_are_always_drawn(m, extra, seed):
+    directions = pool(m, 100)
+    rows = draw(directions, m + extra, np.random.default_rng(seed))
+    assert rows.shape == (m + extra,)
+    assert rows[:m].tolist() == list(range(m))
+    if m > 1:
+        assert len(set(rows.tolist())) == m + extra
+
+
+def test_scalarisation_is_safe_where_an_objective_has_no_range():
+    F = np.array([[1.0, 3.0], [2.0, 3.0]])
+    values = tchebycheff(F, np.full(2, 2**-0.5), np.array([1.0, 3.0]), np.array([2.0, 3.0]))
+    assert values.tolist() == pytest.approx([0.0, 2**-0.5])
+    assert np.array_equal(normalised(F, np.array([1.0, 3.0]), np.array([2.0, 3.0])), [[0.0, 0.0], [1.0, 0.0]])
+
+
+def test_a_new_best_objective_is_better_for_the_direction_that_owns_it():
+    ideal, nadir = np.zeros(2), np.ones(2)
+    assert tchebycheff(np.array([-0.1, 5.0]), np.array([1.0, 0.0]), ideal, nadir) < tchebycheff(ideal, np.array([1.0, 0.0]), ideal, nadir)
+
+
+@given(st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_scalarisation_never_prefers_a_dominated_point(m, seed):
+    rng = np.random.default_rng(seed)
+    better = rng.random(m)
+    worse = better + rng.random(m)
+    for direction in pool(m, 20):
+        assert tchebycheff(better, direction, np.zeros(m), np.ones(m)) <= tchebycheff(worse, direction, np.zeros(m), np.ones(m))

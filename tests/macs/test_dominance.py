@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from macs.dominance import constrained_dominates, dominates, duplicated, extremes, nondominated, weakly_dominates
+
+FRONTS = st.integers(1, 4).flatmap(
+    lambda m: arrays(float, st.tuples(st.integers(1, 15), st.just(m)), elements=st.integers(0, 4).map(float))
+)
+
+
+@given(FRONTS)
+def test_nondominated_rows_are_those_that_no_other_row_dominates(F):
+    keep = nondominated(F)
+    dominated = dominates(F[:, None], F[None]).any(axis=0)
+    assert np.array_equal(keep, ~dominated & ~duplicated(F))
+
+
+@given(FRONTS)
+def test_dominance_is_weak_dominance_without_equality(F):
+    strict, weak = dominates(F[:, None], F[None]), weakly_dominates(F[:, None], F[None])
+    equal = (F[:, None] == F[None]).all(axis=-1)
+    assert np.array_equal(strict, weak & ~equal)
+    assert not (strict & strict.T).any()
+
+
+def test_rows_with_nan_are_never_kept_and_never_dominate():
+    F = np.array([[np.nan, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    assert nondominated(F).tolist() == [False, True, False]
+    assert nondominated(np.full((2, 2), np.nan)).tolist() == [False, False]
+    assert nondominated(np.empty((0, 2))).shape == (0,)
+    assert not dominates(F[0], F[2])
+
+
+def test_duplicates_are_told_except_the_first():
+    assert duplicated(np.array([[1.0, 2.0], [0.0, 0.0], [1.0, 2.0]])).tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("violation", "other", "expected"),
+    [
+        (0.0, 1.0, True),
+        (1.0, 0.0, False),
+        (1.0, 2.0, True),
+        (2.0, 2.0, False),
+        (0.0, np.inf, True),
+        (np.inf, np.inf, False),
+        (0.0, 0.0, False),
+    ],
+)
+def test_feasible_beats_infeasible_and_less_violation_beats_more(violation, other, expected):
+    worse, better = np.array([5.0, 5.0]), np.array([1.0, 1.0])
+    assert constrained_dominates(worse, np.float64(violation), better, np.float64(other)) == expected
+
+
+def test_feasible_points_are_compared_by_objectives_within_the_tolerance():
+    assert constrained_dominates(np.zeros(2), np.float64(1e-7), np.ones(2), np.float64(0.0), tolerance=1e-6)
+    assert not constrained_dominates(np.zeros(2), np.float64(1e-5), np.ones(2), np.float64(0.0), tolerance=1e-6)
+
+
+def test_extremes_break_ties_by_the_other_objectives():
+    F = np.array([[0.0, 5.0], [0.0, 3.0], [2.0, 1.0], [1.0, 1.0]])
+    assert extremes(F).tolist() == [1, 3]

@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs.box import Box
+from macs.individual import coordinate_step, differential, distinct_others, inertia
+from macs.social import current_to_rand, nearest, pair_up
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def box(d, wraps=()):
+    return Box(np.full(d, -2.0), np.full(d, 6.0), np.isin(np.arange(d), wraps))
+
+
+@given(SEEDS, st.booleans())
+def test_every_proposal_is_in_the_box(seed, wrap):
+    rng = np.random.default_rng(seed)
+    cube, k, d = box(4, [0, 2] if wrap else []), 6, 4
+    X = rng.choice([0.0, 0.25, 1.0], (k, d)) if seed % 2 else rng.random((k, d))
+    X = cube.put_back(X)
+    velocity, rho = rng.normal(size=(k, d)), rng.random(k)
+    donors = rng.random((3, k, d))
+    proposals = [
+        inertia(cube, X, velocity, rho, True, rng),
+        inertia(cube, X, velocity, rho, False, rng),
+        coordinate_step(cube, X, rng.integers(d, size=k), rng.uniform(-0.5, 0.5, k)),
+        differential(cube, X, donors, 0.9, 0.9, rng),
+        current_to_rand(cube, X, rng.random((10, d)), 5, 0.9, rng),
+    ]
+    for trial in proposals:
+        assert trial.shape == X.shape
+        assert ((trial >= 0.0) & (trial <= 1.0)).all()
+        values = cube.to_values(trial)
+        assert ((values >= -2.0) & (values <= 6.0)).all()
+
+
+def test_periodic_coordinates_wrap_and_others_stop_at_the_bound():
+    cube = box(2, [0])
+    X = np.array([[0.9, 0.9]])
+    assert np.allclose(coordinate_step(cube, X, np.array([0]), np.array([0.3])), [[0.2, 0.9]])
+    assert np.allclose(coordinate_step(cube, X, np.array([1]), np.array([0.3])), [[0.9, 1.0]])
+    assert np.allclose(cube.difference(np.array([0.1, 0.1]), np.array([0.9, 0.9])), [0.2, -0.8])
+    assert cube.reach(X, np.array([[0.4, 0.0]])) == 1.0
+    assert np.allclose(cube.reach(X, np.array([[0.4, 0.4]])), 0.25)
+    assert cube.stop_outward(np.array([1.0, 1.0]), np.array([1.0, 1.0])).tolist() == [1.0, 0.0]
+
+
+def test_inertia_stays_without_velocity_and_goes_on_along_it():
+    rng = np.random.default_rng(0)
+    cube, X = box(3), np.full((2, 3), 0.5)
+    velocity = np.array([[0.0, 0.0, 0.0], [0.1, -0.2, 0.0]])
+    trial = inertia(cube, X, velocity, np.ones(2), True, rng)
+    assert np.array_equal(trial[0], X[0])
+    step = trial[1] - X[1]
+    assert np.allclose(step / step[0], velocity[1] / velocity[1, 0])
+    assert 0 < step[0] <= 0.1
+
+
+def test_a_coordinate_step_leaves_the_other_coordinates_alone():
+    rng = np.random.default_rng(0)
+    X = rng.random((5, 7))
+    trial = coordinate_step(box(7, [3]), X, np.array([0, 1, 2, 3, 4]), np.full(5, 0.2))
+    assert ((trial != X).sum(axis=1) <= 1).all()
+
+
+@given(SEEDS, st.integers(4, 12))
+def test_parents_are_others_and_all_different(seed, population):
+    rng = np.random.default_rng(seed)
+    agents = np.arange(population)
+    parents = distinct_others(agents, population, 3, rng)
+    assert parents.shape == (3, population)
+    for agent in agents:
+        assert len({agent, *parents[:, agent].tolist()}) == 4
+
+
+def test_differential_evolution_always_changes_something_and_finds_no_step_in_equal_points():
+    rng = np.random.default_rng(0)
+    X, donors = np.full((3, 5), 0.5), rng.random((3, 3, 5))
+    assert (differential(box(5), X, donors, 0.9, 0.0, rng) != X).sum(axis=1).tolist() == [1, 1, 1]
+    assert np.array_equal(differential(box(5), X, np.full((3, 3, 5), 0.5), 0.9, 0.9, rng), X)
+
+
+def test_parents_are_near_and_not_the_point_itself():
+    cube = box(1, [0])
+    pool = np.array([[0.05], [0.5], [0.9], [0.0]])
+    assert nearest(cube, np.array([[0.0]]), pool, 2).tolist() == [[0, 2]]
+    assert nearest(cube, np.array([[0.0]]), np.zeros((2, 1)), 2).tolist() == [[-1, -1]]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_without_two_parents_a_social_agent_stays(count):
+    X = np.array([[0.2, 0.3]])
+    assert np.array_equal(current_to_rand(box(2), X, np.full((count, 2), 0.7), 4, 0.9, np.random.default_rng(0)), X)
+
+
+@given(SEEDS, st.integers(1, 6), st.integers(1, 6))
+def test_pairs_are_one_to_one_and_begin_with_the_cheapest(seed, rows, columns):
+    costs = np.random.default_rng(seed).random((rows, columns))
+    first, second = pair_up(costs)
+    assert len(first) == len(second) == min(rows, columns) == len(set(first)) == len(set(second))
+    assert costs[first[0], second[0]] == costs.min()

@@ -1,0 +1,199 @@
+"""The whole search on plain functions: budgets, sameness, failures, constraints, known fronts."""
+
+import numpy as np
+import pytest
+
+from macs.blackbox import BlackBox
+from macs.dominance import dominates
+from macs.macs import MACS
+
+
+def run(settings, box, budget, seed=1, start=None):
+    state = settings.begin(box, budget, np.random.default_rng(seed), start)
+    while state.evaluations < budget:
+        before = state.evaluations
+        settings.advance(state, box, budget)
+        assert state.evaluations > before or state.iteration < 2
+    return state
+
+
+def schaffer(X):
+    return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
+
+
+def zdt(kind, X):
+    x, rest, d = X[:, 0], X[:, 1:], X.shape[1]
+    if kind == 4:
+        g = 1 + 10 * (d - 1) + (rest**2 - 10 * np.cos(4 * np.pi * rest)).sum(axis=1)
+    else:
+        g = 1 + 9 * rest.mean(axis=1)
+    h = {1: 1 - np.sqrt(x / g), 2: 1 - (x / g) ** 2, 3: 1 - np.sqrt(x / g) - x / g * np.sin(10 * np.pi * x), 4: 1 - np.sqrt(x / g)}[kind]
+    return np.stack([x, g * h], axis=1)
+
+
+def zdt_front(kind):
+    x = np.linspace(0, 1, 1000 if kind != 3 else 20000)
+    F = zdt(kind, np.hstack([x[:, None], np.zeros((len(x), 1))]))
+    if kind == 3:
+        best = np.minimum.accumulate(F[:, 1])
+        F = F[np.r_[True, F[1:, 1] < best[:-1]]]
+        F = F[np.linspace(0, len(F) - 1, 1000).astype(int)]
+    return F
+
+
+def igd(F, front):
+    return np.linalg.norm(front[:, None] - F, axis=-1).min(axis=1).mean()
+
+
+@pytest.mark.parametrize("budget", [1, 2, 9, 10, 11, 57, 200])
+@pytest.mark.parametrize("settings", [MACS(agents=3, archive=4), MACS(), MACS.paper()])
+def test_the_budget_is_met_exactly(budget, settings):
+    rows = []
+
+    def function(X):
+        rows.append(len(X))
+        return schaffer(X)
+
+    state = run(settings, BlackBox(function, [(-2, 2)] * 3), budget)
+    assert sum(rows) == budget == state.evaluations
+    settings.advance(state, BlackBox(function, [(-2, 2)] * 3), 0)
+    assert sum(rows) == budget
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
+    first, again, other = (run(MACS(), BlackBox(schaffer, [(-2, 2)] * 4), 500, seed) for seed in (1, 1, 2))
+    assert np.array_equal(first.archive.Z, again.archive.Z)
+    assert np.array_equal(first.agents.velocity, again.agents.velocity)
+    assert not np.array_equal(first.archive.F, other.archive.F)
+
+
+def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
+    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
+    state = run(MACS(), box, 1000)
+    assert len(state.archive) == 0
+    assert len(state.closest) == 1
+    assert 1.0 <= state.closest.violation[0] < 1.02
+
+
+def test_from_infeasible_to_feasible():
+    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
+    state = run(MACS(), box, 1500)
+    assert len(state.archive) == 10
+    assert len(state.closest) == 0
+    assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
+
+
+def test_failed_evaluations_never_enter_the_archive():
+    def function(X):
+        F = schaffer(X)
+        F[X[:, 0] > 0.3] = np.nan
+        F[X[:, 1] > 0.7, 0] = np.inf
+        return F
+
+    state = run(MACS(), BlackBox(function, [(-2, 2)] * 3), 600)
+    assert len(state.archive) == 10
+    assert (state.archive.Z[:, 0] <= 0.3).all()
+    assert np.isfinite(state.archive.F).all()
+    nothing = run(MACS(), BlackBox(lambda X: np.full((len(X), 2), np.nan), [(0, 1)] * 2), 300)
+    assert len(nothing.archive) == 0
+    assert nothing.evaluations == 300
+
+
+def test_one_objective():
+    state = run(MACS(), BlackBox(lambda X: ((X - 0.3) ** 2).sum(axis=1), [(-2, 2)] * 5), 2000)
+    assert state.archive.F.shape == (1, 1)
+    assert state.archive.F[0, 0] < 1e-4
+
+
+def test_an_objective_that_does_not_vary():
+    state = run(MACS(), BlackBox(lambda X: np.hstack([schaffer(X), np.ones((len(X), 1))]), [(-2, 2)] * 2), 500)
+    assert len(state.archive) == 10
+
+
+def test_periodic_variables_cross_their_bounds():
+    # optimal angles are around 0 = 1: half of them just below the upper bound, half just above the lower one
+    box = BlackBox(lambda X: np.stack([1 - np.cos(2 * np.pi * (X - c)).mean(axis=1) for c in (0.03, 0.97)], axis=1), [(0, 1)] * 6)
+    box.period = np.ones(6)
+    state = run(MACS(), box, 2000)
+    X = (state.archive.Z + 0.5) % 1.0 - 0.5
+    assert (np.abs(X) < 0.1).all()
+    assert ((state.archive.Z >= 0) & (state.archive.Z <= 1)).all()
+
+
+def test_the_best_of_each_objective_is_never_lost():
+    settings, box, best = MACS(agents=5, archive=3), BlackBox(schaffer, [(-2, 2)] * 3), np.full(2, np.inf)
+    state = settings.begin(box, 1000, np.random.default_rng(0))
+    while state.evaluations < 1000:
+        settings.advance(state, box, 1000)
+        now = state.archive.F.min(axis=0)
+        assert (now <= best).all()
+        assert np.array_equal(now, state.ideal)
+        assert not dominates(state.archive.F[:, None], state.archive.F[None]).any()
+        best = now
+
+
+def test_a_start_is_evaluated_first_and_too_many_are_thinned():
+    start = np.random.default_rng(3).uniform(-2, 2, (25, 3))
+    box = BlackBox(schaffer, [(-2, 2)] * 3)
+    state = MACS().begin(box, 100, np.random.default_rng(0), start)
+    assert (state.evaluations, len(state.agents)) == (25, 10)
+    few = MACS().begin(BlackBox(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.zeros((1, 3)))
+    assert few.evaluations == 10
+    assert 0.0 in few.archive.F[:, 0]
+
+
+def test_more_objectives_than_points_and_no_budget_are_refused():
+    box = BlackBox(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
+    with pytest.raises(ValueError, match="5 objectives, not 4"):
+        MACS(archive=4).begin(box, 100, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="leaves none"):
+        MACS().begin(BlackBox(schaffer, [(-2, 2)]), 0, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"agents": 2},
+        {"agents": 3.5},
+        {"archive": 0},
+        {"rho": 0},
+        {"F": 3},
+        {"CR": -0.1},
+        {"social": 1.1},
+        {"contraction": 1},
+        {"momentum": 1},
+    ]
+    + [
+        {"max_contractions": -1},
+        {"coordinates": 0},
+        {"mesh": "adaptive"},
+        {"mesh": "fine"},
+        {"refine": 1},
+        {"directions": 0},
+        {"rho": None},
+    ],
+)
+def test_settings_out_of_range_are_named(setting):
+    with pytest.raises(ValueError, match=next(iter(setting))):
+        MACS(**setting)
+
+
+def test_settings_of_the_paper():
+    assert MACS.paper(archive=20).archive == 20
+    assert not MACS.paper().redraw
+    assert MACS.paper().coordinates_to_scan(29, 10, 2) == 29
+    assert MACS().coordinates_to_scan(29, 10, 2) == 1
+    assert MACS().coordinates_to_scan(29, 0, 2) == 29
+    state = run(MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3), 600)
+    assert len(state.archive) == 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "limit"), [(1, 4.0e-3), (2, 4.0e-3), (3, 4.6e-3), (4, 1.0e-2)])
+def test_fronts_of_zitzler_deb_and_thiele(kind, limit):
+    bounds = [(0, 1)] + [(-5, 5) if kind == 4 else (0, 1)] * (9 if kind == 4 else 29)
+    values = []
+    for seed in range(1, 6):
+        state = run(MACS(agents=10, archive=100), BlackBox(lambda X: zdt(kind, X), bounds), 15_000, seed)
+        values.append(igd(state.archive.F, zdt_front(kind)))
+    assert np.median(values) <= limit, values
