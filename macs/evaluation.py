@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
+from transcription.inner.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+
+__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,15 @@ class CompiledProblem:
         """+1 for a minimised, -1 for a maximised objective, shape (m,)."""
         return np.array([goal.sign for goal in self.goals])
 
+    @property
+    def order_in_time(self) -> list[int]:
+        """Indices of the phases, each after those that lead into it; otherwise as declared."""
+        order: list[int] = []
+        while len(order) < len(self.phases):
+            waiting = (i for i in range(len(self.phases)) if i not in order)
+            order.append(next(i for i in waiting if all(link.first in order for link in self.links if link.second == i)))
+        return order
+
     @cached_property
     def fingerprint(self) -> str:
         """A hash of everything that decides what the problem's trajectories are: two problems with the same one are the same."""

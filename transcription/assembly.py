@@ -36,7 +36,7 @@ class Assembly:
         self._joined: list[tuple[int, int, float, str]] = []
         self.parameters = np.array([self.layout.add(v, free=True) for v in problem.parameters], dtype=int)
         self._writers: dict[int, PhaseWriter] = {}
-        for i in _in_order_of_time(problem):
+        for i in problem.order_in_time:
             self._writers[i] = writer(problem.phases[i], self.layout, self._ends(i))
         self._peaks = [self._add_peaks(phase) for phase in problem.phases]
 
@@ -203,16 +203,3 @@ class Assembly:
             limits == (v.lower, v.upper) for phase in self.problem.phases for v, limits in zip(phase.states, phase.final, strict=True)
         )
         return bare and unbounded_ends
-
-
-def _in_order_of_time(problem: CompiledProblem) -> list[int]:
-    """Indices of the phases, each after those that lead into it; otherwise as declared."""
-    order: list[int] = []
-    while len(order) < len(problem.phases):
-        ready = (
-            i
-            for i in range(len(problem.phases))
-            if i not in order and all(link.first in order for link in problem.links if link.second == i)
-        )
-        order.append(next(ready))
-    return order

@@ -87,10 +87,7 @@ def simulate(
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
     flights: dict[int, _Flight] = {}
     violations: dict[str, float] = {}
-    remaining = list(range(len(problem.phases)))
-    while remaining:
-        i = next(j for j in remaining if all(link.first in flights for link in problem.links if link.second == j))
-        remaining.remove(i)
+    for i in problem.order_in_time:
         phase, planned = problem.phases[i], trajectory[problem.phases[i].name]
         start = _start(problem, i, planned, flights, violations)
         flights[i] = _fly(phase, planned, start, parameters, rtol, atol, method)
