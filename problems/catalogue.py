@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import importlib
 import importlib.util
 import sys
@@ -82,16 +83,21 @@ def _file_module(place: str) -> ModuleType:
     path = Path(place).resolve()
     if not path.is_file():
         raise ValueError(f"there is no file '{place}'")
-    spec = importlib.util.spec_from_file_location(f"_problem_file_{path.stem}", path)
+    name = f"_problem_file_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ValueError(f"'{place}' is not a Python file")
     module = importlib.util.module_from_spec(spec)
-    # As for a script: what stands beside the file can be imported by it.
+    # As for a script: what stands beside the file can be imported by it, and its own classes find their module.
+    sys.modules[name] = module
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
-    except SyntaxError as error:
-        raise ValueError(f"'{place}' is not valid Python: {error}") from error
+    except BaseException as error:
+        del sys.modules[name]
+        if isinstance(error, SyntaxError):
+            raise ValueError(f"'{place}' is not valid Python: {error}") from error
+        raise
     finally:
         sys.path.remove(str(path.parent))
     return module
@@ -100,5 +106,5 @@ def _file_module(place: str) -> ModuleType:
 def _named_module(place: str, name: str) -> ModuleType:
     try:
         return importlib.import_module(place)
-    except ModuleNotFoundError as error:
+    except (ModuleNotFoundError, TypeError) as error:
         raise ValueError(f"there is no module '{place}' for the problem '{name}': {error}") from error

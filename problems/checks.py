@@ -9,6 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .compiled import Variable
+
 
 def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
     """A new name: a non-empty string that is not among `taken`."""
@@ -21,10 +23,14 @@ def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
 
 def number(value: Any, what: str) -> float:
     """A finite real number."""
+    if isinstance(value, str | bytes | ca.SX):
+        raise ValueError(f"{what} must be a number, not {_shown(value)}")
     try:
         result = float(value)
+    except OverflowError:
+        result = math.inf
     except (TypeError, ValueError, RuntimeError, NotImplementedError):
-        raise ValueError(f"{what} must be a number, not {value!r}") from None
+        raise ValueError(f"{what} must be a number, not {_shown(value)}") from None
     if not math.isfinite(result):
         raise ValueError(f"{what} must be finite, not {result}")
     return result
@@ -35,7 +41,7 @@ def interval(value: Any, what: str) -> tuple[float, float]:
     try:
         lower, upper = value
     except (TypeError, ValueError):
-        raise ValueError(f"{what} must be a pair (lower, upper), not {value!r}") from None
+        raise ValueError(f"{what} must be a pair (lower, upper), not {_shown(value)}") from None
     lower, upper = number(lower, f"the lower end of {what}"), number(upper, f"the upper end of {what}")
     if lower > upper:
         raise ValueError(f"{what} is an empty interval: {lower:g} > {upper:g}")
@@ -44,7 +50,7 @@ def interval(value: Any, what: str) -> tuple[float, float]:
 
 def fixed_or_interval(value: Any, what: str) -> tuple[float, float]:
     """A number, which is fixed, or a pair, which is free within it."""
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and np.ndim(value) == 1:
+    if (isinstance(value, Sequence) and not isinstance(value, str)) or (isinstance(value, np.ndarray) and value.ndim == 1):
         return interval(value, what)
     fixed = number(value, what)
     return fixed, fixed
@@ -113,17 +119,36 @@ def expression(value: Any, known: Mapping[int, str], what: str, hint: str) -> ca
 
 def guess(value: Any, what: str) -> Any:
     """A number, a pair of numbers (a straight line), or (times, values): two sequences of the same length, times increasing."""
-    if np.ndim(value) == 0 and not isinstance(value, Sequence):
-        return number(value, what)
     try:
         first, second = value
-    except (TypeError, ValueError):
-        raise ValueError(f"{what} must be a number, a pair of numbers or a pair (times, values)") from None
-    if np.ndim(first) == 0 and np.ndim(second) == 0:
+    except (TypeError, ValueError, RuntimeError, NotImplementedError):
+        if isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim):
+            raise ValueError(f"{what} must be a number, a pair of numbers or a pair (times, values), not {_shown(value)}") from None
+        return number(value, what)
+    if not any(isinstance(part, Sequence | np.ndarray) and np.ndim(np.asarray(part, dtype=object)) for part in (first, second)):
         return number(first, what), number(second, what)
-    times, values = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    try:
+        times, values = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}: times and values must be two sequences of numbers, not {_shown(value)}") from None
     if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
         raise ValueError(f"{what}: times and values must be two sequences of the same length, at least 2")
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values)) and np.all(np.diff(times) > 0)):
         raise ValueError(f"{what}: times must increase, and all must be finite")
     return times, values
+
+
+def guessed(value: Any, variable: Variable, what: str) -> Any:
+    """A guess as `guess` or `number` returns it, if it lies within the bounds of its variable, but for rounding."""
+    samples = np.atleast_1d(value[1] if np.ndim(value) == 2 else value)
+    slack = 1e-9 * max(variable.span, abs(variable.lower), abs(variable.upper))
+    outside = samples[(samples < variable.lower - slack) | (samples > variable.upper + slack)]
+    if len(outside):
+        raise ValueError(f"{what} is {outside[0]:g}, outside its bounds ({variable.lower:g}, {variable.upper:g})")
+    return value
+
+
+def _shown(value: Any) -> str:
+    """A value on one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -147,7 +147,14 @@ class Phase:
             what = f"phase '{self.name}': the guess of '{name}'"
             if name not in self._symbols and name not in ("t0", "tf"):
                 raise ValueError(f"{what}: there is no such state, control or time; there are {', '.join((*self._symbols, 't0', 'tf'))}")
-            self._guesses[name] = checks.number(value, what) if name in ("t0", "tf") else checks.guess(value, what)
+            self._guesses[name] = self._guess(name, value, what)
+
+    def _guess(self, name: str, value: Any, what: str) -> Any:
+        if name in ("t0", "tf"):
+            limits = self._t0_range if name == "t0" else self._tf_range
+            return checks.guessed(checks.number(value, what), Variable(name, *limits), what)
+        variable = self._states.get(name) or self._controls[name]
+        return checks.guessed(checks.guess(value, what), variable, what)
 
     def _new_name(self, kind: str, name: str) -> str:
         taken = {*self._symbols, *self._paths, "time", "t0", "tf"}
@@ -179,6 +186,16 @@ class Phase:
     def _quantity_symbols(self) -> list[ca.MX]:
         """What objectives and constraints may use of this phase, in the order of `CompiledPhase.n_quantities`."""
         return [self.t0, self.tf, *(symbol for kind in _KINDS for symbol, _ in self._quantities[kind])]
+
+    def _labels(self) -> dict[str, list[str]]:
+        """What to call each row of each compiled Function."""
+        place = f"phase '{self.name}'"
+        functions = {"initials": "initial", "finals": "final", "integrands": "integral", "peaks": "peak"}
+        return {
+            "dynamics": [f"{place}: the rate of '{name}'" for name in self._states],
+            "path": [f"path '{name}' of {place}" for name in self._paths],
+            **{word: [f"{place}: {kind}({inner})" for _, inner in self._quantities[kind]] for word, kind in functions.items()},
+        }
 
     def _compile(self) -> CompiledPhase:
         """Plain data and Functions; ranges as stated, before links narrow them."""

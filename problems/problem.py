@@ -8,12 +8,12 @@ from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .functions import vector_function
 from .phase import Phase
+from .sanity import check_numbers
 
 
 class Problem:
@@ -48,6 +48,7 @@ class Problem:
         self._objectives: dict[str, tuple[Objective, ca.MX]] = {}
         self._constraints: dict[str, tuple[Limit, ca.MX]] = {}
         self._links: list[Link] = []
+        self._open_links: set[tuple[int, int]] = set()
         self._guesses: dict[str, float] = {}
 
     def __repr__(self) -> str:
@@ -113,8 +114,8 @@ class Problem:
         Parameters
         ----------
         states : sequence of str, optional
-            The states that are continuous; by default all that have the same name in both. Time always is. For a jump, leave a state
-            out and state it with `constraint`.
+            The states that are continuous; by default all that have the same name in both once the problem is stated. Time always is. For
+            a jump, leave a state out and state it with `constraint`.
         """
         numbers = []
         for phase in (first, second):
@@ -122,7 +123,7 @@ class Problem:
                 raise ValueError(f"problem '{self.name}': link takes two of its phases, not {phase!r}")
             numbers.append(list(self._phases).index(phase.name))
         place = f"the link from phase '{first.name}' to phase '{second.name}'"
-        common = [name for name in first._states if name in second._states]
+        common = _common(first, second)
         chosen = common if states is None else [states] if isinstance(states, str) else list(states)
         for name in chosen:
             if name not in common:
@@ -132,6 +133,8 @@ class Problem:
         if numbers[0] == numbers[1] or numbers[0] in _after(self._links, numbers[1]):
             raise ValueError(f"{place} would make time run in a circle; state a periodic condition with `constraint`")
         self._links.append(Link(numbers[0], numbers[1], tuple(chosen)))
+        if states is None:
+            self._open_links.add((numbers[0], numbers[1]))
 
     def minimize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be minimised: an expression of the same kind as a constraint's."""
@@ -147,7 +150,7 @@ class Problem:
             what = f"problem '{self.name}': the guess of parameter '{name}'"
             if name not in self._parameters:
                 raise ValueError(f"{what}: there is no such parameter; there are {', '.join(self._parameters) or 'none'}")
-            self._guesses[name] = checks.number(value, what)
+            self._guesses[name] = checks.guessed(checks.number(value, what), self._parameters[name][0], what)
 
     def compile(self) -> CompiledProblem:
         """Check the whole and turn it into plain data and named CasADi Functions, which pickle.
@@ -155,34 +158,42 @@ class Problem:
         Raises
         ------
         ValueError
-            No phase, no objective, a phase without states or dynamics, rates that are NaN, ranges or links that leave nothing.
+            No phase, no objective, a phase without states or dynamics, expressions that are NaN, ranges or links that leave nothing.
         """
         place = f"problem '{self.name}'"
         if not self._phases:
             raise ValueError(f"{place} has no phase")
         if not self._objectives:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
-        phases = _narrowed([phase._compile() for phase in self._phases.values()], self._links)
+        links = [self._resolved(link) for link in self._links]
+        phases = _narrowed([phase._compile() for phase in self._phases.values()], links)
         parameters = tuple(variable for variable, _ in self._parameters.values())
-        for phase in phases:
-            _check_rates_are_numbers(phase, parameters)
         groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(self._phases.values())}
         groups["p"] = list(self.parameters.values())
         goals = tuple(goal for goal, _ in self._objectives.values())
         minimised = [goal.sign * expr for goal, expr in self._objectives.values()]
-        return CompiledProblem(
+        compiled = CompiledProblem(
             name=self.name,
             phases=tuple(phases),
             parameters=parameters,
             guesses=dict(self._guesses),
             goals=goals,
             limits=tuple(limit for limit, _ in self._constraints.values()),
-            links=tuple(self._links),
+            links=tuple(links),
             objectives=vector_function("objectives", groups, minimised),
             constraints=vector_function("constraints", groups, [expr for _, expr in self._constraints.values()]),
             address=self.address,
             data=dict(self.data),
         )
+        check_numbers(compiled, [phase._labels() for phase in self._phases.values()])
+        return compiled
+
+    def _resolved(self, link: Link) -> Link:
+        """The link with all states that are common by now, unless its user named them."""
+        if (link.first, link.second) not in self._open_links:
+            return link
+        phases = list(self._phases.values())
+        return replace(link, states=tuple(_common(phases[link.first], phases[link.second])))
 
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
         place = f"problem '{self.name}'"
@@ -198,6 +209,11 @@ class Problem:
             "use initial(...), final(...), integral(...) or peak(...) of a phase, times and parameters"
         )
         return checks.expression(value, known, what, hint)
+
+
+def _common(first: Phase, second: Phase) -> list[str]:
+    """Names of the states of both phases."""
+    return [name for name in first._states if name in second._states]
 
 
 def _after(links: list[Link], start: int) -> set[int]:
@@ -242,17 +258,3 @@ def _with_times_narrowed(phase: CompiledPhase) -> CompiledPhase:
 
 def _ranged(variable: Variable, limits: tuple[float, float]) -> Variable:
     return replace(variable, lower=limits[0], upper=limits[1], scale=limits[1] - limits[0] or 1.0)
-
-
-def _check_rates_are_numbers(phase: CompiledPhase, parameters: tuple[Variable, ...]) -> None:
-    """A rate that is NaN or infinite wherever we look is a mistake in its expression (a division by zero, a root of something negative)."""
-    rng = np.random.default_rng(0)
-    groups = [phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *parameters)]
-    share = rng.random((sum(len(group) for group in groups), 64))
-    variables = [variable for group in groups for variable in group]
-    lower = np.array([[v.lower] for v in variables])
-    samples = lower + share * (np.array([[v.upper] for v in variables]) - lower)
-    rates = np.array(phase.dynamics(*np.split(samples, np.cumsum([len(group) for group in groups])[:-1])))
-    for state, values in zip(phase.states, rates, strict=True):
-        if not np.isfinite(values).any():
-            raise ValueError(f"phase '{phase.name}': the rate of '{state.name}' is not a finite number anywhere within the bounds")

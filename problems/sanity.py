@@ -1,0 +1,77 @@
+"""Expressions that are no numbers anywhere: a division by zero, the root of something negative, a NaN among the user's data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from .compiled import CompiledPhase, CompiledProblem, Variable
+
+SAMPLES = 128
+Labels = Mapping[str, Sequence[str]]
+
+
+def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
+    """Raise a ValueError that names an expression which is not a finite number wherever we look within the bounds.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    labels : sequence of mappings
+        For each phase, by name of its Functions, what to call each of their rows.
+    """
+    rng = np.random.default_rng(0)
+    p = _within(rng, [(v.lower, v.upper) for v in problem.parameters])
+    quantities = [_quantities(phase, words, p, rng) for phase, words in zip(problem.phases, labels, strict=True)]
+    place = f"of problem '{problem.name}'"
+    _finite(problem.objectives, (*quantities, p), [f"objective '{goal.name}' {place}" for goal in problem.goals])
+    _finite(problem.constraints, (*quantities, p), [f"constraint '{limit.name}' {place}" for limit in problem.limits])
+
+
+def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Samples of what objectives and constraints see of a phase, shape (n_quantities, SAMPLES)."""
+    t0, tf = _times(phase, rng)
+    share, s = rng.random(SAMPLES), np.vstack([t0, tf, p])
+    first, last = _within(rng, phase.initial), _within(rng, phase.final)
+    # Half of the samples anywhere in the box, half of them near the ways from the initial to the final states.
+    inside = np.where(np.arange(SAMPLES) % 2, _between(rng, phase.states), first + share * (last - first))
+    u = _between(rng, phase.controls)
+    along = inside, u, t0 + share * (tf - t0), s
+    _finite(phase.dynamics, along, labels["dynamics"])
+    _finite(phase.path, along, labels["path"])
+    initials = _finite(phase.initials, (first, u, t0, s), labels["initials"])
+    finals = _finite(phase.finals, (last, u, tf, s), labels["finals"])
+    integrals = _finite(phase.integrands, along, labels["integrands"]) * (tf - t0)
+    peaks = _finite(phase.peaks, along, labels["peaks"])
+    return np.vstack([t0, tf, initials, finals, integrals, peaks])
+
+
+def _times(phase: CompiledPhase, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Samples of t0 and tf, in that order in time."""
+    t0 = _between(rng, [phase.t0])
+    tf = _between(rng, [phase.tf])
+    return t0, np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
+
+
+def _between(rng: np.random.Generator, variables: Sequence[Variable]) -> np.ndarray:
+    return _within(rng, [(v.lower, v.upper) for v in variables])
+
+
+def _within(rng: np.random.Generator, ranges: Sequence[tuple[float, float]]) -> np.ndarray:
+    lower, upper = np.array(ranges, dtype=float).reshape(-1, 2, 1).transpose(1, 0, 2)
+    return lower + rng.random((len(ranges), SAMPLES)) * (upper - lower)
+
+
+def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequence[str]) -> np.ndarray:
+    """Values of a Function (rows, SAMPLES); those that are no numbers replaced by others of the same row."""
+    if not labels:
+        return np.empty((0, SAMPLES))
+    values = np.array(function(*inputs))
+    for label, row in zip(labels, values, strict=True):
+        good = np.isfinite(row)
+        if not good.any():
+            raise ValueError(f"{label} is not a finite number anywhere within the bounds")
+        row[~good] = np.resize(row[good], np.count_nonzero(~good))
+    return values

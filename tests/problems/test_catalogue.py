@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from problems import Problem, describe, load, names
+from transcription import parse
+
+CASE = """
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from problems import Problem
+
+@dataclass
+class Data:
+    mass: float = 2.0
+
+def problem(mass: float = 2.0, name: str = "mine"):
+    data = Data(mass)
+    problem = Problem(name)
+    phase = problem.phase("hop", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(0, 10), initial=0)
+    phase.dynamics(x=1 / data.mass)
+    problem.minimize("time", phase.tf)
+    problem.maximize("distance", phase.final(x))
+    return problem
+
+def broken():
+    raise TypeError("inside")
+
+number = 3
+
+def nothing():
+    return None
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "my case.py"
+    path.write_text(CASE)
+    return path
+
+
+def refused(action, *words):
+    with pytest.raises(ValueError) as caught:
+        action()
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_case_loads_compiles_and_names_its_defaults(name):
+    problem = load(name)
+    assert isinstance(problem, Problem)
+    assert problem.name == name and problem.address == name
+    assert len(problem.compile().goals) >= 2
+    assert describe(name) and "\n" not in describe(name)
+    parse(problem.default_transcription).transcribe(problem)
+    assert problem.default_evaluations > 0 and problem.verify_tolerance > 0
+    assert load(name).compile().fingerprint == problem.compile().fingerprint
+
+
+def test_the_cases_of_the_paper_are_there():
+    assert {"goddard", "orbit_rise", "orbit_rise_full"} <= set(names())
+
+
+def test_unknown_names_are_told_what_there_is():
+    refused(lambda: load("godard"), "godard", "goddard")
+    refused(lambda: load(""), "goddard")
+    refused(lambda: load("problems.goddard"), "problems.goddard")
+    refused(lambda: load("no.such.module:f"), "no.such.module")
+    refused(lambda: load(".relative:f"), ".relative")
+    refused(lambda: load("problems.goddard:nothing"), "problems.goddard", "nothing")
+    refused(lambda: load("problems.goddard:"), "problems.goddard")
+    refused(lambda: load("missing.py:problem"), "missing.py")
+
+
+def test_a_case_from_a_module():
+    assert load("problems.goddard:problem").name == "goddard"
+
+
+def test_a_case_from_a_file(case, monkeypatch):
+    problem = load(f"{case}:problem", mass=4.0)
+    assert problem.name == "mine" and problem.data == {"mass": 4.0}
+    assert load(problem.address, **problem.data).compile().fingerprint == problem.compile().fingerprint
+    monkeypatch.chdir(case.parent)
+    relative = load(f"{case.name}:problem")
+    monkeypatch.chdir("/")
+    assert load(relative.address).name == "mine", "the address is found from another folder"
+
+
+def test_a_file_that_changed_is_read_again(case):
+    first = load(f"{case}:problem").compile().fingerprint
+    case.write_text(CASE.replace("bounds=(0, 10)", "bounds=(0, 123456)"))
+    os.utime(case, (1, 1))
+    assert load(f"{case}:problem").compile().fingerprint != first
+
+
+def test_files_of_the_same_name_do_not_disturb_each_other(case, tmp_path):
+    other = tmp_path / "other" / case.name
+    other.parent.mkdir()
+    other.write_text(CASE.replace('"mine"', '"other"'))
+    assert load(f"{case}:problem").name == "mine"
+    assert load(f"{other}:problem").name == "other"
+    assert load(f"{case}:problem").name == "mine"
+
+
+def test_what_stands_beside_a_file_can_be_imported(case):
+    (case.parent / "beside_the_case.py").write_text("from problems import Problem\n")
+    case.write_text("from beside_the_case import Problem\n" + CASE.replace("from __future__ import annotations", ""))
+    assert load(f"{case}:problem").name == "mine"
+    assert str(case.parent) not in sys.path
+
+
+def test_what_is_no_case_is_refused(case):
+    refused(lambda: load(f"{case}:nothing"), "nothing", "NoneType")
+    refused(lambda: load(f"{case}:number"), "number")
+    refused(lambda: load(f"{case}:absent"), "absent")
+    refused(lambda: load(f"{case}:problem", weight=1), "weight")
+    refused(lambda: load("goddard", mass=1), "goddard", "mass")
+    with pytest.raises(TypeError, match="inside"):
+        load(f"{case}:broken")
+    case.write_text("def problem(:\n")
+    refused(lambda: load(f"{case}:problem"), "my case.py", "Python")
+    assert not [name for name in sys.modules if "my case" in name and sys.modules[name].__file__ == str(case)]
+
+
+def test_naming_the_cases_is_quick_and_quiet():
+    code = "import sys, problems; assert problems.names(); print(*(m for m in ('matplotlib', 'xarray', 'scipy.stats') if m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "" and done.stderr == ""

@@ -1,0 +1,587 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from problems import Phase, Problem
+
+NAN, INF = float("nan"), float("inf")
+
+
+def glider(**times) -> tuple[Problem, Phase]:
+    problem = Problem("glider")
+    phase = problem.phase("descent", **({"t0": 0.0, "tf": (1.0, 2.0)} | times))
+    phase.state("height", bounds=(0, 10), initial=5)
+    phase.control("flap", bounds=(-1, 1))
+    phase.dynamics(height=-phase["flap"])
+    problem.minimize("time", phase.tf)
+    return problem, phase
+
+
+def bare() -> tuple[Problem, Phase]:
+    problem = Problem("glider")
+    return problem, problem.phase("descent", t0=0, tf=1)
+
+
+def refused(action, *words: str) -> None:
+    """The call raises a ValueError on one line that quotes the words."""
+    with pytest.raises(ValueError) as caught:
+        action()
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, f"'{word}' is missing from: {message}"
+
+
+# Numbers
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [
+        (1, 0),
+        (0, INF),
+        (-INF, 0),
+        (NAN, 1),
+        (0, None),
+        None,
+        3,
+        (0, 1, 2),
+        "01",
+        ("0", "1"),
+        (0, 1j),
+        (0, 10**400),
+        (0, ca.MX.sym("q")),
+        ca.DM([0, 1, 2]),
+        (0, np.array([1.0, 2.0])),
+        {"a": 1, "b": 2},
+        (0, ca.SX.sym("s")),
+        (),
+        [[0, 1], [2, 3]],
+        np.ones((2, 40)),
+    ],
+    ids=str,
+)
+def test_bad_bounds_are_refused_with_the_name_of_the_variable(bounds):
+    problem, phase = bare()
+    refused(lambda: phase.state("height", bounds=bounds), "height", "descent")
+    refused(lambda: phase.control("flap", bounds=bounds), "flap", "descent")
+    refused(lambda: problem.parameter("mass", bounds=bounds), "mass", "glider")
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [(0, 1), [0, 1], np.array([0, 1]), (np.float32(0), np.int64(1)), (ca.DM(0), ca.DM(1)), (np.array(0.0), np.array(1)), (ca.MX(0), 1)],
+    ids=str,
+)
+def test_numbers_of_every_kind_are_bounds(bounds):
+    _, phase = bare()
+    phase.state("height", bounds=bounds, initial=bounds[0], final=bounds)
+    compiled_state = phase._states["height"]
+    assert (compiled_state.lower, compiled_state.upper) == (0.0, 1.0)
+    assert phase._initial["height"] == (0.0, 0.0) and phase._final["height"] == (0.0, 1.0)
+
+
+def test_a_state_of_one_value_only_is_refused():
+    refused(lambda: bare()[1].state("height", bounds=(2, 2)), "height")
+
+
+@pytest.mark.parametrize("word", ["initial", "final"])
+@pytest.mark.parametrize("value", [11, -0.1, (0, 11), (-1, 5), NAN, INF, (6, 5), "5", (1, 2, 3), ca.MX.sym("q")], ids=str)
+def test_values_outside_bounds_are_refused(word, value):
+    refused(lambda: bare()[1].state("height", bounds=(0, 10), **{word: value}), "height", "descent", word)
+
+
+@pytest.mark.parametrize("scale", [0, -1, NAN, INF, "1", ca.MX.sym("q")], ids=str)
+def test_scales_are_positive_numbers(scale):
+    problem, phase = glider()
+    refused(lambda: phase.state("speed", bounds=(0, 1), scale=scale), "speed")
+    refused(lambda: phase.control("brake", bounds=(0, 1), scale=scale), "brake")
+    refused(lambda: phase.path("load", phase["flap"], upper=1, scale=scale), "load")
+    refused(lambda: problem.parameter("mass", bounds=(0, 1), scale=scale), "mass")
+    refused(lambda: problem.constraint("fuel", phase.tf, upper=1, scale=scale), "fuel")
+    refused(lambda: problem.minimize("cost", phase.tf, scale=scale), "cost")
+
+
+@pytest.mark.parametrize(
+    "times", [{"t0": NAN}, {"t0": (2, 1)}, {"tf": INF}, {"tf": (0, INF)}, {"tf": None}, {"tf": "5"}, {"tf": [1]}], ids=str
+)
+def test_bad_times_are_refused(times):
+    refused(lambda: glider(**times), "descent", next(iter(times)))
+
+
+@pytest.mark.parametrize("duration", [-1, (-2, -1), 0, (-1, 2), (0, 0), (2, 1), INF, NAN])
+def test_durations_are_positive(duration):
+    refused(lambda: glider(duration=duration), "descent", "duration")
+
+
+@pytest.mark.parametrize("times", [{"tf": 0}, {"tf": (-2, -1)}, {"t0": 3}, {"t0": (2, 3), "tf": (0, 2)}], ids=str)
+def test_a_phase_must_last(times):
+    refused(lambda: glider(**times)[0].compile(), "descent")
+
+
+@pytest.mark.parametrize("duration", [3, (2.5, 3), (0.1, 0.5)])
+def test_a_duration_that_the_times_do_not_allow_is_refused(duration):
+    refused(lambda: glider(duration=duration)[0].compile(), "descent", "duration")
+
+
+@pytest.mark.parametrize("period", [0, -6, 3, NAN, INF, "2", 2.01])
+def test_a_period_is_the_width_of_the_bounds(period):
+    refused(lambda: bare()[1].control("bank", bounds=(-1, 1), period=period), "bank")
+
+
+def test_a_period_may_differ_from_the_width_by_rounding():
+    bare()[1].control("bank", bounds=(-math.pi, math.pi), period=math.tau)
+    bare()[1].control("bank", bounds=(0.1, 0.3), period=0.2)
+
+
+@pytest.mark.parametrize(
+    "limits", [{}, {"lower": 2, "upper": 1}, {"lower": NAN}, {"upper": "3"}, {"upper": INF}, {"lower": ca.MX.sym("q")}], ids=str
+)
+def test_bad_limits_are_refused(limits):
+    problem, phase = glider()
+    refused(lambda: phase.path("load", phase["flap"], **limits), "load", "descent")
+    refused(lambda: problem.constraint("fuel", phase.tf, **limits), "fuel", "glider")
+
+
+# Names
+
+
+@pytest.mark.parametrize("name", ["", " ", None, 3, ca.MX.sym("x")], ids=str)
+def test_names_are_words(name):
+    problem, phase = glider()
+    refused(lambda: Problem(name))
+    refused(lambda: problem.phase(name, t0=0, tf=1), "glider")
+    refused(lambda: problem.parameter(name, bounds=(0, 1)), "glider")
+    refused(lambda: problem.minimize(name, phase.tf), "glider")
+    refused(lambda: problem.constraint(name, phase.tf, upper=1), "glider")
+    refused(lambda: phase.state(name, bounds=(0, 1)), "descent")
+    refused(lambda: phase.control(name, bounds=(0, 1)), "descent")
+    refused(lambda: phase.path(name, phase["flap"], upper=1), "descent")
+
+
+@pytest.mark.parametrize("name", ["height", "flap", "load", "time", "t0", "tf"])
+def test_a_phase_uses_a_name_once(name):
+    _, phase = glider()
+    phase.path("load", phase["flap"], upper=1)
+    refused(lambda: phase.state(name, bounds=(0, 1)), name, "descent", "twice")
+    refused(lambda: phase.control(name, bounds=(0, 1)), name, "descent", "twice")
+    refused(lambda: phase.path(name, phase["flap"], upper=1), name, "descent", "twice")
+
+
+def test_a_problem_uses_a_name_once_in_each_kind():
+    problem, phase = glider()
+    problem.parameter("mass", bounds=(0, 1))
+    problem.constraint("fuel", phase.tf, upper=9)
+    refused(lambda: problem.phase("descent", t0=0, tf=1), "descent", "twice")
+    refused(lambda: problem.parameter("mass", bounds=(0, 1)), "mass", "twice")
+    refused(lambda: problem.constraint("fuel", phase.tf, upper=1), "fuel", "twice")
+    refused(lambda: problem.minimize("time", phase.tf), "time", "twice")
+    refused(lambda: problem.maximize("time", phase.tf), "time", "twice")
+    # Kinds do not disturb each other, and neither do phases.
+    problem.minimize("fuel", phase.tf)
+    problem.constraint("descent", phase.tf, upper=9)
+    problem.phase("landing", t0=0, tf=1).state("height", bounds=(0, 1))
+
+
+def test_what_was_refused_leaves_nothing_behind():
+    problem, phase = glider()
+    before = problem.compile().fingerprint
+    for action in (
+        lambda: problem.phase("landing", t0=2, tf=NAN),
+        lambda: problem.parameter("mass", bounds=(1, 0)),
+        lambda: problem.constraint("fuel", ca.MX.sym("q"), upper=1),
+        lambda: problem.minimize("cost", ca.MX.sym("q")),
+        lambda: phase.state("speed", bounds=(1, 0)),
+        lambda: phase.state("speed", bounds=(0, 1), final=2),
+        lambda: phase.path("load", ca.MX.sym("q"), upper=1),
+        lambda: phase.integral(ca.MX.sym("q")),
+    ):
+        refused(action)
+    assert problem.compile().fingerprint == before
+
+
+# Expressions
+
+
+def test_every_state_needs_a_rate_and_nothing_else_has_one():
+    _, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.state("speed", bounds=(0, 1))
+    refused(lambda: phase.dynamics(height=1), "descent", "[height]", "[height, speed]")
+    refused(lambda: phase.dynamics(height=1, speed=1, mass=1), "descent", "mass")
+    phase.dynamics(speed=1, height=2)
+    refused(lambda: phase.dynamics(height=1, speed=1), "descent", "twice")
+
+
+def test_dynamics_may_come_in_any_order():
+    problem, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.state("speed", bounds=(0, 1))
+    phase.dynamics(speed=1, height=2)
+    problem.minimize("time", phase.tf)
+    rates = problem.compile().phases[0].dynamics([0, 0], [], 0, [0, 1])
+    assert np.array(rates).ravel().tolist() == [2, 1]
+
+
+def test_a_state_after_the_dynamics_is_missed_when_the_problem_is_compiled():
+    problem, phase = glider()
+    phase.state("speed", bounds=(0, 1))
+    refused(problem.compile, "descent", "speed")
+
+
+def test_dynamics_must_be_given():
+    problem, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    problem.minimize("time", phase.tf)
+    refused(problem.compile, "descent", "height")
+
+
+def test_a_problem_needs_a_phase_an_objective_and_states():
+    refused(lambda: Problem("empty").compile(), "empty", "phase")
+    problem, phase = bare()
+    refused(problem.compile, "glider", "objective")
+    problem.minimize("time", phase.tf)
+    refused(problem.compile, "descent", "state")
+
+
+def strangers() -> dict[str, ca.MX]:
+    other_problem, other = glider()
+    return {
+        "q": ca.MX.sym("q"),
+        "height": other["height"],
+        "mass": other_problem.parameter("mass", bounds=(0, 1)),
+        "tf of descent": other.tf,
+        "final(height)": other.final(other["height"]),
+    }
+
+
+@pytest.mark.parametrize("name", strangers())
+def test_symbols_of_another_problem_are_refused(name):
+    problem, phase = glider()
+    alien = strangers()[name]
+    for expression in (alien, phase.tf * alien, ca.if_else(alien > 0, 1, phase.tf)):
+        refused(lambda e=expression: phase.path("load", e, upper=1), name, "load", "descent")
+        refused(lambda e=expression: problem.constraint("fuel", e, upper=1), name, "fuel", "glider")
+        refused(lambda e=expression: problem.minimize("cost", e), name, "cost", "glider")
+        for kind in ("initial", "final", "integral", "peak"):
+            refused(lambda e=expression, kind=kind: getattr(phase, kind)(e), name, "descent", kind)
+    refused(lambda: bare_dynamics(alien), name, "height", "descent")
+
+
+def bare_dynamics(rate):
+    _, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=rate)
+
+
+def test_symbols_of_another_phase_are_refused_along_a_phase():
+    problem, phase = glider()
+    second = problem.phase("landing", t0=2, tf=3)
+    distance = second.state("distance", bounds=(0, 1))
+    refused(lambda: second.dynamics(distance=phase["height"]), "height", "distance", "landing")
+    refused(lambda: second.path("load", phase.time, upper=1), "time of descent", "landing")
+    refused(lambda: second.integral(phase.tf), "tf of descent", "landing")
+    refused(lambda: phase.peak(distance), "distance", "descent")
+
+
+def test_raw_states_controls_and_time_are_refused_in_objectives_and_constraints():
+    problem, phase = glider()
+    for symbol, name in ((phase["height"], "height"), (phase["flap"], "flap"), (phase.time, "time of descent")):
+        refused(lambda s=symbol: problem.minimize("cost", phase.tf + s), name, "cost", "final(...)")
+        refused(lambda s=symbol: problem.constraint("fuel", s, upper=1), name, "fuel", "final(...)")
+
+
+def test_quantities_are_refused_along_a_phase():
+    _, phase = glider()
+    for kind in ("initial", "final", "integral", "peak"):
+        quantity = getattr(phase, kind)(phase["height"])
+        refused(lambda q=quantity: phase.path("load", q - phase["height"], upper=1), f"{kind}(height)", "load")
+        refused(lambda q=quantity: phase.integral(q * phase.time), f"{kind}(height)", "integral")
+        refused(lambda q=quantity: bare_dynamics(q), f"{kind}(height)")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, "1", NAN, INF, ca.MX(NAN), ca.MX(1) / 0, [1], ca.MX.sym("v", 2), ca.MX(0, 0), ca.SX.sym("s"), ca.DM([1, 2]), np.ones(2)],
+    ids=str,
+)
+def test_expressions_are_scalars_and_numbers(value):
+    problem, phase = glider()
+    refused(lambda: phase.path("load", value, upper=1), "load")
+    refused(lambda: phase.final(value), "final", "descent")
+    refused(lambda: problem.minimize("cost", value), "cost")
+    refused(lambda: problem.constraint("fuel", value, upper=1), "fuel")
+    refused(lambda: bare_dynamics(value), "height")
+
+
+def test_vectors_are_refused_with_their_name():
+    problem, phase = glider()
+    refused(lambda: problem.minimize("cost", ca.vertcat(phase.tf, phase.t0)), "cost", "(2, 1)")
+    problem.minimize("norm", ca.norm_2(ca.vertcat(phase.tf, phase.t0)))
+
+
+def broken(kind: str, value) -> Problem:
+    problem, phase = glider()
+    x = phase["height"]
+    bad = value(x)
+    if kind in ("initial", "final", "integral", "peak"):
+        problem.minimize("cost", getattr(phase, kind)(bad))
+    elif kind == "path":
+        phase.path("load", bad, upper=1)
+    elif kind == "objective":
+        problem.maximize("cost", value(phase.final(x)))
+    else:
+        problem.constraint("fuel", value(phase.final(x)), upper=1)
+    return problem
+
+
+@pytest.mark.parametrize("kind", ["initial", "final", "integral", "peak", "path", "objective", "constraint"])
+@pytest.mark.parametrize("value", [lambda x: x * NAN, lambda x: x + INF, lambda x: ca.sqrt(-1 - x), lambda x: 1 / ca.fmin(x, 0)])
+def test_expressions_that_are_nowhere_numbers_are_found_before_any_work(kind, value):
+    name = {"path": "load", "objective": "cost", "constraint": "fuel"}.get(kind, f"{kind}(")
+    refused(broken(kind, value).compile, name)
+
+
+@pytest.mark.parametrize("rate", [lambda x: x * NAN, lambda x: ca.log(-1 - x), lambda x: 1 / ca.fmin(x, 0)])
+def test_rates_that_are_nowhere_numbers_are_found_before_any_work(rate):
+    problem, phase = bare()
+    x = phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=rate(x))
+    problem.minimize("time", phase.final(x))
+    refused(problem.compile, "descent", "height")
+
+
+@pytest.mark.parametrize(
+    "rate", [lambda f, x: 1 / (f.tf - f.time), lambda f, x: 1 / f.time, lambda f, x: ca.sqrt(x - 0.9), lambda f, x: 1 / x]
+)
+def test_rates_that_are_numbers_somewhere_are_welcome(rate):
+    problem, phase = bare()
+    x = phase.state("height", bounds=(0, 1), initial=0)
+    phase.dynamics(height=rate(phase, x))
+    problem.minimize("time", phase.final(x))
+    problem.compile()
+
+
+def test_plain_numbers_are_expressions():
+    problem, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=np.float64(1))
+    phase.path("load", ca.DM(0.5), upper=1)
+    problem.constraint("fuel", 3, lower=2)
+    problem.minimize("nothing", 1)
+    problem.minimize("time", phase.final(2) + phase.integral(1))
+    problem.compile()
+
+
+# Links
+
+
+def relay(count: int = 3) -> tuple[Problem, list[Phase]]:
+    problem = Problem("relay")
+    phases = []
+    for i in range(count):
+        phase = problem.phase(f"leg {i}", t0=(0, 10), tf=(0, 10))
+        x = phase.state("x", bounds=(0, 10))
+        phase.state(f"own {i}", bounds=(0, 10))
+        phase.dynamics(**{"x": 1, f"own {i}": x})
+        phases.append(phase)
+    problem.minimize("time", phases[-1].tf)
+    return problem, phases
+
+
+def test_links_take_phases_of_this_problem():
+    problem, legs = relay()
+    _, stranger = glider()
+    for pair in ((legs[0], stranger), (stranger, legs[0]), ("leg 0", legs[1]), (legs[0], None)):
+        refused(lambda pair=pair: problem.link(*pair), "relay", "link")
+
+
+def test_links_take_states_of_both_phases():
+    problem, legs = relay()
+    refused(lambda: problem.link(legs[0], legs[1], states=["own 0"]), "own 0", "leg 0", "leg 1")
+    refused(lambda: problem.link(legs[0], legs[1], states="y"), "y", "leg 0", "leg 1")
+    problem.link(legs[0], legs[1], states="x")
+    problem.link(legs[1], legs[2], states=())
+    assert [link.states for link in problem.compile().links] == [("x",), ()]
+
+
+def test_links_do_not_close_a_circle():
+    problem, legs = relay()
+    refused(lambda: problem.link(legs[0], legs[0]), "leg 0")
+    problem.link(legs[0], legs[1])
+    refused(lambda: problem.link(legs[0], legs[1]), "leg 0", "leg 1", "twice")
+    refused(lambda: problem.link(legs[1], legs[0]), "leg 0", "leg 1", "circle")
+    problem.link(legs[1], legs[2])
+    refused(lambda: problem.link(legs[2], legs[0]), "leg 2", "leg 0", "circle")
+
+
+def test_a_link_stated_before_the_states_still_joins_them():
+    problem = Problem("relay")
+    first, second = problem.phase("up", t0=0, tf=1), problem.phase("down", t0=1, tf=2)
+    problem.link(first, second)
+    for phase in (first, second):
+        phase.state("x", bounds=(0, 1))
+        phase.dynamics(x=1)
+    problem.minimize("time", second.tf)
+    assert problem.compile().links[0].states == ("x",)
+
+
+def test_links_that_leave_nothing_are_refused():
+    problem, legs = relay(2)
+    third = problem.phase("late", t0=11, tf=12)
+    third.state("x", bounds=(0, 1))
+    third.dynamics(x=1)
+    problem.link(legs[0], third)
+    refused(problem.compile, "leg 0", "late", "time")
+    problem = Problem("relay")
+    first, second = problem.phase("up", t0=0, tf=1), problem.phase("down", t0=1, tf=2)
+    for phase, bounds in ((first, (0, 1)), (second, (2, 3))):
+        phase.state("x", bounds=bounds)
+        phase.dynamics(x=1)
+    problem.link(first, second)
+    problem.minimize("time", second.tf)
+    refused(problem.compile, "up", "down", "'x'")
+
+
+def ranges(problem: Problem) -> dict[str, tuple[float, float, float, float]]:
+    return {p.name: (p.t0.lower, p.t0.upper, p.tf.lower, p.tf.upper) for p in problem.compile().phases}
+
+
+def test_times_are_narrowed_by_durations():
+    assert ranges(glider(tf=(0, 100), duration=(2, 5))[0]) == {"descent": (0, 0, 2, 5)}
+    assert ranges(glider(t0=(0, 10), tf=8, duration=3)[0]) == {"descent": (5, 5, 8, 8)}
+    assert ranges(glider(t0=(4, 10), tf=(0, 6))[0]) == {"descent": (4, 6, 4, 6)}
+
+
+def test_times_are_narrowed_along_links_both_ways():
+    problem, legs = relay()
+    for first, second in itertools.pairwise(legs):
+        problem.link(first, second)
+    last = problem.phase("last", t0=(0, 10), tf=7, duration=(3, 10))
+    last.state("x", bounds=(2, 4), initial=3)
+    last.dynamics(x=0)
+    problem.link(legs[2], last)
+    for times in ranges(problem).values():
+        assert times[1] <= 4
+    compiled = problem.compile()
+    assert compiled.phases[2].final[0] == (3, 3) and compiled.phases[3].initial[0] == (3, 3)
+
+
+# Guesses
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        NAN,
+        INF,
+        "5",
+        None,
+        (1, 2, 3),
+        ([0, 1], [1]),
+        ([0], [1]),
+        ([1, 0], [1, 2]),
+        ([0, NAN], [1, 2]),
+        ([0, 1], [1, NAN]),
+        (1, None),
+        ([0, 1], ["a", "b"]),
+        ([0, 0], [1, 2]),
+        np.ones((2, 2, 2)),
+        (1, [2, 3]),
+        {},
+        ca.MX.sym("q"),
+        [[0, 1], [1, 2], [2, 3]],
+        (),
+    ],
+    ids=str,
+)
+def test_bad_guesses_are_refused(value):
+    refused(lambda: glider()[1].guess(height=value), "height", "descent", "guess")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [3, 3.5, np.float64(2), np.array(3), (1, 2), [1, 2], np.array([1, 2]), ([0, 1, 2], [5, 4, 3]), (np.arange(3), range(3))],
+    ids=str,
+)
+def test_guesses_of_every_kind_are_taken(value):
+    glider()[1].guess(height=value)
+
+
+def test_guesses_of_unknown_names_and_outside_bounds_are_refused():
+    problem, phase = glider()
+    problem.parameter("mass", bounds=(1, 2))
+    refused(lambda: phase.guess(speed=1), "speed", "descent", "height")
+    refused(lambda: problem.guess(weight=1), "weight", "glider", "mass")
+    refused(lambda: problem.guess(mass=NAN), "mass", "glider")
+    refused(lambda: problem.guess(mass=3), "mass", "glider", "(1, 2)")
+    refused(lambda: phase.guess(height=11), "height", "descent")
+    refused(lambda: phase.guess(height=(5, -1)), "height", "descent")
+    refused(lambda: phase.guess(flap=([0, 1], [0, 2])), "flap", "descent")
+    refused(lambda: phase.guess(tf=3), "tf", "descent")
+    refused(lambda: phase.guess(tf=(1, 2)), "tf", "descent")
+    phase.guess(height=(0, 10), flap=1, tf=2, t0=0)
+    problem.guess(mass=1)
+
+
+# Afterwards
+
+
+def test_what_was_stated_can_be_read_back():
+    problem, phase = glider()
+    mass = problem.parameter("mass", bounds=(0, 1))
+    gain = phase.final(phase["height"] * 2)
+    problem.maximize("gain", gain, unit="m")
+    assert problem.name == "glider"
+    assert problem.phases["descent"] is phase and list(problem.phases) == ["descent"]
+    assert problem.parameters["mass"] is mass
+    assert problem.objectives["gain"] is gain
+    assert phase.name == "descent"
+    assert phase["height"].name() == "height" and phase["flap"].name() == "flap"
+    assert all(ca.MX.is_symbolic(symbol) for symbol in (phase.time, phase.t0, phase.tf))
+    assert glider(t0=3, tf=4)[1].t0.is_symbolic(), "a fixed time is a symbol, too"
+    with pytest.raises(KeyError, match=r"speed.*height"):
+        phase["speed"]
+    with pytest.raises(TypeError):
+        problem.phases["other"] = phase
+    assert "descent" in repr(problem) and "height" in repr(phase)
+
+
+def test_signs_are_those_of_the_senses():
+    problem, phase = glider()
+    problem.maximize("late", phase.tf, unit="s")
+    compiled = problem.compile()
+    assert compiled.signs.tolist() == [1, -1]
+    assert np.array(compiled.objectives([0, 1.5], [])).ravel().tolist() == [1.5, -1.5]
+    assert [(goal.name, goal.sense, goal.unit) for goal in compiled.goals] == [("time", "minimize", ""), ("late", "maximize", "s")]
+
+
+def test_default_scales_are_spans():
+    problem, phase = glider()
+    phase.path("load", phase["flap"], lower=-2, upper=3)
+    phase.path("lift", phase["flap"], lower=-2)
+    phase.path("trim", phase["flap"], lower=1, upper=1)
+    phase.state("speed", bounds=(-4, 4), scale=100)
+    phase._rates |= {"speed": ca.MX(0)}
+    problem.constraint("fuel", phase.tf, lower=0, upper=5)
+    problem.constraint("exact", phase.tf, lower=2, upper=2, scale=9)
+    compiled = problem.compile()
+    assert [v.scale for v in compiled.phases[0].states] == [10, 100]
+    assert [v.scale for v in compiled.phases[0].paths] == [5, 1, 1]
+    assert [v.scale for v in compiled.limits] == [5, 9]
+
+
+def test_names_may_hold_spaces_and_any_letters():
+    problem = Problem("Höhe über Grund")
+    phase = problem.phase("Phase α", t0=0, tf=1)
+    x = phase.state("h [km]", bounds=(0, 1))
+    u = phase.control("δ*", bounds=(0, 1))
+    phase.dynamics(**{"h [km]": u})
+    phase.path("q̇ ≤ 1", x, upper=1)
+    problem.minimize("Δ v'\"", phase.final(x))
+    assert problem.compile().fingerprint
