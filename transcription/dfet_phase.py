@@ -14,7 +14,7 @@ from .dfet_tables import Tables
 from .guess import along, line
 from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows, Written
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
 
 NEWTON_ITERATIONS = 30
 NEWTON_TOLERANCE = 1e-14
@@ -100,11 +100,7 @@ class DFETPhase(PhaseWriter):
         phase, tables = self.phase, self.tables
         s = extended[self.ends.statics]
         edges = s[0] + (s[1] - s[0]) * np.arange(self.n + 1) / self.n
-        U = extended[self.U]
-        for i, variable in enumerate(phase.controls):
-            if variable.period:
-                U[:, :, i] = np.unwrap(U[:, :, i], axis=1, period=variable.period)
-        control = PiecewisePolynomial(edges, U, tables.control_basis)
+        control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         inside = tables.state(tables.tau) @ extended[self.X]
         closed = np.concatenate([B[:-1, None], inside, B[1:, None]], axis=1)
@@ -164,7 +160,7 @@ def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
 
 
 def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
-    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round, as `numpy.unwrap` has it."""
+    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
     columns = ca.horzsplit(U) if U.shape[1] > 1 else [U]
     period = np.array([v.period or 0.0 for v in phase.controls])
     if not period.any():

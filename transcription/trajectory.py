@@ -115,6 +115,19 @@ def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray
     return result
 
 
+def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Coefficients (N, degree + 1, nu) of which those of periodic controls follow each other the short way round inside an element.
+
+    A step of half a period goes down: other than `numpy.unwrap`, and exactly as the equations of a transcription have it.
+    """
+    result = np.array(coefficients, dtype=float)
+    for i, v in enumerate(variables):
+        for k in range(1, result.shape[1] if v.period else 0):
+            step = result[:, k, i] - result[:, k - 1, i]
+            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory(Mapping[str, PhaseTrajectory]):
     """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
