@@ -93,7 +93,7 @@ def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
             times, line = _dense(phase.state if kind == "state" else phase.control, index)
             ax.plot(times, line, color=color, lw=1.3)
             drawn.append(line[np.isfinite(line)])
-        ax.plot(phase.time, values, ".", color=color, ms=3.5)
+        ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
         drawn.append(values)
         limits.append((phase, owners[kind][index]))
     _bounds(ax, np.concatenate(drawn), limits)

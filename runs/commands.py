@@ -70,7 +70,11 @@ def solve(arguments: Namespace) -> int:
         # The disk filled up while the search went on: what it found is shown at least.
         print(front.table())
         raise
-    print(front.table(defects=[defect(point) for point in front]))
+    defects = [defect(point) for point in front]
+    print(front.table(defects=defects))
+    missing = sum(not value <= problem.verify_tolerance for value in defects)
+    if missing:
+        print(f"{missing} of {len(front)} points, flown, end more than {problem.verify_tolerance:g} away: see `macs verify {out}`.")
     print(f"\nfront saved in {out}")
     if arguments.plot:
         draw(front, arguments.plot)
