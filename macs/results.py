@@ -12,7 +12,7 @@ from transcription.base import NLP
 from transcription.sampling import excursions
 
 from .archive import Archive
-from .evaluation import CONVERGED, INFEASIBLE
+from .evaluation import CONVERGED, FAILED, INFEASIBLE
 from .front import Front
 
 
@@ -39,8 +39,10 @@ def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mappi
             **more,
         )
 
-    if len(archive) or not len(closest) or not np.isfinite(closest.Z).all():
-        return of(archive, message="" if len(archive) else _nothing(stats))
+    if len(archive):
+        return of(archive)
+    if not len(closest) or not np.isfinite(closest.Z).all():
+        return of(archive, message=f"{_nothing(stats)}; every one of them failed")
     nearest = of(closest)[0]
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
     message = f"{_nothing(stats)}; the nearest misses {label} by {amount:.2g} of its scale"
@@ -72,12 +74,13 @@ def black_box_front(
 
     if len(archive) or not len(closest):
         return of(archive, message="" if len(archive) else _nothing(stats))
-    message = f"{_nothing(stats)}; the nearest violates the constraints by {closest.violation[0]:.2g}"
-    return of(archive, message=message, closest=of(closest)[0])
+    nearest, violation = of(closest)[0], closest.violation[0]
+    why = f"the nearest violates the constraints by {violation:.2g}" if np.isfinite(violation) else "every one of them failed"
+    return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
 
 
 def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
-    return np.where(violation <= tolerance, CONVERGED, INFEASIBLE)
+    return np.where(violation <= tolerance, CONVERGED, np.where(np.isfinite(violation), INFEASIBLE, FAILED))
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
