@@ -41,12 +41,10 @@ def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mappi
 
     if len(archive):
         return of(archive)
-    if not len(closest) or not np.isfinite(closest.Z).all():
-        return of(archive, message=f"{_nothing(stats)}; every one of them failed")
     nearest = of(closest)[0]
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
-    message = f"{_nothing(stats)}; the nearest misses {label} by {amount:.2g} of its scale"
-    return of(archive, message=message, closest=nearest)
+    why = f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
+    return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
 
 
 def black_box_front(

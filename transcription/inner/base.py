@@ -19,7 +19,7 @@ class InnerResult:
     Attributes
     ----------
     z : array (k, n)
-        Feasible vectors where the status is "converged", else the best that was found.
+        Feasible vectors where the status is "converged", else the best that was found; where that is no number, the start.
     F : array (k, m)
         Objectives there, all minimised; NaN where they are no numbers.
     violation : array (k,)
@@ -77,10 +77,10 @@ def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterati
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
     status = np.where(finite & (violation <= tolerance), CONVERGED, np.where(finite, said, FAILED))
     return InnerResult(
-        z=Z,
+        z=np.where(finite[:, None], Z, start),
         F=np.where(finite[:, None], F, np.nan),
         violation=np.where(finite, violation, np.inf),
         status=status,
-        moved=np.where(finite, nlp.distance(Z, start), np.inf),
+        moved=np.where(finite, nlp.distance(Z, start), 0.0),
         iterations=iterations,
     )
