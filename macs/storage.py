@@ -114,7 +114,7 @@ def to_bytes(front: Front) -> bytes:
 
 def from_bytes(content: bytes) -> Front:
     """The front in a file's content. Raises whatever comes if it is none."""
-    import h5py  # type: ignore[import-untyped]
+    import h5py
 
     with h5py.File(io.BytesIO(content), "r") as file:
         if _text(file.attrs.get("format")) != FORMAT:
