@@ -9,7 +9,7 @@ import numpy as np
 
 from .compiled import CompiledPhase, CompiledProblem, Variable
 
-SAMPLES = 128
+SAMPLES = 2048
 Labels = Mapping[str, Sequence[str]]
 
 
