@@ -39,20 +39,24 @@ class Ipopt(InnerSolver):
     seconds: float = 60.0
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
-        """See `InnerSolver.solve`. A projection that does not converge is tried once more from propagated states."""
+        """See `InnerSolver.solve`.
+
+        A projection that does not converge is tried once more from propagated states. What stays infeasible comes back as it would be
+        flown, so that its violation is that of the user's constraints, not one smeared over the dynamics.
+        """
         start = started(nlp, candidates, warm)
         Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
-        first = result(nlp, Z, start, said, iterations, tolerance)
-        again = np.flatnonzero((first.violation > tolerance) & (said != TIMEOUT))
-        if self.objective == "constant" or not len(again):
-            return first
-        flown = nlp.march(start[again])
-        usable = np.isfinite(flown).all(axis=1)
-        again, flown = again[usable], flown[usable]
-        if not len(again):
-            return first
-        Z[again], said[again], more = self._solve_all(nlp, start[again], flown, tolerance)
-        iterations[again] += more
+        _, violation = nlp.evaluate(Z)
+        again = np.flatnonzero(~(violation <= tolerance) & (said != TIMEOUT))
+        if len(again) and self.objective == "projection":
+            Z[again], said[again], more = self._solve_all(nlp, start[again], nlp.march(start[again]), tolerance)
+            iterations[again] += more
+            _, violation = nlp.evaluate(Z)
+        left = np.flatnonzero(~(violation <= tolerance))
+        if len(left):
+            flown = nlp.march(Z[left])
+            usable = np.isfinite(nlp.evaluate(flown)[1])
+            Z[left[usable]] = flown[usable]
         return result(nlp, Z, start, said, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -63,6 +67,8 @@ class Ipopt(InnerSolver):
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
             if violation[row] <= tolerance and self.objective == "projection" and np.array_equal(start[row], guess[row]):
+                continue
+            if not np.isfinite(guess[row]).all():
                 continue
             y0 = np.clip(guess[row] / scale, lower, upper)
             answer = solver(
@@ -96,6 +102,7 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
         "print_time": False,
         "error_on_fail": False,
         "record_time": False,
+        "show_eval_warnings": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.max_iter": settings.max_iterations,
