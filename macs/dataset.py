@@ -32,13 +32,12 @@ ARRAYS = {
     "controls": ("node", "control"),
     "paths": ("node", "path"),
     "edges": ("edge",),
-    "edge_states": ("edge", "state"),
     "state_coefficients": ("element", "state_function", "state"),
     "control_edges": ("control_edge",),
     "control_coefficients": ("control_element", "control_function", "control"),
 }
-"""What a phase holds of each point. The states at `edges`, the ends of the elements, are `edge_states`; within, states and controls are the
-sums of their coefficients times the functions of their basis (`state_basis`, `control_basis`) on [-1, 1]."""
+"""What a phase holds of each point. Between `edges`, the ends of the elements, states and controls are the sums of their coefficients times
+the functions of their basis (`state_basis`, `control_basis`) on [-1, 1]."""
 LENGTHS = ("node", "edge", "element", "state_function", "control_edge", "control_element", "control_function")
 """The dimensions in which points may differ; `<dimension>_count` (point) are the true lengths."""
 
@@ -166,7 +165,6 @@ def _read_phase(data: xarray.Dataset) -> list[PhaseTrajectory | None]:
             states=array["states"],
             controls=array["controls"],
             paths=array["paths"],
-            edge_states=array["edge_states"],
             state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data.attrs["state_basis"])),
             control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data.attrs["control_basis"])),
             state_variables=states,
@@ -184,7 +182,6 @@ def _arrays(phase: PhaseTrajectory) -> dict[str, np.ndarray]:
         "controls": phase.controls,
         "paths": phase.paths,
         "edges": phase.state.edges,
-        "edge_states": phase.edge_states,
         "state_coefficients": phase.state.coefficients,
         "control_edges": phase.control.edges,
         "control_coefficients": phase.control.coefficients,

@@ -133,7 +133,6 @@ def _phase_differences(one: PhaseTrajectory, two: PhaseTrajectory) -> dict[str, 
         ),
         "states": max(
             _difference(one.states, two.states, states),
-            _difference(one.edge_states, two.edge_states, states),
             _difference(one.state.coefficients, two.state.coefficients, states),
         ),
         "controls": max(

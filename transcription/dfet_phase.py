@@ -116,7 +116,6 @@ class DFETPhase(PhaseWriter):
             states=states,
             controls=wrapped(controls, phase.controls),
             paths=paths.reshape(len(time), len(phase.paths)),
-            edge_states=B,
             state=PiecewisePolynomial(edges, closed, "closed-legendre"),
             control=control,
             state_variables=phase.states,

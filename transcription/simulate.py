@@ -14,7 +14,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import expanded
 from .sampling import DENSE, excess
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, wrapped
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -107,22 +107,23 @@ def simulate(
 
 @dataclass(frozen=True, eq=False)
 class _Flight:
-    """One flown phase: dense states and paths on each element, quantities q for objectives and constraints."""
+    """One flown phase: what was planned and what was flown, the quantities q for objectives and constraints, what its paths exceed."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
     quantities: np.ndarray
+    path_excess: np.ndarray
 
     def defect(self, phase: CompiledPhase) -> dict[str, float]:
         difference = np.abs(self.trajectory.edge_states - self.planned.edge_states) / np.array([v.span for v in phase.states])
         return {v.name: _or_infinite(amount) for v, amount in zip(phase.states, difference.max(axis=0), strict=True)}
 
     def violations(self, phase: CompiledPhase) -> dict[str, float]:
-        dense = self.trajectory
-        found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(dense.states, phase.states), strict=True)}
-        found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, excess(dense.paths, phase.paths), strict=True)}
+        states = self.trajectory.states
+        found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(states, phase.states), strict=True)}
+        found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, self.path_excess, strict=True)}
         ends = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.final, strict=True)]
-        for v, end, amount in zip(phase.states, ends, excess(dense.edge_states[-1:], ends), strict=True):
+        for v, end, amount in zip(phase.states, ends, excess(states[-1:], ends), strict=True):
             if (end.lower, end.upper) != (v.lower, v.upper):
                 found[f"final value of {phase.name}.{v.name}"] = amount
         return {label: _or_infinite(amount) for label, amount in found.items()}
@@ -159,29 +160,31 @@ def _fly(
     span = np.array([v.span for v in phase.states])
     y = np.concatenate([start, np.zeros(phase.integrands.size1_out(0))])
     tolerances = atol * np.concatenate([span, np.ones(len(y) - nx)])
-    edge_states, elements = [start], []
+    elements = []
     for j in range(len(edges) - 1):
         dense = _element(phase, planned, j, y, s, rtol, tolerances, method)
         y = dense[-1]
-        edge_states.append(y[:nx])
         elements.append(dense[:, :nx])
     times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in range(len(elements))])
     states = np.concatenate(elements)
     controls = np.concatenate([planned.control.on_element(j, DENSE) for j in range(len(elements))])
     inputs = states.T, controls.T, times[None], s
+    paths = np.array(phase.path(*inputs)).T.reshape(len(times), len(phase.paths))
+    # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
+    kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
     trajectory = replace(
         planned,
-        time=times,
-        states=states,
-        controls=controls,
-        paths=np.array(phase.path(*inputs)).T.reshape(len(times), len(phase.paths)),
-        edge_states=np.array(edge_states),
+        time=times[kept],
+        states=states[kept],
+        controls=wrapped(controls[kept], phase.controls),
+        paths=paths[kept],
         state=PiecewisePolynomial(edges, np.array(elements), "lobatto"),
     )
     peaks = np.array(phase.peaks(*inputs)).max(axis=1, initial=-np.inf) if phase.peaks.size1_out(0) else []
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
-    return _Flight(planned, trajectory, np.concatenate([s[:2], initials, finals, y[nx:], peaks]))
+    quantities = np.concatenate([s[:2], initials, finals, y[nx:], peaks])
+    return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
 
 
 def _element(

@@ -50,9 +50,9 @@ class PhaseTrajectory:
     """One phase of a flight, at nodes and between them.
 
     `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
-    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there. `state` and `control` interpolate; at the ends of the
-    elements `state` takes the `edge_states` (N + 1, nx), the most accurate that the method knows. A periodic control is continued beyond
-    its bounds inside an element, so that it interpolates the short way round. All in the user's units.
+    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there; `state`, which is continuous, and `control`
+    interpolate. A periodic control is continued beyond its bounds inside an element, so that it interpolates the short way round. All in
+    the user's units.
     """
 
     name: str
@@ -61,7 +61,6 @@ class PhaseTrajectory:
     states: np.ndarray
     controls: np.ndarray
     paths: np.ndarray
-    edge_states: np.ndarray
     state: PiecewisePolynomial
     control: PiecewisePolynomial
     state_variables: tuple[Variable, ...]
@@ -75,6 +74,11 @@ class PhaseTrajectory:
     @property
     def tf(self) -> float:
         return float(self.state.edges[-1])
+
+    @property
+    def edge_states(self) -> np.ndarray:
+        """States (N + 1, nx) at the ends of the elements: the most accurate that the method knows."""
+        return self.state(self.state.edges)
 
     @property
     def names(self) -> tuple[str, ...]:

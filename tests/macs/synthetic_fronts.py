@@ -61,7 +61,6 @@ def trajectory(rng: np.random.Generator, elements: int = 3, order: int = 4) -> T
                 state(time),
                 control(time),
                 paths,
-                state(edges),
                 state,
                 control,
                 phase.states,
