@@ -87,7 +87,7 @@ class DFETPhase(PhaseWriter):
         k, nx, nu = len(extended), len(self.phase.states), len(self.phase.controls)
         s = extended[:, self.ends.statics]
         h = (s[:, 1] - s[:, 0]) / self.n
-        U = extended[:, self.U].reshape(-1, nu).T
+        U = extended[:, self.U].reshape(k * self.n * self.U.shape[1], nu).T
         starts = s[:, :1] + h[:, None] * np.arange(self.n)
         right, X = self._propagate(
             extended[:, self.ends.initial].T, U, starts.reshape(1, -1), np.repeat(h, self.n)[None], np.repeat(s, self.n, axis=0).T

@@ -60,4 +60,4 @@ class Layout:
     def write(extended: np.ndarray, slots: np.ndarray, values: np.ndarray) -> None:
         """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape); constants stay what they are."""
         flat, mask = slots.ravel(), slots.ravel() >= 0
-        extended[:, flat[mask]] = values.reshape(len(extended), -1)[:, mask]
+        extended[:, flat[mask]] = values.reshape(len(extended), slots.size)[:, mask]

@@ -17,6 +17,8 @@ from .sampling import DENSE, excess
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, wrapped
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+MOST_CALLS = 200_000
+"""Evaluations of the dynamics on one element after which the integration counts as broken down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,12 +142,13 @@ def _start(
         if link.second != i:
             continue
         before = problem.phases[link.first]
+        place = f"link from '{before.name}' to '{problem.phases[i].name}'"
+        violations[f"{place}: t0"] = _or_infinite(abs(flights[link.first].planned.tf - planned.t0) / before.tf.scale)
         end = dict(zip((v.name for v in before.states), flights[link.first].trajectory.edge_states[-1], strict=True))
         for name in link.states:
             j = names.index(name)
             if name in taken:
-                label = f"link from '{before.name}' to '{problem.phases[i].name}': {name}"
-                violations[label] = _or_infinite(abs(end[name] - start[j]) / problem.phases[i].states[j].scale)
+                violations[f"{place}: {name}"] = _or_infinite(abs(end[name] - start[j]) / problem.phases[i].states[j].scale)
             else:
                 start[j] = end[name]
                 taken.add(name)
@@ -197,14 +200,22 @@ def _element(
     right_hand_side = _right_hand_side(phase, planned, j, s)
     times = t0 + 0.5 * (1.0 + DENSE) * (t1 - t0)
     times[-1] = t1
-    solution = solve_ivp(right_hand_side, (t0, t1), y, method=method, rtol=max(rtol, 3e-14), atol=atol, t_eval=times)
-    return solution.y.T if solution.success else np.full((len(DENSE), len(y)), np.nan)
+    nowhere = np.full((len(DENSE), len(y)), np.nan)
+    if not np.isfinite(right_hand_side(t0, y)).all():
+        return nowhere
+    try:
+        solution = solve_ivp(right_hand_side, (t0, t1), y, method=method, rtol=max(rtol, 3e-14), atol=atol, t_eval=times)
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+        # The implicit methods raise where rates are no numbers; so do ours where an integrator gets nowhere.
+        return nowhere
+    return solution.y.T if solution.success else nowhere
 
 
 def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: np.ndarray) -> Callable[[float, np.ndarray], np.ndarray]:
     """Rates of states and integrals on element j, called through buffers: some thousand calls a trajectory."""
     t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
     nx, function = len(phase.states), _rates(phase)
+    calls = 0
     x, u, time, out = np.zeros(nx), np.zeros(len(phase.controls)), np.zeros(1), np.zeros(function.size1_out(0))
     arguments = x, u, time, np.array(s, dtype=float)
     buffer, trigger = function.buffer()
@@ -214,6 +225,10 @@ def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: 
 
     def rates(t: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
         # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
+        nonlocal calls
+        calls += 1
+        if calls > MOST_CALLS:
+            raise ArithmeticError("the integrator gets nowhere")
         x[:], time[0] = y[:nx], t
         u[:] = planned.control.on_element(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
         trigger()
