@@ -54,6 +54,13 @@ class MACS(Solver):
         Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
     momentum : float, default 0.7
         How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
+    concentration : float, default 1.5
+        Exponent of the lengths of pattern search, in [1, 10]: radius times a uniform number to this power. Higher: more short steps. 1 in
+        the paper.
+    experience : float, default 0.3
+        Probability that a social agent moves as others did when they improved, in [0, 1]. 0 in the paper, where it only uses positions.
+    memory : int, default 100
+        How many of the last improvements are remembered for that, at least 1.
     shorten : bool, default False
         Shorten inertia's steps until they stay in the box, as in the paper; otherwise they are clipped to it, variable by variable.
 
@@ -78,12 +85,16 @@ class MACS(Solver):
     directions: int | None = None
     redraw: bool = True
     momentum: float = 0.7
+    concentration: float = 1.5
+    experience: float = 0.3
+    memory: int = 100
     shorten: bool = False
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
         self._check_count("archive", self.archive, 1)
         self._check_count("max_contractions", self.max_contractions, 0)
+        self._check_count("memory", self.memory, 1)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten"):
@@ -100,12 +111,22 @@ class MACS(Solver):
         self._check_range("contraction", "(0, 1)", lambda x: 0 < x < 1)
         self._check_range("coordinates", "(0, 1]", lambda x: 0 < x <= 1)
         self._check_range("momentum", "[0, 1)", lambda x: 0 <= x < 1)
+        self._check_range("concentration", "[1, 10]", lambda x: 1 <= x <= 10)
+        self._check_range("experience", "[0, 1]", lambda x: 0 <= x <= 1)
 
     @classmethod
     def paper(cls, **overrides: Any) -> MACS:
         """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself."""
-        settings: dict[str, Any] = {"refine": False, "adaptive_coordinates": False, "redraw": False, "momentum": 0.0, "shorten": True}
-        return cls(**{**settings, **overrides})
+        settings: dict[str, Any] = {
+            "refine": False,
+            "adaptive_coordinates": False,
+            "redraw": False,
+            "momentum": 0.0,
+            "concentration": 1.0,
+            "experience": 0.0,
+            "shorten": True,
+        }
+        return cls(**(settings | overrides))
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
         """Sample, evaluate and archive the first population.

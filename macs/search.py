@@ -11,8 +11,8 @@ from macs import archive as archives
 from macs import directions, individual, social
 from macs.agent import NO_DIRECTION, Agents
 from macs.archive import Archive
+from macs.attempts import Attempts
 from macs.box import Box
-from macs.dominance import dominates
 from macs.evaluation import Evaluation, Evaluator
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ class SearchState:
         The best feasible values ever seen; the worst ones in the archive. NaN before there are any.
     directions : array (k, m)
         The pool that the agents' directions are drawn from.
+    experience : array (k, d)
+        The displacements of the last improvements of any agent, in units of span, oldest first.
     iteration, evaluations : int
         Iterations done; evaluations spent by the evaluator so far.
     rng : numpy.random.Generator
@@ -45,6 +47,7 @@ class SearchState:
     ideal: np.ndarray
     nadir: np.ndarray
     directions: np.ndarray
+    experience: np.ndarray
     iteration: int
     evaluations: int
     rng: np.random.Generator
@@ -75,6 +78,7 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
         ideal=np.full(m, np.nan),
         nadir=np.full(m, np.nan),
         directions=directions.pool(m, settings.directions or 100 * m),
+        experience=np.empty((0, len(evaluator.free))),
         iteration=0,
         evaluations=evaluator.counts.evaluations,
         rng=rng,
@@ -100,56 +104,6 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
     state.iteration += 1
 
 
-class Attempts:
-    """The one door between proposals and the evaluator: evaluates, keeps what was seen, moves who had success, and stays in budget."""
-
-    def __init__(self, settings: MACS, state: SearchState, evaluator: Evaluator, box: Box, budget: int) -> None:
-        self.settings, self.state, self.evaluator, self.box, self.budget = settings, state, evaluator, box, budget
-        self.seen: list[Evaluation] = []
-
-    def positions(self, rows: np.ndarray) -> np.ndarray:
-        """Unit coordinates (k, d) of agents."""
-        return self.box.to_unit(self.state.agents.Z[np.ix_(rows, self.evaluator.free)])
-
-    def try_out(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray) -> np.ndarray:
-        """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d); put those that had success there.
-
-        Returns
-        -------
-        array (k,) of bool
-            Who had success. A proposal that did not move, or for which no budget is left, is not evaluated and has none.
-        """
-        success = np.zeros(len(rows), dtype=bool)
-        moved = np.flatnonzero((trial != X).any(axis=1))[: self.budget - self.state.evaluations]
-        if not moved.size:
-            return success
-        rows, X, trial = rows[moved], X[moved], trial[moved]
-        agents, free = self.state.agents, self.evaluator.free
-        Z = agents.Z[rows]
-        Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
-        result = self.evaluator.evaluate(Z)
-        self.state.evaluations = self.evaluator.counts.evaluations
-        self.seen.append(result)
-        better = self.improves(rows, result)
-        success[moved] = better
-        achieved = self.box.difference(self.box.to_unit(result.Z[:, free]), X)
-        agents.velocity[rows[better]] = achieved[better] + self.settings.momentum * agents.velocity[rows[better]]
-        agents.place(rows[better], result.Z[better], result.F[better], result.violation[better])
-        return success
-
-    def improves(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
-        """Which results (k,) are a success for the agents `rows`: they dominate, or are better for the agent's own direction."""
-        agents, state, tolerance = self.state.agents, self.state, self.evaluator.tolerance
-        feasible, was_feasible = result.violation <= tolerance, agents.violation[rows] <= tolerance
-        pull = (agents.direction[rows] != NO_DIRECTION) & np.isfinite(state.ideal).all()
-        weights = state.directions[agents.direction[rows]]
-        now = directions.tchebycheff(result.F, weights, state.ideal, state.nadir)
-        before = directions.tchebycheff(agents.F[rows], weights, state.ideal, state.nadir)
-        by_objectives = dominates(result.F, agents.F[rows]) | (pull & (now < before))
-        by_violation = ~was_feasible & (feasible | (result.violation < agents.violation[rows]))
-        return np.where(feasible & was_feasible, by_objectives, by_violation)
-
-
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
     """Inertia, pattern search, differential evolution: the agents go through them in step, and each leaves at its first success."""
     agents, rng = state.agents, state.rng
@@ -165,34 +119,35 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
     attempt(lambda who, X: individual.inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng))
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
     for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1])]:
-        step = rng.uniform(-1.0, 1.0, count) * agents.rho / 2
-        back = -np.sign(step) * rng.random(count) * agents.rho / 2
-        attempt(lambda who, X, c=coordinate, s=step: individual.coordinate_step(box, X, c[who], s[who]))
-        attempt(lambda who, X, c=coordinate, s=back: individual.coordinate_step(box, X, c[who], s[who]))
+        length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
+        side = rng.choice([-1.0, 1.0], count)
+        attempt(lambda who, X, c=coordinate, s=side * length[0]: individual.coordinate_step(box, X, c[who], s[who]))
+        attempt(lambda who, X, c=coordinate, s=-side * length[1]: individual.coordinate_step(box, X, c[who], s[who]))
 
     def differential(who: np.ndarray, X: np.ndarray) -> np.ndarray:
-        donors = attempts.positions(np.arange(count))[individual.distinct_others(who, count, 3, rng)]
+        donors = attempts.positions()[individual.distinct_others(who, count, 3, rng)]
         return individual.differential(box, X, donors, settings.F, settings.CR, rng)
 
     attempt(differential)
-    success = np.ones(count, dtype=bool)
-    success[waiting] = False
-    agents.adapt_radius(success, settings.rho, settings.contraction, settings.max_contractions)
+    agents.adapt_radius(attempts.credited, settings.rho, settings.contraction, settings.max_contractions)
 
 
 def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts, evaluator: Evaluator) -> None:
-    """One proposal for each social agent from the points near it, of the archive or of the population."""
+    """One proposal for each social agent: from the points near it, of the archive or of the population, or from what has helped others."""
     agents, rng = state.agents, state.rng
     rows = np.flatnonzero(agents.direction != NO_DIRECTION)
     if not rows.size:
         return
     X = attempts.positions(rows)
-    everyone = attempts.positions(np.arange(len(agents)))
+    everyone = attempts.positions()
     archive = box.to_unit(state.archive.Z[:, evaluator.free])
     trial = social.current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
     if len(archive) > 3:
         pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len(np.unique(everyone, axis=0)))
         trial = np.where(pick[:, None], social.current_to_rand(box, X, archive, max(len(rows), 4), settings.F, rng), trial)
+    if len(state.experience) > 3:
+        pick = rng.random(len(rows)) < settings.experience
+        trial = np.where(pick[:, None], social.follow_experience(box, X, state.experience, rng), trial)
     attempts.try_out(rows, X, trial)
 
 
@@ -216,7 +171,7 @@ def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -
     """Give the social agents their directions, and send them to the points of the archive that are best for these."""
     agents, archive, m = state.agents, state.archive, state.directions.shape[1]
     social_count = min(settings.social_agents(m), len(agents))
-    if not social_count or not len(archive):
+    if not social_count:
         return
     if settings.redraw or not (agents.direction != NO_DIRECTION).any():
         agents.direction[:] = NO_DIRECTION

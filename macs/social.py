@@ -50,6 +50,28 @@ def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: fl
     return box.put_back(X + K * step)
 
 
+def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Move as others did when they improved: by normal deviates with the mean and the second moments of their displacements.
+
+    What improves one point of a front tends to improve its neighbours, and steps that did so are longest where there is most to gain; this
+    is the estimate of a covariance from successful steps (Hansen and Ostermeier 2001), without its matrix.
+
+    Parameters
+    ----------
+    X : array (k, d)
+        Positions of the agents.
+    experience : array (e, d)
+        Displacements, e > 0.
+
+    Returns
+    -------
+    array (k, d)
+    """
+    count = len(experience)
+    weights = rng.standard_normal((len(X), count)) / np.sqrt(count) + 1.0 / count
+    return box.put_back(X + weights @ experience)
+
+
 def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pair rows with columns of `costs` (r, c), the globally cheapest pair first: two arrays (min(r, c),) of int."""
     costs = costs.astype(float, copy=True)

@@ -23,10 +23,7 @@ def schaffer(X):
 
 def zdt(kind, X):
     x, rest, d = X[:, 0], X[:, 1:], X.shape[1]
-    if kind == 4:
-        g = 1 + 10 * (d - 1) + (rest**2 - 10 * np.cos(4 * np.pi * rest)).sum(axis=1)
-    else:
-        g = 1 + 9 * rest.mean(axis=1)
+    g = 1 + (10 * (d - 1) + (rest**2 - 10 * np.cos(4 * np.pi * rest)).sum(axis=1) if kind == 4 else 9 * rest.mean(axis=1))
     h = {1: 1 - np.sqrt(x / g), 2: 1 - (x / g) ** 2, 3: 1 - np.sqrt(x / g) - x / g * np.sin(10 * np.pi * x), 4: 1 - np.sqrt(x / g)}[kind]
     return np.stack([x, g * h], axis=1)
 
@@ -162,8 +159,6 @@ def test_more_objectives_than_points_and_no_budget_are_refused():
         {"social": 1.1},
         {"contraction": 1},
         {"momentum": 1},
-    ]
-    + [
         {"max_contractions": -1},
         {"coordinates": 0},
         {"mesh": "adaptive"},
