@@ -1,0 +1,77 @@
+"""What the search makes of an evaluator that moves its candidates, and of variables that it may not alter itself."""
+
+import numpy as np
+
+from macs.attempts import Attempts
+from macs.evaluation import Counts, Evaluation, Evaluator
+from macs.macs import MACS
+from macs.search import box_of
+
+
+class Sticky(Evaluator):
+    """Free are entries 1 and 2 of three; the last of them is always put back to 0.5, and entry 0 remembers the point it started from."""
+
+    m = 2
+
+    def __init__(self):
+        self.free, self.lower, self.upper, self.period = np.array([1, 2]), np.zeros(2), np.ones(2), np.zeros(2)
+        self.tolerance, self.counts, self.started_from = 1e-6, Counts(), []
+
+    def first_guess(self, candidates):
+        return np.hstack([np.full((len(candidates), 1), 7.0), candidates])
+
+    def _evaluate(self, Z):
+        self.started_from.append(Z[:, 0].copy())
+        back = Z.copy()
+        back[:, 2] = 0.5
+        back[:, 0] = Z[:, 1]
+        F = np.stack([back[:, 1], back[:, 1] ** 2], axis=1)
+        return Evaluation(back, F, np.zeros(len(Z)), np.full(len(Z), "converged"), np.abs(Z[:, 2] - 0.5)), 1
+
+
+def prepared():
+    box, settings = Sticky(), MACS()
+    state = settings.begin(box, 1000, np.random.default_rng(0))
+    agents = state.agents
+    agents.Z[:], agents.velocity[:] = [0.8, 0.8, 0.5], 0.0
+    agents.F[:] = [0.8, 0.64]
+    state.experience = np.empty((0, 2))
+    return box, state, Attempts(settings, state, box, box_of(box), 1000)
+
+
+def test_velocity_and_experience_are_what_was_achieved():
+    _, state, attempts = prepared()
+    rows = np.array([2, 5])
+    X = attempts.positions(rows)
+    success = attempts.try_out(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
+    assert success.tolist() == [True, False]
+    assert np.allclose(state.agents.velocity[2], [-0.2, 0.0])
+    assert np.allclose(state.experience, [[-0.2, 0.0]])
+    assert np.allclose(state.agents.Z[2], [0.6, 0.6, 0.5])
+    assert (state.agents.velocity[5] == 0.0).all()
+
+
+def test_a_step_that_was_mostly_undone_is_a_success_without_credit():
+    _, _, attempts = prepared()
+    rows = np.array([0, 1])
+    X = attempts.positions(rows)
+    assert attempts.try_out(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
+    assert attempts.credited[:2].tolist() == [False, True]
+
+
+def test_candidates_start_from_the_memory_of_their_own_agent():
+    box, _, attempts = prepared()
+    attempts.state.agents.Z[3, 0] = 0.123
+    rows = np.array([3])
+    X = attempts.positions(rows)
+    attempts.try_out(rows, X, X - 0.1)
+    assert box.started_from[-1].tolist() == [0.123]
+    assert box.started_from[0].tolist() == [7.0] * 10
+
+
+def test_proposals_that_do_not_move_cost_nothing():
+    box, state, attempts = prepared()
+    before = state.evaluations
+    X = attempts.positions()
+    assert not attempts.try_out(np.arange(10), X, X).any()
+    assert (state.evaluations, box.counts.evaluations) == (before, before)
