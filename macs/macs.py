@@ -52,6 +52,8 @@ class MACS(Solver):
         How many directions the agents' own are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True
         Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
+    reseed : {"all", "spread"}, default "all"
+        Which points of the archive agents may be sent to: all, or only as many as there are agents, well spread (the authors' later code).
     momentum : float, default 0.7
         How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
     concentration : float, default 1.5
@@ -84,6 +86,7 @@ class MACS(Solver):
     adaptive_coordinates: bool = True
     directions: int | None = None
     redraw: bool = True
+    reseed: str = "all"
     momentum: float = 0.7
     concentration: float = 1.5
     experience: float = 0.3
@@ -104,6 +107,8 @@ class MACS(Solver):
             raise ValueError("MACS: mesh='adaptive' is not available yet")
         if self.mesh != "fixed":
             raise ValueError(f"MACS: mesh must be 'fixed', not {self.mesh!r}")
+        if self.reseed not in ("all", "spread"):
+            raise ValueError(f"MACS: reseed must be 'all' or 'spread', not {self.reseed!r}")
         self._check_range("rho", "(0, 1]", lambda x: 0 < x <= 1)
         self._check_range("F", "(0, 2]", lambda x: 0 < x <= 2)
         self._check_range("CR", "[0, 1]", lambda x: 0 <= x <= 1)
@@ -121,6 +126,7 @@ class MACS(Solver):
             "refine": False,
             "adaptive_coordinates": False,
             "redraw": False,
+            "reseed": "spread",
             "momentum": 0.0,
             "concentration": 1.0,
             "experience": 0.0,

@@ -179,6 +179,8 @@ def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -
     owners = np.flatnonzero(agents.direction != NO_DIRECTION)
     if len(archive) < m:
         return
+    if settings.reseed == "spread" and len(archive) > len(owners) >= m:
+        archive = archive.take(archives.spread(archive.F, len(owners)))
     weights = state.directions[agents.direction[owners]]
     costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     points, columns = social.pair_up(costs)

@@ -1,5 +1,7 @@
 """The whole search on plain functions: budgets, sameness, failures, constraints, known fronts."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,22 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     assert np.array_equal(first.archive.Z, again.archive.Z)
     assert np.array_equal(first.agents.velocity, again.agents.velocity)
     assert not np.array_equal(first.archive.F, other.archive.F)
+
+
+def test_the_state_is_all_there_is_to_go_on_from():
+    settings, box = MACS(), BlackBox(schaffer, [(-2, 2)] * 4)
+    state = settings.begin(box, 600, np.random.default_rng(0))
+    while state.evaluations < 300:
+        settings.advance(state, box, 600)
+    kept, other = copy.deepcopy(state), BlackBox(schaffer, [(-2, 2)] * 4)
+    kept.rng = np.random.default_rng(9)
+    kept.rng.bit_generator.state = state.rng.bit_generator.state
+    other.counts.evaluations = kept.evaluations
+    while state.evaluations < 600:
+        settings.advance(state, box, 600)
+        settings.advance(kept, other, 600)
+    assert np.array_equal(state.archive.Z, kept.archive.Z)
+    assert state.iteration == kept.iteration
 
 
 def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
@@ -166,6 +184,11 @@ def test_more_objectives_than_points_and_no_budget_are_refused():
         {"refine": 1},
         {"directions": 0},
         {"rho": None},
+        {"reseed": "none"},
+        {"memory": 0},
+        {"experience": 2},
+        {"concentration": 0.5},
+        {"redraw": "no"},
     ],
 )
 def test_settings_out_of_range_are_named(setting):
@@ -181,6 +204,7 @@ def test_settings_of_the_paper():
     assert MACS().coordinates_to_scan(29, 0, 2) == 29
     state = run(MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3), 600)
     assert len(state.archive) == 10
+    assert len(run(MACS.paper(archive=30), BlackBox(schaffer, [(-2, 2)] * 3), 900).archive) == 30
 
 
 @pytest.mark.slow
