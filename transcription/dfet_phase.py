@@ -107,7 +107,8 @@ class DFETPhase(PhaseWriter):
         time = (edges[:-1, None] + 0.5 * (1.0 + tables.points[:-1]) * np.diff(edges)[:, None]).ravel()
         time = np.append(time, edges[-1])
         states = np.vstack([closed[:, :-1].reshape(-1, len(phase.states)), B[-1:]])
-        controls = np.vstack([control(time[:-1]), control.on_element(self.n - 1, np.ones(1))])
+        inner = tables.control(tables.points[:-1]) @ control.coefficients
+        controls = np.vstack([inner.reshape(len(time) - 1, len(phase.controls)), control.ends()[1][-1:]])
         paths = np.array(phase.path(states.T, controls.T, time[None], s)).T
         return PhaseTrajectory(
             name=phase.name,

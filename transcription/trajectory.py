@@ -44,6 +44,11 @@ class PiecewisePolynomial:
         """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]
 
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values (N, k) at the beginning and at the end of each element, also where elements have no length."""
+        ends = basis_matrix(self.basis, self.coefficients.shape[1] - 1, np.array([-1.0, 1.0])) @ self.coefficients
+        return ends[:, 0], ends[:, 1]
+
 
 @dataclass(frozen=True, eq=False)
 class PhaseTrajectory:
@@ -78,7 +83,8 @@ class PhaseTrajectory:
     @property
     def edge_states(self) -> np.ndarray:
         """States (N + 1, nx) at the ends of the elements: the most accurate that the method knows."""
-        return self.state(self.state.edges)
+        left, right = self.state.ends()
+        return np.vstack([left, right[-1:]])
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,0 +1,73 @@
+"""Small problems whose answers are known."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from problems import Phase, Problem
+from transcription import NLP
+from transcription.inner import InnerResult, inner_solver
+
+
+def candidates(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
+    """Random values (k, d) of the free variables."""
+    rng = np.random.default_rng(seed)
+    return nlp.lower[nlp.free] + rng.random((k, len(nlp.free))) * nlp.span[nlp.free]
+
+
+def flown(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
+    """Propagated vectors (k, n)."""
+    return inner_solver("march").solve(nlp, candidates(nlp, k, seed)).z
+
+
+def solved(nlp: NLP, k: int = 3, seed: int = 0, inner: str = "ipopt") -> InnerResult:
+    """What an inner solver makes of random candidates."""
+    return inner_solver(inner).solve(nlp, candidates(nlp, k, seed))
+
+
+def slot(nlp: NLP, name: str) -> int:
+    """Index of a variable of the NLP."""
+    return [v.name for v in nlp.variables].index(name)
+
+
+def oscillator() -> Problem:
+    """Non-linear, depends on time, has parameters and two controls; no terminal constraint."""
+    problem = Problem("oscillator")
+    m = problem.parameter("m", bounds=(0.5, 2))
+    phase = problem.phase("swing", t0=(0.0, 0.5), tf=(1.5, 2.0))
+    x = phase.state("x", bounds=(-50, 50), initial=(-1, 1))
+    y = phase.state("y", bounds=(-50, 50), initial=0.5)
+    u, v = phase.control("u", bounds=(-1, 1)), phase.control("v", bounds=(0, 1))
+    t = phase.time
+    phase.dynamics(x=y + 0.1 * ca.sin(3 * t) * u, y=-m * ca.sin(x) - 0.2 * y * ca.fabs(v) ** 2 + ca.cos(t * phase.tf) * u * v)
+    problem.minimize("cost", phase.integral(u**2 + x * y))
+    problem.maximize("end", phase.final(x + 0 * u))
+    return problem
+
+
+def oscillator_rates(t: float, x: np.ndarray, u: np.ndarray, m: float, tf: float) -> np.ndarray:
+    return np.array([
+        x[1] + 0.1 * np.sin(3 * t) * u[0],
+        -m * np.sin(x[0]) - 0.2 * x[1] * u[1] ** 2 + np.cos(t * tf) * u[0] * u[1],
+    ])  # fmt: skip
+
+
+def decay(tf: object = (1.0, 2.0), final: object = None) -> tuple[Problem, Phase]:
+    """x' = -x, x(0) = 1, no control."""
+    problem = Problem("decay")
+    phase = problem.phase("fall", t0=0, tf=tf)
+    x = phase.state("x", bounds=(-2, 2), initial=1, final=final)
+    phase.dynamics(x=-x)
+    problem.minimize("rest", phase.final(x))
+    return problem, phase
+
+
+def integrator(name: str = "line", **more: object) -> tuple[Problem, Phase]:
+    """x' = u in [-1, 1], from 0, for 2 time units."""
+    problem = Problem(name)
+    phase = problem.phase("run", **({"t0": 0, "tf": 2.0} | {k: v for k, v in more.items() if k in ("t0", "tf", "duration")}))
+    phase.state("x", bounds=(-10, 10), initial=more.get("initial", 0), final=more.get("final"))
+    phase.control("u", bounds=more.get("bounds", (-1, 1)), period=more.get("period"))
+    phase.dynamics(x=phase["u"])
+    return problem, phase
