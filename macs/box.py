@@ -32,12 +32,17 @@ class Box:
         return self.upper - self.lower
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
-        """Unit coordinates of values (..., d) in the user's units."""
-        return (values - self.lower) / self.span
+        """Unit coordinates of values (..., d) in the user's units; values outside the bounds are put back."""
+        return self.put_back((values - self.lower) / self.span)
 
     def to_values(self, X: np.ndarray) -> np.ndarray:
         """Values (..., d) in the user's units, inside the bounds to the last bit."""
         return np.clip(self.lower + X * self.span, self.lower, self.upper)
+
+    def confine(self, values: np.ndarray) -> np.ndarray:
+        """The values (..., d), in the user's units, with those outside the bounds put back; the others keep all their bits."""
+        outside = (values < self.lower) | (values > self.upper)
+        return np.where(outside, self.to_values(self.to_unit(values)), values)
 
     def put_back(self, X: np.ndarray) -> np.ndarray:
         """The points X (..., d), wrapped where periodic and clipped elsewhere."""

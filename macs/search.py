@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -67,8 +67,9 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
     batches = [] if start is None else [np.asarray(start, dtype=float)]
     if missing > 0:
         batches.append(evaluator.first_guess(box.to_values(box.sample(missing, rng))))
-    Z = np.vstack(batches)
-    seen = evaluator.evaluate(Z[: budget - evaluator.counts.evaluations])
+    Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
+    Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
+    seen = evaluator.evaluate(Z)
     m = seen.F.shape[1]
     settings.check_objectives(m)
     state = SearchState(
@@ -84,6 +85,7 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
         rng=rng,
     )
     remember(state, [seen], settings, evaluator)
+    seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # a failure may bring nothing back to start from again
     state.agents = _population(seen, _choose(seen, settings.agents, evaluator.tolerance), len(evaluator.free), settings)
     assign(state, settings, box, evaluator)
     return state

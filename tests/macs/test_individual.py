@@ -42,6 +42,9 @@ def test_periodic_coordinates_wrap_and_others_stop_at_the_bound():
     assert np.allclose(coordinate_step(cube, X, np.array([0]), np.array([0.3])), [[0.2, 0.9]])
     assert np.allclose(coordinate_step(cube, X, np.array([1]), np.array([0.3])), [[0.9, 1.0]])
     assert np.allclose(cube.difference(np.array([0.1, 0.1]), np.array([0.9, 0.9])), [0.2, -0.8])
+    assert np.allclose(cube.confine(np.array([7.0, 7.0])), [-1.0, 6.0])
+    assert cube.confine(np.array([0.1, 0.3])).tolist() == [0.1, 0.3]
+    assert np.allclose(cube.to_unit(np.array([7.0, 7.0])), [0.125, 1.0])
     assert cube.reach(X, np.array([[0.4, 0.0]])) == 1.0
     assert np.allclose(cube.reach(X, np.array([[0.4, 0.4]])), 0.25)
     assert cube.stop_outward(np.array([1.0, 1.0]), np.array([1.0, 1.0])).tolist() == [1.0, 0.0]

@@ -155,6 +155,8 @@ def test_a_start_is_evaluated_first_and_too_many_are_thinned():
     few = MACS().begin(BlackBox(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.zeros((1, 3)))
     assert few.evaluations == 10
     assert 0.0 in few.archive.F[:, 0]
+    outside = MACS().begin(BlackBox(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.full((12, 3), 5.0))
+    assert outside.agents.Z.max() == 2.0
 
 
 def test_more_objectives_than_points_and_no_budget_are_refused():
