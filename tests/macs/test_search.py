@@ -4,10 +4,12 @@ import copy
 
 import numpy as np
 import pytest
+from ascent import Ascent
 
 from macs.blackbox import BlackBox
 from macs.dominance import dominates
 from macs.macs import MACS
+from problems.goddard import reference
 
 
 def run(settings, box, budget, seed=1, start=None):
@@ -218,3 +220,36 @@ def test_fronts_of_zitzler_deb_and_thiele(kind, limit):
         state = run(MACS(agents=10, archive=100), BlackBox(lambda X: zdt(kind, X), bounds), 15_000, seed)
         values.append(igd(state.archive.F, zdt_front(kind)))
     assert np.median(values) <= limit, values
+
+
+def distances(F, front):
+    """Distance of each point to the polyline through the front, and mean distance of the evenly resampled polyline to the points."""
+    low, span = front.min(axis=0), np.ptp(front, axis=0)
+    points, corners = (F - low) / span, (front - low) / span
+    begin, side = corners[:-1], np.diff(corners, axis=0)
+    along = np.clip(((points[:, None] - begin) * side).sum(axis=-1) / (side**2).sum(axis=-1), 0.0, 1.0)
+    to_curve = np.linalg.norm(points[:, None] - begin - along[..., None] * side, axis=-1).min(axis=1)
+    length = np.r_[0.0, np.cumsum(np.linalg.norm(side, axis=1))]
+    even = np.stack([np.interp(np.linspace(0, length[-1], 1001), length, column) for column in corners.T], axis=1)
+    return to_curve, igd(points, even)
+
+
+@pytest.mark.slow
+def test_the_front_of_the_lunar_ascent():
+    front, gd, spread = reference() * [1, -1], [], []
+    for seed in range(1, 6):
+        F = run(MACS(agents=10, archive=10), Ascent(), 10_000, seed).archive.F
+        to_curve, coverage = distances(F, front)
+        gd.append(to_curve.mean())
+        spread.append(coverage)
+    assert np.mean(gd) <= 6e-3, gd
+    assert np.max(gd) <= 1e-2, gd
+    assert np.mean(spread) <= 0.044, spread
+
+
+def test_a_short_search_of_the_lunar_ascent():
+    state = run(MACS(), Ascent(), 1500)
+    to_curve, _ = distances(state.archive.F, reference() * [1, -1])
+    assert len(state.archive) == 10
+    assert (state.archive.violation <= 1e-9).all()
+    assert to_curve.mean() < 0.06
