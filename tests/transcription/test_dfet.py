@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -354,7 +356,7 @@ def relay(legs: int, jump: float = 0.0) -> Problem:
         u = phase.control("u", bounds=(-1, 1))
         phase.dynamics(x=u, m=-0.1)
         phases.append(phase)
-    for i, (first, second) in enumerate(zip(phases[:-1], phases[1:], strict=True)):
+    for i, (first, second) in enumerate(itertools.pairwise(phases)):
         problem.link(first, second, states=["x"] if jump else None)
         if jump:
             drop = first.final(first["m"]) - second.initial(second["m"])
@@ -475,7 +477,7 @@ def guessed(**values):
 
 
 def test_nothing_guessed_is_nan():
-    nlp, found = guessed()
+    nlp, _found = guessed()
     assert np.isnan(nlp.guess).all()
     Z = nlp.first_guess(candidates(nlp, 2))
     phase = nlp.unpack(Z[0])["run"]

@@ -14,7 +14,7 @@ def inner_solver(inner: str | InnerSolver) -> InnerSolver:
     """An inner solver by name, or as it is given. Raises ValueError for an unknown name."""
     if isinstance(inner, InnerSolver):
         return inner
-    if inner not in NAMED:
+    if not isinstance(inner, str) or inner not in NAMED:
         raise ValueError(f"unknown inner level {inner!r}; there are {', '.join(NAMED)}")
     return NAMED[inner]
 

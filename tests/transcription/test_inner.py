@@ -1,0 +1,331 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass, fields
+
+import casadi as ca
+import numpy as np
+import pytest
+from cases import candidates, decay, integrator, oscillator, slot
+from scipy.optimize import minimize
+
+from macs import MACS
+from problems import Problem, load
+from transcription import DFET, InnerResult, InnerSolver
+from transcription.inner import Auto, Ipopt, March, inner_solver
+
+NAMES = ("auto", "march", "ipopt", "ipopt-feasibility")
+STATUSES = {"converged", "infeasible", "failed", "timeout"}
+
+
+def violation(nlp, z: np.ndarray) -> float:
+    """The largest scaled residual, written once more."""
+    F, g = (np.array(v).ravel() for v in nlp.functions(z))
+    worst = [0.0]
+    for v, value in zip(nlp.variables, z, strict=True):
+        worst += [(v.lower - value) / v.scale, (value - v.upper) / v.scale]
+    for low, high, scale, value in zip(nlp.g_lower, nlp.g_upper, nlp.g_scale, g, strict=True):
+        worst += [(low - value) / scale, (value - high) / scale]
+    return float(np.max(worst)) if np.isfinite(F).all() and np.isfinite(g).all() else np.inf
+
+
+def hop() -> Problem:
+    """x' = u from 0 to 1 in 2 time units."""
+    problem, phase = integrator(final=1)
+    problem.minimize("effort", phase.integral(phase["u"] ** 2))
+    problem.maximize("first", phase.initial(phase["u"]))
+    return problem
+
+
+def impossible() -> Problem:
+    problem, phase = integrator(final=5)
+    problem.minimize("effort", phase.integral(phase["u"] ** 2))
+    return problem
+
+
+def broken() -> Problem:
+    """The square root of a negative number at the start, whatever one does."""
+    problem = Problem("broken")
+    phase = problem.phase("run", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(-1, 1), initial=-0.5)
+    phase.dynamics(x=ca.sqrt(x) + phase.control("u", bounds=(-1, 1)))
+    problem.minimize("time", phase.tf)
+    problem.maximize("end", phase.final(x))
+    return problem
+
+
+@pytest.mark.parametrize("inner", NAMES)
+@pytest.mark.parametrize(
+    "make", [hop, oscillator, lambda: load("goddard"), lambda: load("orbit_rise_full")], ids=["hop", "osc", "goddard", "rise"]
+)
+def test_a_batch_comes_back_as_a_batch_and_means_what_it_says(inner, make):
+    nlp = DFET(3, 2).transcribe(make())
+    C = candidates(nlp, 4)
+    before = C.copy()
+    found = inner_solver(inner).solve(nlp, C)
+    n, m = len(nlp.variables), len(nlp.problem.goals)
+    shapes = {"z": (4, n), "F": (4, m), "violation": (4,), "status": (4,), "moved": (4,), "iterations": (4,)}
+    assert {f.name: getattr(found, f.name).shape for f in fields(found)} == shapes
+    assert set(found.status.tolist()) <= STATUSES and np.array_equal(C, before)
+    assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all() or inner == "march" or "converged" not in found.status
+    for i in range(4):
+        assert found.violation[i] == pytest.approx(violation(nlp, found.z[i]), rel=1e-9, abs=1e-14)
+        assert (found.status[i] == "converged") == (violation(nlp, found.z[i]) <= 1e-6)
+    assert pytest.approx(nlp.evaluate(found.z)[0]) == found.F
+    if inner == "march":
+        assert np.array_equal(found.z[:, nlp.free], C) and not found.moved.any()
+
+
+@pytest.mark.parametrize("inner", ["auto", "ipopt"])
+def test_the_projection_is_the_nearest_feasible_point(inner):
+    nlp = DFET(3, 1).transcribe(hop())
+    C = candidates(nlp, 8, seed=1)
+    C[0], C[1] = -1, [1, -1, 1, 1, 1, -1]
+    found = inner_solver(inner).solve(nlp, C, tolerance=1e-8)
+    assert set(found.status) == {"converged"}
+    for c, z, moved in zip(C, found.z, found.moved, strict=True):
+        # The final state is the mean of all coefficients times the duration: a plane, and a box.
+        plane = {"type": "eq", "fun": lambda u: 2 * np.mean(u) - 1}
+        nearest = minimize(
+            lambda u, c=c: np.sum((u - c) ** 2), np.full(6, 0.5), bounds=[(-1, 1)] * 6, constraints=plane, options={"ftol": 1e-14}
+        )
+        assert z[nlp.free] == pytest.approx(nearest.x, abs=2e-5)
+        assert moved == pytest.approx(np.linalg.norm(z[nlp.free] - c) / 2, rel=1e-9)
+
+
+def test_a_feasible_candidate_is_left_alone():
+    nlp = DFET(3, 1).transcribe(hop())
+    found = Ipopt().solve(nlp, np.full((1, 6), 0.5), nlp.march(nlp.first_guess(np.full((1, 6), 0.5))))
+    assert np.array_equal(found.z[0, nlp.free], np.full(6, 0.5)) and found.moved[0] == 0 and found.iterations[0] == 0
+
+
+def test_the_constant_objective_forgets_the_candidate_the_projection_does_not():
+    nlp = DFET(4, 6).transcribe(load("goddard"))
+    C = inner_solver("ipopt").solve(nlp, candidates(nlp, 3)).z[:, nlp.free]
+    near = np.clip(C + 0.01 * nlp.span[nlp.free], nlp.lower[nlp.free], nlp.upper[nlp.free])
+    projected, constant = (inner_solver(name).solve(nlp, near) for name in ("ipopt", "ipopt-feasibility"))
+    assert set(projected.status) == set(constant.status) == {"converged"}
+    assert projected.moved.max() < 0.1 < constant.moved.min()
+
+
+def test_random_candidates_of_goddard_converge():
+    nlp = DFET(4, 6).transcribe(load("goddard"))
+    found = inner_solver("auto").solve(nlp, candidates(nlp, 20))
+    assert set(found.status) == {"converged"} and found.violation.max() <= 1e-6
+
+
+@pytest.mark.parametrize("inner", ["auto", "ipopt", "ipopt-feasibility"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+def test_the_tolerance_is_kept(inner, tolerance):
+    nlp = DFET(4, 3).transcribe(load("goddard"))
+    found = inner_solver(inner).solve(nlp, candidates(nlp, 3), tolerance=tolerance)
+    assert set(found.status) == {"converged"}
+    assert max(violation(nlp, z) for z in found.z) <= tolerance
+
+
+@pytest.mark.parametrize("inner", NAMES)
+def test_what_cannot_be_is_infeasible_and_says_why(inner):
+    nlp = DFET(3, 2).transcribe(impossible())
+    found = inner_solver(inner).solve(nlp, candidates(nlp, 3))
+    assert set(found.status) <= {"infeasible", "failed"} and (found.violation > 1e-3).all() and np.isfinite(found.F).all()
+    for z in found.z:
+        violations = nlp.violations(z)
+        assert max(violations, key=violations.get) == "final value of run.x"
+
+
+def test_it_comes_as_near_as_it_can():
+    nlp = DFET(3, 2).transcribe(impossible())
+    found = inner_solver("ipopt").solve(nlp, candidates(nlp, 2))
+    assert found.violation == pytest.approx(np.full(2, 3 / 20), abs=1e-3), "full speed brings it to 2; the span of x is 20"
+
+
+@pytest.mark.parametrize("inner", NAMES)
+def test_no_freedom_left(inner):
+    """Fixed times, no control: there is nothing to choose, and the final value is right or wrong."""
+    for final, feasible in ((np.exp(-1.0), True), (0.5, False)):
+        problem, _ = decay(tf=1.0, final=final)
+        nlp = DFET(3, 5).transcribe(problem)
+        found = inner_solver(inner).solve(nlp, np.empty((2, 0)))
+        assert (found.status == "converged").tolist() == [feasible] * 2
+        assert found.moved.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("inner", NAMES)
+def test_dynamics_that_are_no_numbers_fail_and_are_never_feasible(inner, capfd):
+    nlp = DFET(2, 2).transcribe(broken())
+    C = candidates(nlp, 3)
+    found = inner_solver(inner).solve(nlp, C)
+    assert set(found.status) == {"failed"}
+    assert np.isinf(found.violation).all() and np.isnan(found.F).all()
+    assert np.array_equal(found.z[:, nlp.free], C)
+    assert capfd.readouterr() == ("", ""), "the library does not print"
+
+
+def test_objectives_that_are_no_numbers_fail():
+    problem, phase = integrator()
+    x = phase["x"]
+    problem.minimize("root", phase.final(ca.sqrt(x)))
+    nlp = DFET(2, 1).transcribe(problem)
+    found = inner_solver("auto").solve(nlp, np.array([[-1.0] * 4, [1.0] * 4]))
+    assert found.status.tolist() == ["failed", "converged"]
+    assert np.isnan(found.F[0]).all() and found.F[1] == pytest.approx([np.sqrt(2)]) and np.isinf(found.violation[0])
+
+
+def test_march_equals_projection_where_every_candidate_is_feasible():
+    nlp = DFET(30, 1).transcribe(load("orbit_rise"))
+    assert nlp.marches_exactly and not DFET(4, 6).transcribe(load("goddard")).marches_exactly
+    C = candidates(nlp, 3)
+    flown, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("march", "ipopt", "auto"))
+    assert set(flown.status) == set(projected.status) == {"converged"}
+    assert projected.z == pytest.approx(flown.z, abs=1e-5) and pytest.approx(flown.F, abs=1e-6) == projected.F
+    assert np.array_equal(auto.z, flown.z) and flown.violation.max() < 1e-12
+
+
+def test_auto_repairs_what_leaves_the_bounds_of_states():
+    problem, phase = integrator()
+    phase.state("y", bounds=(-0.5, 0.5), initial=0)
+    phase._rates = {}
+    phase.dynamics(x=phase["u"], y=phase["x"])
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(3, 2).transcribe(problem)
+    assert nlp.marches_exactly
+    C = np.vstack([np.full(9, 0.1), np.ones(9)])
+    assert inner_solver("march").solve(nlp, C).status.tolist() == ["converged", "infeasible"]
+    found = inner_solver("auto").solve(nlp, C)
+    assert found.status.tolist() == ["converged", "converged"]
+    assert found.moved[0] == 0 and found.moved[1] > 0.01 and np.array_equal(found.z[0, nlp.free], C[0])
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        lambda p, f: f.path("gate", f["x"], upper=1),
+        lambda p, f: p.constraint("gate", f.final(f["x"]), upper=1),
+        lambda p, f: f.state("z", bounds=(0, 1), final=0.5),
+        lambda p, f: f.state("z", bounds=(0, 1), final=(0.1, 1)),
+    ],
+    ids=["path", "constraint", "final", "range"],
+)
+def test_constraints_are_not_marched(stated):
+    problem, phase = integrator()
+    stated(problem, phase)
+    phase._rates = {}
+    phase.dynamics(**dict.fromkeys(phase._states, 0))
+    problem.minimize("end", phase.final(phase["x"]))
+    assert not DFET(2, 2).transcribe(problem).marches_exactly
+
+
+def test_a_warm_start_keeps_its_states_and_saves_iterations():
+    nlp = DFET(4, 6).transcribe(load("goddard"))
+    first = inner_solver("ipopt").solve(nlp, candidates(nlp, 4))
+    C = first.z[:, nlp.free]
+    again = inner_solver("ipopt").solve(nlp, C, first.z)
+    assert np.array_equal(again.z, first.z) and not again.iterations.any() and not again.moved.any()
+    near = np.clip(C + 1e-3, nlp.lower[nlp.free], nlp.upper[nlp.free])
+    warm, cold = (inner_solver("ipopt").solve(nlp, near, start) for start in (first.z, None))
+    assert set(warm.status) == {"converged"} and warm.iterations.sum() <= cold.iterations.sum()
+
+
+@pytest.mark.parametrize("inner", NAMES)
+def test_results_do_not_depend_on_what_was_solved_before(inner):
+    problem, solver = load("goddard"), inner_solver(inner)
+    fresh, used = (DFET(3, 3).transcribe(problem) for _ in range(2))
+    C, other = candidates(fresh, 2), candidates(fresh, 3, seed=9)
+    solver.solve(used, other)
+    inner_solver("ipopt").solve(used, other[::-1], tolerance=1e-4)
+    solver.solve(DFET(2, 2).transcribe(hop()), np.zeros((1, 6)))
+    first, second = solver.solve(fresh, C), solver.solve(used, C)
+    for field in fields(InnerResult):
+        assert np.array_equal(getattr(first, field.name), getattr(second, field.name)), field.name
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {here!r})
+from cases import candidates
+from problems import load
+from transcription import DFET
+from transcription.inner import inner_solver
+nlp = DFET(3, 3).transcribe(load("goddard"))
+found = inner_solver("auto").solve(nlp, candidates(nlp, 3))
+print(found.z.tobytes().hex())
+"""
+
+
+def test_two_processes_give_the_same_bits():
+    from pathlib import Path
+
+    code = SCRIPT.format(here=str(Path(__file__).parent))
+    first, second = (subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in range(2))
+    assert first == second and len(first) > 100
+
+
+def test_a_time_limit_gives_a_timeout():
+    nlp = DFET(20, 6).transcribe(load("goddard"))
+    found = Ipopt(seconds=1e-6).solve(nlp, candidates(nlp, 2))
+    assert found.status.tolist() == ["timeout", "timeout"] and (found.violation > 1e-6).all()
+
+
+def test_an_iteration_limit_is_no_success():
+    nlp = DFET(4, 6).transcribe(load("goddard"))
+    found = Ipopt(max_iterations=1).solve(nlp, candidates(nlp, 2))
+    assert set(found.status) <= {"failed", "infeasible"}
+
+
+def test_peaks_are_tight_afterwards():
+    problem, phase = integrator(final=1)
+    problem.minimize("top", phase.peak(phase["u"]))
+    problem.constraint("gentle", phase.peak(phase["u"]), upper=0.9)
+    nlp = DFET(2, 2, basis="bernstein").transcribe(problem)
+    for inner in NAMES:
+        found = inner_solver(inner).solve(nlp, candidates(nlp, 3))
+        assert np.array_equal(nlp.tighten(found.z), found.z)
+        assert np.array_equal(found.F[:, 0], found.z[:, slot(nlp, "run.peak[0]")])
+
+
+def test_periodic_controls_are_projected_the_short_way_round():
+    problem, phase = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi, final=-1.9)
+    phase._rates = {}
+    phase.dynamics(x=ca.cos(phase["u"]))
+    problem.minimize("drift", phase.integral(ca.sin(phase["u"])))
+    nlp = DFET(3, 0).transcribe(problem)
+    found = inner_solver("ipopt").solve(nlp, np.array([[np.pi - 0.6, -np.pi + 0.1, 2.6]]))
+    assert found.status[0] == "converged" and found.moved[0] < 0.15
+    assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all()
+
+
+# Names and strangers
+
+
+def test_inner_solvers_by_name():
+    assert isinstance(inner_solver("auto"), Auto) and isinstance(inner_solver("march"), March)
+    own = Ipopt(max_iterations=5)
+    assert inner_solver(own) is own
+    for wrong in ("newton", "", None, 3, March, ["auto"]):
+        with pytest.raises(ValueError, match="ipopt-feasibility"):
+            inner_solver(wrong)
+    with pytest.raises(ValueError, match="newton"):
+        MACS().solve(load("goddard"), DFET(2, 2), evaluations=5, inner="newton")
+
+
+@dataclass(frozen=True)
+class Bisection(InnerSolver):
+    """A user's own: scales the controls until the final value is met."""
+
+    goal: float = 1.0
+
+    def solve(self, nlp, candidates, warm=None, *, tolerance=1e-6):
+        assert warm is None or warm.shape == (len(candidates), len(nlp.variables))
+        C = np.clip(candidates + (self.goal / 2 - candidates.mean(axis=1, keepdims=True)), -1, 1)
+        Z = nlp.march(nlp.first_guess(C))
+        F, worst = nlp.evaluate(Z)
+        status = np.where(worst <= tolerance, "converged", "infeasible")
+        return InnerResult(Z, F, worst, status, np.linalg.norm(C - candidates, axis=1), np.ones(len(C), dtype=int))
+
+
+def test_a_users_own_inner_solver_is_as_good_as_ours():
+    front = MACS(agents=4, archive=4).solve(hop(), DFET(2, 1), evaluations=120, seed=1, inner=Bisection())
+    assert len(front) > 0 and front.violation.max() <= 1e-6
+    assert front.stats["evaluations"] <= 120 and "Bisection" in front.stats["inner"]
+    assert front[0].simulate().max_defect < 1e-9

@@ -1,0 +1,306 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from cases import candidates, decay, flown, integrator, oscillator, solved
+
+from problems import Problem, load
+from transcription import DFET, PiecewisePolynomial, Trajectory
+from transcription.inner import inner_solver
+from transcription.sampling import excursions
+from transcription.simulate import simulate
+
+
+def fly(nlp, z, **options):
+    return simulate(nlp.problem, nlp.unpack(z), **options)
+
+
+def tampered(flight: Trajectory, phase: str, change) -> Trajectory:
+    """The flight with the control coefficients of one phase changed."""
+    law = flight[phase].control
+    control = PiecewisePolynomial(law.edges, change(law.coefficients.copy()), law.basis)
+    return Trajectory(tuple(replace(p, control=control) if p.name == phase else p for p in flight.phases), flight.parameters)
+
+
+@pytest.mark.parametrize("method", ["RK45", "DOP853", "Radau", "BDF", "LSODA"])
+def test_a_flight_without_controls_has_its_closed_form(method):
+    problem, phase = decay(tf=1.5)
+    problem.minimize("square", phase.integral(phase["x"] ** 2))
+    problem.minimize("moment", phase.integral(phase.time))
+    problem.minimize("top", phase.peak(-phase["x"]))
+    problem.maximize("end", phase.final(phase["x"] * phase.time))
+    nlp = DFET(3, 4).transcribe(problem)
+    check = fly(nlp, nlp.march(nlp.first_guess(np.empty((1, 0))))[0], rtol=1e-9, method=method)
+    e = np.exp(-1.5)
+    exact = {"rest": e, "square": (1 - e**2) / 2, "moment": 1.125, "top": -e, "end": 1.5 * e}
+    assert check.objectives == pytest.approx(exact, rel=1e-5)
+    assert check.trajectory["fall"].at(0.7)["x"] == pytest.approx(np.exp(-0.7), rel=1e-5)
+    assert check.max_defect < 1e-6 and check.violation < 1e-9
+
+
+def test_an_exact_trajectory_has_no_defect():
+    problem, phase = integrator()
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(3, 4).transcribe(problem)
+    for z in flown(nlp):
+        check = fly(nlp, z, rtol=1e-12, atol=1e-14)
+        assert check.max_defect < 1e-12 and check.violation == 0
+        F, _ = nlp.evaluate(z[None])
+        assert check.objectives["end"] == pytest.approx(F[0, 0], abs=1e-10)
+
+
+def test_the_defect_is_that_of_the_mesh():
+    problem, _phase = decay(tf=2.0)
+    nlp = DFET(2, 0).transcribe(problem)
+    flight = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])
+    check = simulate(nlp.problem, flight)
+    error = np.abs(flight["fall"].edge_states[:, 0] - np.exp(-flight["fall"].state.edges)).max()
+    assert error > 0.02
+    assert check.defect == {"fall": {"x": pytest.approx(error / 4, rel=1e-6)}}, "in spans of the bounds"
+    assert check.max_defect == check.defect["fall"]["x"]
+
+
+@pytest.mark.parametrize("element", [0, 2])
+def test_a_tampered_control_is_found(element):
+    nlp = DFET(3, 4).transcribe(load("goddard"))
+    gentle = np.full((1, len(nlp.free)), 0.4)
+    gentle[0, [v.name for v in (nlp.variables[i] for i in nlp.free)].index("ascent.tf")] = 150.0
+    flight = nlp.unpack(inner_solver("ipopt").solve(nlp, gentle).z[0])
+
+    def change(c):
+        c[element] += 0.3
+        return c
+
+    honest, false = simulate(nlp.problem, flight), simulate(nlp.problem, tampered(flight, "ascent", change))
+    assert false.max_defect > 10 * honest.max_defect and false.max_defect > 1e-3
+    assert false.violation > 1e-3 and max(false.violations, key=false.violations.get).startswith(
+        ("final value of ascent.", "bounds of ascent.")
+    )
+
+
+def test_objectives_and_violations_are_those_of_the_transcription():
+    nlp = DFET(4, 8).transcribe(oscillator())
+    C = candidates(nlp, 1)
+    C[0, 4:] = 0.3
+    z = nlp.march(nlp.first_guess(C))[0]
+    check, F = fly(nlp, z), nlp.evaluate(z[None])[0][0]
+    assert list(check.objectives.values()) == pytest.approx((F * nlp.problem.signs).tolist(), rel=1e-8)
+    assert set(check.defect) == {"swing"} and set(check.defect["swing"]) == {"x", "y"}
+
+
+def test_violations_of_paths_constraints_bounds_and_ends_are_named():
+    problem, phase = integrator(final=(0, 1), bounds=(-1, 8))
+    phase.path("gate", phase["x"] * phase.time, upper=4)
+    problem.constraint("late", phase.integral(phase["x"]), upper=1, scale=5)
+    problem.constraint("calm", phase.peak(phase["x"]), upper=12)
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(2, 2).transcribe(problem)
+    C = np.full((1, 6), 6.0)
+    check = fly(nlp, nlp.march(nlp.first_guess(C))[0])
+    assert check.violations["final value of run.x"] == pytest.approx(11 / 20)
+    assert check.violations["bounds of run.x"] == pytest.approx(2 / 20)
+    assert check.violations["path 'gate' of 'run'"] == pytest.approx(20)
+    assert check.violations["constraint 'late'"] == pytest.approx(11 / 5)
+    assert check.violations["constraint 'calm'"] == pytest.approx(0, abs=1e-9)
+    assert check.violation == max(check.violations.values())
+
+
+# Phases
+
+
+def two_legs(jump: float) -> Problem:
+    problem = Problem("legs")
+    legs = []
+    for i in range(2):
+        leg = problem.phase(f"leg {i}", t0=0 if i == 0 else (0, 4), tf=(1, 2) if i == 0 else (3, 4))
+        x = leg.state("x", bounds=(-10, 10), initial=1 if i == 0 else None)
+        leg.state("m", bounds=(0, 20), initial=10 if i == 0 else None)
+        leg.dynamics(x=x * leg.control("u", bounds=(-1, 1)), m=-x)
+        legs.append(leg)
+    problem.link(legs[0], legs[1], states=["x"])
+    problem.constraint("drop", legs[0].final(legs[0]["m"]) - legs[1].initial(legs[1]["m"]), lower=jump, upper=jump)
+    problem.minimize("time", legs[1].tf)
+    problem.maximize("mass", legs[1].final(legs[1]["m"]))
+    return problem
+
+
+def test_linked_phases_are_flown_on_from_where_the_first_ended():
+    nlp = DFET(3, 6).transcribe(two_legs(2.0))
+    found = solved(nlp)
+    assert set(found.status) == {"converged"}
+    flight = nlp.unpack(found.z[0])
+    check = simulate(nlp.problem, flight)
+    assert check.max_defect < 1e-3 and check.violation < 1e-3
+    assert "constraint 'drop'" in check.violations
+
+    def change(c):
+        return np.clip(c + 0.5, -1, 1)
+
+    other = simulate(nlp.problem, tampered(flight, "leg 0", change))
+    first, second = other.trajectory["leg 0"], other.trajectory["leg 1"]
+    assert second.edge_states[0, 0] == first.edge_states[-1, 0] != flight["leg 1"].edge_states[0, 0]
+    assert second.edge_states[0, 1] == flight["leg 1"].edge_states[0, 1], "what is not linked starts where the trajectory says"
+    assert other.defect["leg 1"]["x"] > 1e-3 and other.violations["constraint 'drop'"] > 1e-3
+
+
+def test_a_meeting_that_does_not_take_place_is_found():
+    problem = Problem("meeting")
+    together = problem.phase("together", t0=(1, 5), tf=6)
+    x = together.state("x", bounds=(-10, 10))
+    together.dynamics(x=0)
+    for name, start in (("left", -1), ("right", 1)):
+        phase = problem.phase(name, t0=0, tf=(1, 5))
+        phase.state("x", bounds=(-10, 10), initial=start)
+        phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
+        problem.link(phase, together)
+    problem.minimize("place", together.final(x))
+    nlp = DFET(2, 2).transcribe(problem)
+    good, bad = solved(nlp, k=1).z[0], flown(nlp, k=1)[0]
+    assert fly(nlp, good).violation < 1e-5
+    check = fly(nlp, bad)
+    flight = nlp.unpack(bad)
+    assert check.violations["link from 'right' to 'together': x"] == pytest.approx(
+        abs(flight["right"]["x"][-1] - flight["left"]["x"][-1]) / 20, rel=1e-6
+    )
+    assert check.violations["link from 'right' to 'together': t0"] == pytest.approx(abs(flight["right"].tf - flight["left"].tf) / 4)
+    assert check.violation == pytest.approx(nlp.evaluate(bad[None])[1][0], rel=1e-6)
+
+
+def test_a_phase_of_no_duration_is_flown_through():
+    problem = Problem("coast")
+    burn = problem.phase("burn", t0=0, tf=(1, 3))
+    burn.state("x", bounds=(-10, 10), initial=0)
+    burn.dynamics(x=1)
+    coast = problem.phase("coast", t0=(1, 3), tf=(1, 3))
+    coast.state("x", bounds=(-10, 10))
+    coast.dynamics(x=2)
+    problem.link(burn, coast)
+    problem.minimize("end", coast.final(coast["x"]) + coast.integral(coast["x"]))
+    nlp = DFET(2, 2).transcribe(problem)
+    check = fly(nlp, nlp.march(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
+    assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
+
+
+# Trouble
+
+
+def test_stiff_dynamics_have_their_methods():
+    problem = Problem("stiff")
+    phase = problem.phase("run", t0=0, tf=1)
+    x = phase.state("x", bounds=(-2, 2), initial=1)
+    phase.dynamics(x=-1e5 * (x - ca.cos(phase.time)))
+    problem.minimize("end", phase.final(x))
+    nlp = DFET(4, 3).transcribe(problem)
+    z = nlp.march(nlp.first_guess(np.empty((1, 0))))[0]
+    assert fly(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
+
+
+@pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
+def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
+    """x' = -1/x reaches 0 at t = 1/2, where there is nothing more to integrate; or nothing from the start."""
+    for initial, root in ((1.0, False), (0.0, False), (-0.5, True))[method == "LSODA" :]:
+        problem = Problem("broken")
+        phase = problem.phase("run", t0=0, tf=(1, 2))
+        x = phase.state("x", bounds=(-1, 1), initial=initial)
+        phase.dynamics(x=(ca.sqrt(x) if root else -1 / x) + phase.control("u", bounds=(-0.1, 0.1)))
+        problem.minimize("end", phase.final(x) + phase.integral(x) + phase.peak(x))
+        nlp = DFET(2, 2).transcribe(problem)
+        flight = nlp.unpack(nlp.first_guess(candidates(nlp, 1))[0])
+        check = simulate(nlp.problem, flight, method=method)
+        assert check.max_defect == np.inf and check.violation == np.inf
+    assert capfd.readouterr().out == ""
+
+
+def test_unstable_dynamics_are_flown_as_far_as_they_go():
+    problem = Problem("blow up")
+    phase = problem.phase("run", t0=0, tf=2)
+    x = phase.state("x", bounds=(-100, 100), initial=1)
+    phase.dynamics(x=x**2)
+    problem.minimize("end", phase.final(x))
+    nlp = DFET(4, 3).transcribe(problem)
+    check = fly(nlp, nlp.first_guess(np.empty((1, 0)))[0])
+    assert check.max_defect == np.inf
+
+
+@pytest.mark.parametrize(
+    "options", [{"method": "Euler"}, {"method": None}, {"method": "rk45"}, {"rtol": 0}, {"rtol": -1}, {"atol": 0}, {"atol": np.nan}]
+)
+def test_bad_settings_are_refused(options):
+    problem, _ = decay()
+    nlp = DFET(1, 1).transcribe(problem)
+    z = nlp.march(nlp.first_guess(np.array([[1.5]])))[0]
+    with pytest.raises(ValueError, match=next(iter(options))):
+        fly(nlp, z, **options)
+
+
+def test_a_tighter_tolerance_than_arithmetic_allows_is_met_as_well_as_can_be():
+    problem, _ = decay()
+    nlp = DFET(2, 5).transcribe(problem)
+    assert fly(nlp, nlp.march(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
+
+
+# Between nodes
+
+
+def overshooting(basis: str):
+    problem, phase = integrator()
+    phase.path("push", phase["u"] + 0 * phase["x"], upper=1.2)
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(1, 4, basis=basis).transcribe(problem)
+    # Bang-bang coefficients: between its nodes, a polynomial through them overshoots.
+    z = nlp.march(nlp.first_guess(np.array([[1, 1, -1, -1, 1.0]])))[0]
+    return nlp, z
+
+
+def test_a_control_that_overshoots_between_nodes_is_found():
+    nlp, z = overshooting("lobatto")
+    found = excursions(nlp.problem, nlp.unpack(z))
+    law = nlp.unpack(z)["run"].at(np.linspace(0, 2, 4001))["u"]
+    assert found["run.u"] == pytest.approx(max(law.max() - 1, -1 - law.min()) / 2, rel=1e-2)
+    assert found["run.push"] == pytest.approx(law.max() - 1.2, rel=1e-2)
+    assert fly(nlp, z).violations["path 'push' of 'run'"] == pytest.approx(law.max() - 1.2, rel=1e-2)
+
+
+def test_bernstein_does_not_overshoot():
+    nlp, z = overshooting("bernstein")
+    assert excursions(nlp.problem, nlp.unpack(z)) == {}
+    assert fly(nlp, z).violation == 0
+
+
+def test_periodic_controls_and_missing_controls_have_no_excursions():
+    problem, phase = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi)
+    phase._rates = {}
+    phase.dynamics(x=ca.cos(phase["u"]))
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(1, 3).transcribe(problem)
+    z = nlp.march(nlp.first_guess(np.array([[3, -3, 3.1, -2.5]])))[0]
+    assert excursions(nlp.problem, nlp.unpack(z)) == {}
+    assert fly(nlp, z).max_defect < 1e-3
+    problem, _ = decay()
+    nlp = DFET(1, 3).transcribe(problem)
+    assert excursions(nlp.problem, nlp.unpack(nlp.march(nlp.first_guess(np.array([[1.5]])))[0])) == {}
+
+
+def test_what_was_flown_is_a_trajectory():
+    nlp = DFET(3, 3).transcribe(oscillator())
+    flight = fly(nlp, flown(nlp, k=1)[0]).trajectory
+    phase = flight["swing"]
+    assert list(flight) == ["swing"] and set(flight.parameters) == {"m"}
+    assert (np.diff(phase.time) >= 0).all()
+    assert set(phase.at(0.7)) == {"x", "y", "u", "v"}
+    assert phase["x"].shape == phase.time.shape == phase["u"].shape
+    assert phase.at(phase.time)["x"] == pytest.approx(phase["x"], abs=1e-9)
+
+
+def test_simulations_leave_no_trace_in_each_other():
+    nlp = DFET(3, 3).transcribe(oscillator())
+    first, second = (nlp.unpack(z) for z in flown(nlp, k=2))
+    alone = simulate(nlp.problem, first)
+    simulate(nlp.problem, second)
+    again = simulate(nlp.problem, first)
+    assert alone.objectives == again.objectives and alone.defect == again.defect
+    with np.errstate(all="raise"):
+        simulate(nlp.problem, first)
