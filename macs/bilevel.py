@@ -13,8 +13,8 @@ from .evaluation import Counts, Evaluation, Evaluator
 class Bilevel(Evaluator):
     """The two-level problem of Ricciardi, Vasile and Maddock (IEEE CEC 2016), eq. (13).
 
-    The full vector is that of the NLP; free are parameters, times, free initial states and controls; the other entries, the states, are where
-    the inner solve starts from: those of the point from which a candidate was made.
+    The full vector is that of the NLP; free are parameters, times, free initial states and controls; the other entries, the states, are
+    where the inner solve starts from: those of the point from which a candidate was made.
 
     Parameters
     ----------

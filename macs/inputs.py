@@ -48,7 +48,7 @@ def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """
     rows = []
     if np.isfinite(nlp.guess).any():
-        middle = 0.5 * (nlp.lower + nlp.upper)[nlp.free]
+        middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
     if start is not None:
         given = _array(start)
@@ -71,7 +71,7 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     if Z.shape[1] != len(variables):
         raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected; a start belongs to one problem and mesh")
     lower, upper, scale = (np.array([getattr(v, name) for v in variables]) for name in ("lower", "upper", "scale"))
-    wrong = ~np.isfinite(Z) | (Z < lower - 1e-6 * scale) | (Z > upper + 1e-6 * scale)
+    wrong = ~np.isfinite(Z) | (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         v = variables[column]

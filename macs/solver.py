@@ -42,6 +42,9 @@ class Solver(ABC):
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
         """One iteration, within the budget of evaluations."""
 
+    def check_objectives(self, m: int) -> None:
+        """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
+
     def solve(
         self,
         problem: Problem | CompiledProblem,
@@ -96,6 +99,7 @@ class Solver(ABC):
         check_problem(problem, transcription)
         solver = inner_solver(inner)
         nlp = transcription.transcribe(problem)
+        self.check_objectives(len(nlp.problem.goals))
         about = {"inner": inner if isinstance(inner, str) else repr(inner)}
         run = Run(
             self,
@@ -154,6 +158,8 @@ class Solver(ABC):
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
+        if box.m_known is not None:
+            self.check_objectives(box.m_known)
         sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
         variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
 
