@@ -91,7 +91,7 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
     z = y * nlp.scale
     _, g = nlp.functions(z)
     constant = settings.objective == "constant"
-    f = ca.MX(1) if constant else ca.sumsqr((z[nlp.free.tolist()] - candidate) / nlp.span[nlp.free])
+    f = ca.MX(1) if constant else ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free])
     parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
     solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
     return solver, (nlp.lower - nlp.period) / nlp.scale, (nlp.upper + nlp.period) / nlp.scale
