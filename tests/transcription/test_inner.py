@@ -295,6 +295,17 @@ def test_periodic_controls_are_projected_the_short_way_round():
     assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all()
 
 
+def test_dates_keep_their_digits():
+    """Times of the size of seconds since 1970, free within ten of them."""
+    now = 1.7e9
+    problem, phase = integrator(t0=(now, now + 10), tf=(now + 20, now + 30), final=5)
+    problem.minimize("time", phase.tf - phase.t0)
+    problem.minimize("effort", phase.integral(phase["u"] ** 2))
+    nlp = DFET(3, 2).transcribe(problem)
+    found = inner_solver("ipopt").solve(nlp, candidates(nlp, 10))
+    assert set(found.status) == {"converged"}
+
+
 # Names and strangers
 
 

@@ -62,7 +62,7 @@ class Ipopt(InnerSolver):
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
         solver, lower, upper = _program(nlp, self, tolerance)
-        scale = nlp.scale
+        scale, origin = nlp.scale, _origin(nlp)
         Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
@@ -70,12 +70,12 @@ class Ipopt(InnerSolver):
                 continue
             if not np.isfinite(guess[row]).all():
                 continue
-            y0 = np.clip(guess[row] / scale, lower, upper)
+            y0 = np.clip((guess[row] - origin) / scale, lower, upper)
             answer = solver(
                 x0=y0, p=start[row, nlp.free], lbx=lower, ubx=upper, lbg=nlp.g_lower / nlp.g_scale, ubg=nlp.g_upper / nlp.g_scale
             )
             stats = solver.stats()
-            Z[row] = _back_in_bounds(nlp, np.array(answer["x"]).ravel() * scale)
+            Z[row] = _back_in_bounds(nlp, origin + np.array(answer["x"]).ravel() * scale)
             said[row] = _SAID.get(stats["return_status"], FAILED)
             iterations[row] = stats["iter_count"]
         return nlp.tighten(Z), said, iterations
@@ -83,18 +83,24 @@ class Ipopt(InnerSolver):
 
 @lru_cache(maxsize=8)
 def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
-    """The nonlinear program in scaled variables y = z / scale, with the candidate as its parameter, and the bounds of y.
+    """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y.
 
     Periodic variables get one more period on either side, so that a bound never stops them.
     """
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
-    z = y * nlp.scale
+    origin = _origin(nlp)
+    z = origin + y * nlp.scale
     _, g = nlp.functions(z)
     constant = settings.objective == "constant"
     f = ca.MX(1) if constant else ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free])
     parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
     solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
-    return solver, (nlp.lower - nlp.period) / nlp.scale, (nlp.upper + nlp.period) / nlp.scale
+    return solver, (nlp.lower - nlp.period - origin) / nlp.scale, (nlp.upper + nlp.period - origin) / nlp.scale
+
+
+def _origin(nlp: NLP) -> np.ndarray:
+    """Where y = 0: the lower bounds, so that a narrow range far from zero (a radius, a date) keeps its digits."""
+    return np.where(np.isfinite(nlp.lower), nlp.lower, 0.0)
 
 
 def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
