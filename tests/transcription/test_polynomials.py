@@ -51,10 +51,10 @@ def test_lagrange_functions_are_one_at_their_own_node(basis, degree):
     assert pl.basis_matrix(basis, degree, near) == pytest.approx(np.eye(degree + 1), abs=1e-12)
 
 
-@given(st.integers(1, 30), st.integers(0, 2**32 - 1), st.floats(-2, 2))
-def test_lagrange_agrees_with_scipy(degree, seed, shift):
-    nodes, values = pl.nodes("lobatto", degree), np.random.default_rng(seed).normal(size=degree + 1)
-    t = np.clip(np.linspace(-1, 1, 7) + shift / 10, -1, 1)
+@given(st.integers(1, 30), st.integers(0, 2**32 - 1))
+def test_lagrange_agrees_with_scipy(degree, seed):
+    rng = np.random.default_rng(seed)
+    nodes, values, t = pl.nodes("lobatto", degree), rng.normal(size=degree + 1), rng.uniform(-1, 1, 7)
     assert pl.basis_matrix("lobatto", degree, t) @ values == pytest.approx(BarycentricInterpolator(nodes, values)(t), abs=1e-8)
 
 

@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pytest
+from cases import candidates, flown, integrator, slot
+
+from problems import Problem
+from transcription import DFET
+
+# Periodic controls
+
+
+def spinner(**bounds) -> Problem:
+    problem, phase = integrator(**({"bounds": (-np.pi, np.pi), "period": 2 * np.pi} | bounds))
+    phase._rates = {}
+    phase.dynamics(x=ca.cos(phase["u"]))
+    problem.minimize("end", phase.final(phase["x"]))
+    problem.minimize("turns", phase.integral(ca.sin(phase["u"])))
+    return problem
+
+
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+def test_a_period_more_changes_nothing(basis):
+    nlp = DFET(2, 3, basis=basis).transcribe(spinner())
+    assert nlp.period[nlp.free] == pytest.approx(np.full(8, 2 * np.pi))
+    rng = np.random.default_rng(3)
+    Z = flown(nlp, k=5)
+    moved = Z.copy()
+    moved[:, nlp.free] += 2 * np.pi * rng.integers(-1, 2, (5, 8))
+    F, g = (np.array(v).T for v in nlp.functions(Z.T))
+    G, h = (np.array(v).T for v in nlp.functions(moved.T))
+    assert pytest.approx(F, abs=1e-12) == G and pytest.approx(g, abs=1e-12) == h
+    assert nlp.march(moved)[:, [i for i in range(Z.shape[1]) if i not in nlp.free]] == pytest.approx(
+        Z[:, [i for i in range(Z.shape[1]) if i not in nlp.free]], abs=1e-12
+    )
+    assert nlp.distance(Z, moved) == pytest.approx(np.zeros(5), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "values", [(3.0, -3.0), (-3.0, 3.0), (np.pi / 2, -np.pi / 2), (-np.pi / 2, np.pi / 2), (0, np.pi), (-np.pi, 0), (0, 3)]
+)
+def test_inside_an_element_a_periodic_control_takes_the_short_way(values):
+    """And the trajectory takes the same as the equations, also at half a period."""
+    nlp = DFET(1, 1, basis="bernstein").transcribe(spinner())
+    z = nlp.march(nlp.first_guess(np.array([values], dtype=float)))[0]
+    phase = nlp.unpack(z)["run"]
+    law = phase.control.coefficients[0, :, 0]
+    assert abs(law[1] - law[0]) <= np.pi + 1e-12
+    assert np.cos(law) == pytest.approx(np.cos(values))
+    A = 0.5 * (law[0] + law[1])
+    half = 0.5 * (law[1] - law[0]) / np.sqrt(3)
+    assert phase.edge_states[-1, 0] == pytest.approx(np.cos(A + half) + np.cos(A - half), abs=1e-12)
+    shown = phase.at(np.linspace(0, 2, 50))["u"]
+    assert (shown >= -np.pi - 1e-12).all() and (shown <= np.pi + 1e-12).all()
+    assert (phase["u"] >= -np.pi - 1e-12).all() and (phase["u"] <= np.pi + 1e-12).all()
+
+
+# Links
+
+
+def relay(legs: int, jump: float = 0.0) -> Problem:
+    """x' = u one leg after the other; `drop` is lost between the legs, if at all."""
+    problem = Problem("relay")
+    phases = []
+    for i in range(legs):
+        phase = problem.phase(f"leg {i}", t0=0 if i == 0 else (0, 10), tf=(0, 10), duration=(0, 3))
+        phase.state("x", bounds=(-10, 10), initial=0 if i == 0 else None)
+        phase.state("m", bounds=(0, 20), initial=10 if i == 0 else None)
+        u = phase.control("u", bounds=(-1, 1))
+        phase.dynamics(x=u, m=-0.1)
+        phases.append(phase)
+    for i, (first, second) in enumerate(itertools.pairwise(phases)):
+        problem.link(first, second, states=["x"] if jump else None)
+        if jump:
+            drop = first.final(first["m"]) - second.initial(second["m"])
+            problem.constraint(f"drop {i}", drop, lower=jump, upper=jump)
+    problem.minimize("time", phases[-1].tf)
+    problem.maximize("way", phases[-1].final(phases[-1]["x"]))
+    return problem
+
+
+@pytest.mark.parametrize("legs", [1, 2, 3, 12])
+def test_linked_phases_share_time_and_states(legs):
+    nlp = DFET(2, 2).transcribe(relay(legs))
+    assert not any(label.startswith("link") for label in nlp.g_labels)
+    flight = nlp.unpack(flown(nlp, k=1)[0])
+    assert list(flight) == [f"leg {i}" for i in range(legs)] and len(flight) == legs
+    for i in range(1, legs):
+        before, after = flight[f"leg {i - 1}"], flight[f"leg {i}"]
+        assert after.t0 == pytest.approx(before.tf, abs=1e-12)
+        assert np.array_equal(after.edge_states[0], before.edge_states[-1])
+    total = sum(p.control.coefficients.mean() for p in flight.values())
+    assert np.isfinite(total)
+    last = flight[f"leg {legs - 1}"]
+    assert last.edge_states[-1, 1] == pytest.approx(10 - 0.1 * last.tf)
+
+
+@pytest.mark.parametrize("second", [(3.0, 3.0), (4.0, 2.0)], ids=["no time", "backwards"])
+def test_a_phase_of_no_duration_still_has_its_ends(second):
+    problem = relay(2)
+    nlp = DFET(3, 2).transcribe(problem)
+    C = candidates(nlp, 1)
+    C[0, [list(nlp.free).index(slot(nlp, f"leg {i}.tf")) for i in range(2)]] = second
+    z = nlp.march(nlp.first_guess(C))[0]
+    flight = nlp.unpack(z)
+    assert np.array_equal(flight["leg 1"].edge_states[0], flight["leg 0"].edge_states[-1])
+    assert flight["leg 1"].edge_states[-1, 1] == pytest.approx(10 - 0.1 * second[1]) == flight["leg 1"]["m"][-1]
+    assert flight["leg 1"]["u"][0] == pytest.approx(flight["leg 1"].control.on_element(0, -np.ones(1))[0, 0])
+    assert (nlp.evaluate(z[None])[1][0] < 1e-12) == (second[1] >= second[0])
+
+
+def test_states_that_are_not_linked_may_jump():
+    nlp = DFET(2, 2).transcribe(relay(3, jump=1.5))
+    assert "constraint 'drop 0'" in nlp.g_labels
+    from cases import solved
+
+    found = solved(nlp)
+    assert set(found.status) == {"converged"}
+    flight = nlp.unpack(found.z[0])
+    assert flight["leg 0"]["m"][-1] - flight["leg 1"]["m"][0] == pytest.approx(1.5, abs=1e-5)
+    assert flight["leg 0"]["x"][-1] == flight["leg 1"]["x"][0]
+
+
+def test_several_phases_may_lead_into_one_declared_before_them():
+    problem = Problem("meeting")
+    together = problem.phase("together", t0=(0, 5), tf=6)
+    x = together.state("x", bounds=(-10, 10))
+    together.dynamics(x=0)
+    for name, start in (("left", -1), ("right", 1)):
+        phase = problem.phase(name, t0=0, tf=(1, 5))
+        phase.state("x", bounds=(-10, 10), initial=start)
+        phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
+        problem.link(phase, together)
+    problem.minimize("place", together.final(x))
+    nlp = DFET(2, 2).transcribe(problem)
+    joined = {label for label in nlp.g_labels if label.startswith("link")}
+    assert joined == {"link from 'right' to 'together': t0", "link from 'right' to 'together': x"}
+    from cases import solved
+
+    found = solved(nlp)
+    assert set(found.status) == {"converged"}
+    flight = nlp.unpack(found.z[0])
+    assert list(flight) == ["together", "left", "right"]
+    assert flight["left"].tf == pytest.approx(flight["right"].tf, abs=1e-5) == flight["together"].t0
+    assert flight["left"]["x"][-1] == pytest.approx(flight["right"]["x"][-1], abs=1e-4)
+
+
+def test_one_phase_may_lead_into_several():
+    problem = Problem("staging")
+    ends = {}
+    for name in ("stack", "orbiter", "booster"):
+        phase = problem.phase(name, t0=0 if name == "stack" else (0, 9), tf=(1, 9))
+        ends[name] = phase
+        phase.state("x", bounds=(-10, 10), initial=0 if name == "stack" else None)
+        phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
+    problem.link(ends["stack"], ends["orbiter"])
+    problem.link(ends["stack"], ends["booster"])
+    problem.minimize("time", ends["orbiter"].tf + ends["booster"].tf)
+    nlp = DFET(2, 2).transcribe(problem)
+    flight = nlp.unpack(flown(nlp, k=1)[0])
+    for name in ("orbiter", "booster"):
+        assert flight[name].t0 == pytest.approx(flight["stack"].tf) and flight[name]["x"][0] == flight["stack"]["x"][-1]
+
+
+def test_durations_are_rows_only_where_the_times_do_not_see_to_it():
+    def labels(**times):
+        problem, phase = integrator(**times)
+        problem.minimize("time", phase.tf)
+        return [label for label in DFET(1, 1).transcribe(problem).g_labels if "duration" in label]
+
+    assert labels(tf=(1, 5)) == []
+    assert labels(tf=(1, 5), duration=(2, 4)) == []
+    assert labels(t0=(0, 4), tf=(1, 5)) == ["duration of 'run'"]
+    assert labels(t0=(0, 4), tf=(5, 9)) == []
+    assert labels(t0=(0, 4), tf=(5, 9), duration=(2, 3)) == ["duration of 'run'"]
