@@ -41,6 +41,14 @@ def check_problem(problem: Any, transcription: Any) -> None:
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
 
 
+def check_freedom(nlp: NLP) -> None:
+    """Raise ValueError if there is nothing to search."""
+    if not len(nlp.free):
+        raise ValueError(
+            f"problem '{nlp.problem.name}' leaves nothing to decide: no control, no parameter, no free time and no free initial state"
+        )
+
+
 def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
 

@@ -19,7 +19,7 @@ from .bilevel import Bilevel
 from .blackbox import BlackBox
 from .evaluation import Evaluator
 from .front import Front
-from .inputs import beginning, check_problem, check_run, decisions
+from .inputs import beginning, check_freedom, check_problem, check_run, decisions
 from .monitor import Progress
 from .results import black_box_front, trajectory_front
 from .running import Run
@@ -42,7 +42,7 @@ class Solver(ABC):
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
         """One iteration, within the budget of evaluations."""
 
-    def check_objectives(self, m: int) -> None:
+    def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
         """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
 
     def solve(
@@ -99,6 +99,7 @@ class Solver(ABC):
         check_problem(problem, transcription)
         solver = inner_solver(inner)
         nlp = transcription.transcribe(problem)
+        check_freedom(nlp)
         self.check_objectives(len(nlp.problem.goals))
         about = {"inner": inner if isinstance(inner, str) else repr(inner)}
         run = Run(

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .compiled import Variable
+from .compiled import Limit, Variable
 
 
 def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
@@ -80,6 +80,18 @@ def scale(value: Any, default: float, what: str) -> float:
     if result <= 0:
         raise ValueError(f"the scale of {what} must be positive, not {result:g}")
     return result
+
+
+def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
+    """A row lower <= expression <= upper, of which one side may be missing.
+
+    What counts as one in it is, unless told, the span of the limits, or else 1; but at least a thousandth of a limit's size, so that at the
+    usual tolerance of 1e-6 no limit has to hold to more than nine digits, which scaled solvers cannot reach.
+    """
+    low, high = one_sided(lower, upper, what)
+    finite = [abs(side) for side in (low, high) if math.isfinite(side)]
+    default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
+    return Limit(name, low, high, scale(given_scale, default, what))
 
 
 def one_sided(lower: Any, upper: Any, what: str) -> tuple[float, float]:

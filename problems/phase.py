@@ -117,10 +117,7 @@ class Phase:
     def path(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
         """Limit an expression all along the phase; an equality where both limits are the same."""
         what = self._new_name("path", name)
-        limits = checks.one_sided(lower, upper, what)
-        span = limits[1] - limits[0]
-        default = span if 0 < span < float("inf") else 1.0
-        self._paths[name] = Limit(name, *limits, checks.scale(scale, default, what)), self._expression(expr, what)
+        self._paths[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
 
     def initial(self, expr: Any) -> ca.MX:
         """The value of an expression of the phase's symbols at t0, for use in objectives and constraints."""

@@ -103,10 +103,7 @@ class Problem:
         """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases."""
         place = f"problem '{self.name}'"
         what = f"constraint '{checks.name_of('constraint', name, self._constraints, place)}' of {place}"
-        limits = checks.one_sided(lower, upper, what)
-        span = limits[1] - limits[0]
-        default = span if 0 < span < float("inf") else 1.0
-        self._constraints[name] = Limit(name, *limits, checks.scale(scale, default, what)), self._expression(expr, what)
+        self._constraints[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
 
     def link(self, first: Phase, second: Phase, *, states: Any = None) -> None:
         """Make phase `second` begin when and where phase `first` ends.

@@ -36,7 +36,7 @@ def test_goddard_on_the_papers_mesh() -> None:
 
 
 def test_orbit_rise_on_the_papers_mesh() -> None:
-    for seed in range(1, 4):
+    for seed in range(1, 6):
         front = MACS(agents=10, archive=10, refine=False).solve(load("orbit_rise"), DFET(30, 1), evaluations=10_000, seed=seed)
         distance, inverted = indicators(front, orbit_rise.reference())
         print(f"orbit rise, seed {seed}: GD {distance:.2e}, IGD {inverted:.4f}")

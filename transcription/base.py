@@ -140,9 +140,11 @@ class NLP:
 
     def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         F, g = (np.array(value).T for value in self.functions(Z.T))
-        outside = np.maximum(self.lower - Z, Z - self.upper) / self.scale
-        rows = np.maximum(self.g_lower - g, g - self.g_upper) / self.g_scale
-        return F, np.maximum(np.hstack([outside, rows]), 0.0)
+        # Numbers that overflowed are told by what comes back, not by warnings.
+        with np.errstate(invalid="ignore"):
+            outside = np.maximum(self.lower - Z, Z - self.upper) / self.scale
+            rows = np.maximum(self.g_lower - g, g - self.g_upper) / self.g_scale
+            return F, np.maximum(np.hstack([outside, rows]), 0.0)
 
     @cached_property
     def _bound_labels(self) -> tuple[str, ...]:

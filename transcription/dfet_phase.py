@@ -144,7 +144,8 @@ def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
 
     def over(function: ca.Function, tau: np.ndarray, states: ca.MX) -> ca.MX:
         times = start + 0.5 * h * ca.DM(1.0 + tau).T
-        return function.map(len(tau))(states, law @ ca.DM(tables.control(tau)).T, times, ca.repmat(s, 1, len(tau)))
+        controls = _wrapped(law @ ca.DM(tables.control(tau)).T, phase)
+        return function.map(len(tau))(states, controls, times, ca.repmat(s, 1, len(tau)))
 
     inside = X @ ca.DM(tables.state(tables.tau)).T
     closed = ca.horzcat(left, inside, right)
@@ -154,23 +155,36 @@ def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
     paths = over(phase.path, tables.points, closed)
     peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown).T)
-    ends = ca.vec(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T)
+    ends = ca.vec(_wrapped(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
     return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)
 
 
 def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
     """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
-    columns = ca.horzsplit(U) if U.shape[1] > 1 else [U]
-    period = np.array([v.period or 0.0 for v in phase.controls])
+    period, divisor, _ = _periods(phase)
     if not period.any():
         return U
-    divisor = np.where(period > 0, period, 1.0)
-    law = [columns[0]]
-    for column in columns[1:]:
-        step = column - law[-1]
-        law.append(law[-1] + step - period * ca.floor(step / divisor + 0.5))
+    law = ca.horzsplit(U)
+    for k in range(1, len(law)):
+        step = law[k] - law[k - 1]
+        law[k] = law[k - 1] + step - period * ca.floor(step / divisor + 0.5)
     return ca.horzcat(*law)
+
+
+def _wrapped(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Controls (nu, k) of which the periodic ones are brought back into their bounds: see `trajectory.wrapped`."""
+    period, divisor, lower = _periods(phase)
+    if not period.any():
+        return controls
+    turns = [ca.floor((column - lower) / divisor) for column in ca.horzsplit(controls)]
+    return controls - ca.repmat(ca.DM(period), 1, controls.shape[1]) * ca.horzcat(*turns)
+
+
+def _periods(phase: CompiledPhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Periods of the controls (nu,), 0 where there is none; the same to divide by; lower bounds."""
+    period = np.array([v.period or 0.0 for v in phase.controls])
+    return period, np.where(period > 0, period, 1.0), np.array([v.lower for v in phase.controls])
 
 
 def _propagation(element: ca.Function, n: int, tables: Tables, phase: CompiledPhase) -> ca.Function:

@@ -59,7 +59,7 @@ def _dense(path: object, flown: PhaseTrajectory, parameters: np.ndarray) -> tupl
     elements = range(len(edges) - 1)
     times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in elements])
     states = np.concatenate([flown.state.on_element(j, DENSE) for j in elements])
-    controls = np.concatenate([flown.control.on_element(j, DENSE) for j in elements])
+    controls = np.concatenate([flown.controls_on(j, DENSE) for j in elements])
     s = np.concatenate([[flown.t0, flown.tf], parameters])
     paths = np.array(path(states.T, controls.T, times[None], s)).T  # type: ignore[operator]
     return states, controls, paths.reshape(len(times), -1)

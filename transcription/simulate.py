@@ -14,7 +14,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import expanded
 from .sampling import DENSE, excess
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, wrapped
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 MOST_CALLS = 200_000
@@ -170,7 +170,7 @@ def _fly(
         elements.append(dense[:, :nx])
     times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in range(len(elements))])
     states = np.concatenate(elements)
-    controls = np.concatenate([planned.control.on_element(j, DENSE) for j in range(len(elements))])
+    controls = np.concatenate([planned.controls_on(j, DENSE) for j in range(len(elements))])
     inputs = states.T, controls.T, times[None], s
     paths = np.array(phase.path(*inputs)).T.reshape(len(times), len(phase.paths))
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
@@ -179,7 +179,7 @@ def _fly(
         planned,
         time=times[kept],
         states=states[kept],
-        controls=wrapped(controls[kept], phase.controls),
+        controls=controls[kept],
         paths=paths[kept],
         state=PiecewisePolynomial(edges, np.array(elements), "lobatto"),
     )
@@ -230,7 +230,7 @@ def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: 
         if calls > MOST_CALLS:
             raise ArithmeticError("the integrator gets nowhere")
         x[:], time[0] = y[:nx], t
-        u[:] = planned.control.on_element(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
+        u[:] = planned.controls_on(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
         trigger()
         return out.copy()
 

@@ -98,6 +98,10 @@ class PhaseTrajectory:
             raise KeyError(f"phase '{self.name}' has no '{name}'; it has {', '.join(self.names)}")
         return np.hstack([self.states, self.controls, self.paths])[:, self.names.index(name)]
 
+    def controls_on(self, j: int, tau: np.ndarray) -> np.ndarray:
+        """Controls (len(tau), nu) on element `j` at local coordinates `tau` in [-1, 1], within the bounds of those that are periodic."""
+        return wrapped(self.control.on_element(j, tau), self.control_variables)
+
     def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
         """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.
 

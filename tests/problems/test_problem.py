@@ -213,6 +213,7 @@ def test_default_scales_are_spans():
     problem, phase = glider()
     phase.path("load", phase["flap"], lower=-2, upper=3)
     phase.path("lift", phase["flap"], lower=-2)
+    phase.path("heat", phase["flap"] * 1e6, upper=3e6)
     phase.path("trim", phase["flap"], lower=1, upper=1)
     phase.state("speed", bounds=(-4, 4), scale=100)
     phase._rates |= {"speed": ca.MX(0)}
@@ -220,7 +221,7 @@ def test_default_scales_are_spans():
     problem.constraint("exact", phase.tf, lower=2, upper=2, scale=9)
     compiled = problem.compile()
     assert [v.scale for v in compiled.phases[0].states] == [10, 100]
-    assert [v.scale for v in compiled.phases[0].paths] == [5, 1, 1]
+    assert [v.scale for v in compiled.phases[0].paths] == [5, 1, 3000, 1]
     assert [v.scale for v in compiled.limits] == [5, 9]
 
 

@@ -1,0 +1,113 @@
+"""What all solvers share: checks before any work, ends before the budget, and what comes back."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from macs import MACS, Progress
+from problems import Problem, load
+from transcription import DFET
+
+MESH = DFET(3, 2)
+
+
+def test_nothing_to_decide() -> None:
+    problem = Problem("falling stone")
+    fall = problem.phase("fall", t0=0, tf=1)
+    height = fall.state("height", bounds=(-10, 10), initial=5)
+    fall.dynamics(height=-1)
+    problem.maximize("height", fall.final(height))
+    with pytest.raises(ValueError, match="'falling stone' leaves nothing to decide"):
+        MACS().solve(problem, MESH, evaluations=10)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"evaluations": 0}, "evaluations"),
+        ({"evaluations": 2.5}, "evaluations"),
+        ({"seed": -1}, "seed"),
+        ({"tolerance": 0}, "tolerance"),
+        ({"tolerance": float("nan")}, "tolerance"),
+        ({"time_limit": -1}, "time_limit"),
+        ({"inner": "magic"}, "magic"),
+        ({"callback": 3}, "callback"),
+        ({"checkpoint": "there.nc"}, "checkpoint"),
+        ({"start": np.zeros((2, 7))}, "7 entries"),
+        ({"start": np.full((1, 9 + 1), np.nan)}, "start"),
+        ({"start": "nonsense"}, "start"),
+    ],
+)
+def test_arguments_that_make_no_sense(wrong: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        MACS().solve(load("orbit_rise"), MESH, **{"evaluations": 50, **wrong})
+
+
+def test_things_that_are_no_problem_or_transcription() -> None:
+    with pytest.raises(ValueError, match="problem must be a Problem, not str"):
+        MACS().solve("goddard", MESH, evaluations=50)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="transcription must be"):
+        MACS().solve(load("goddard"), "dfet:4x6", evaluations=50)  # type: ignore[arg-type]
+
+
+def test_an_archive_smaller_than_the_objectives() -> None:
+    with pytest.raises(ValueError, match="archive"):
+        MACS(archive=1).solve(load("goddard"), MESH, evaluations=50)
+
+
+def test_a_callback_sees_progress_and_stops_the_search() -> None:
+    seen: list[Progress] = []
+
+    def callback(progress: Progress) -> bool:
+        seen.append(progress)
+        assert len(progress.front) == progress.archive
+        return progress.evaluations > 200
+
+    front = MACS().solve(load("orbit_rise"), MESH, evaluations=5000, seed=1, callback=callback)
+    assert front.stats["stopped"] == "callback"
+    assert not front.stats["reproducible"]
+    assert seen[-1].evaluations == front.stats["evaluations"] < 5000
+    assert seen[-1].ideal["flight time"] == front.objectives[:, 0].min()
+
+
+def test_a_time_limit_keeps_what_was_found() -> None:
+    front = MACS().solve(load("orbit_rise"), MESH, evaluations=10**6, seed=1, time_limit=0.5)
+    assert front.stats["stopped"] == "time limit"
+    assert not front.stats["reproducible"]
+    assert len(front) > 0
+
+
+def test_an_interrupt_keeps_what_was_found() -> None:
+    before = signal.getsignal(signal.SIGINT)
+
+    def press(progress: Progress) -> None:
+        if progress.evaluations > 100:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    front = MACS().solve(load("orbit_rise"), MESH, evaluations=5000, seed=1, callback=press)
+    assert front.stats["stopped"] == "interrupted"
+    assert len(front) > 0
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_start_is_used_and_never_made_worse() -> None:
+    first = MACS().solve(load("orbit_rise"), MESH, evaluations=300, seed=1)
+    again = MACS().solve(load("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
+    for row in first.F:
+        assert not (row < again.F).all(axis=1).all()
+    best = first.F.min(axis=0)
+    assert (again.F.min(axis=0) <= best).all()
+    assert len(MACS().solve(load("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
+
+
+def test_a_guess_is_among_the_first() -> None:
+    problem = load("orbit_rise")
+    problem.phases["rise"].guess(u=1.5, tf=50.0)
+    front = MACS().solve(problem, MESH, evaluations=1, seed=1)
+    assert len(front) == 1
+    assert front[0].objectives["flight time"] == 50.0
+    np.testing.assert_allclose(front[0].trajectory["rise"]["u"], 1.5)
