@@ -74,7 +74,7 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None) -> np.n
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)] = True
     inside = fixed.copy() if members is None else fixed | members
-    energy = energies @ inside
+    energy = energies[:, inside].sum(axis=1)
     while np.count_nonzero(inside) > limit:  # an extreme that came in makes room for itself
         _flip(inside, energy, energies, np.argmax(np.where(inside & ~fixed, energy, -np.inf)))
     while np.count_nonzero(inside) < limit:

@@ -69,7 +69,8 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
     """
     count = len(experience)
     weights = rng.standard_normal((len(X), count)) / np.sqrt(count) + 1.0 / count
-    return box.put_back(X + weights @ experience)
+    # Not a matrix product: those of BLAS may sum in another order with another number of threads.
+    return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
 
 
 def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
