@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from macs.dominance import extremes, nondominated
+from .dominance import extremes, nondominated
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from macs.agent import NO_DIRECTION
-from macs.box import Box
-from macs.directions import tchebycheff
-from macs.dominance import constrained_dominates
-from macs.evaluation import Evaluation, Evaluator
+from .agent import NO_DIRECTION
+from .box import Box
+from .directions import tchebycheff
+from .dominance import constrained_dominates
+from .evaluation import Evaluation, Evaluator
 
 if TYPE_CHECKING:
-    from macs.macs import MACS
-    from macs.search import SearchState
+    from .macs import MACS
+    from .search import SearchState
 
 CREDIT = 0.5
 """Least part of a proposed step that must have been achieved for the radius to take it as its own success."""

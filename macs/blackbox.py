@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from macs.evaluation import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
+from .evaluation import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
 
 SENSES = ("minimize", "maximize")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from macs.box import Box
+from .box import Box
 
 
 def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:

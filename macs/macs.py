@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from macs import search
-from macs.evaluation import Evaluator
-from macs.search import SearchState
-from macs.solver import Solver
+from . import search
+from .evaluation import Evaluator
+from .search import SearchState
+from .solver import Solver
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from macs import archive as archives
-from macs import directions, individual, social
-from macs.agent import NO_DIRECTION, Agents
-from macs.archive import Archive
-from macs.attempts import Attempts
-from macs.box import Box
-from macs.evaluation import Evaluation, Evaluator
+from . import archive as archives
+from . import directions, individual, social
+from .agent import NO_DIRECTION, Agents
+from .archive import Archive
+from .attempts import Attempts
+from .box import Box
+from .evaluation import Evaluation, Evaluator
 
 if TYPE_CHECKING:
-    from macs.macs import MACS
+    from .macs import MACS
 
 
 @dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from macs.box import Box
+from .box import Box
 
 
 def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
