@@ -26,7 +26,6 @@ class Bilevel(Evaluator):
 
     def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float) -> None:
         self.nlp, self.inner, self.tolerance = nlp, inner, tolerance
-        self.m = len(nlp.problem.goals)
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
         self.counts = Counts()
@@ -37,5 +36,5 @@ class Bilevel(Evaluator):
 
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
-        evaluation = Evaluation(found.z, found.F, found.violation, found.status, found.moved)
+        evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked)
         return evaluation, int(np.sum(found.iterations))

@@ -32,25 +32,26 @@ class Evaluation:
         Largest scaled residual of any constraint, 0 where there is none, infinite where the evaluation failed.
     status : array (k,) of str
         "converged" (feasible within the tolerance), "infeasible", "failed" or "timeout".
-    moved : array (k,)
-        Euclidean distance that the inner level moved the free variables, each divided by the span of its bounds.
+    clocked : bool
+        Whether a clock ended any of the work: then the same vectors need not give the same batch again.
     """
 
     Z: np.ndarray
     F: np.ndarray
     violation: np.ndarray
     status: np.ndarray
-    moved: np.ndarray
+    clocked: bool = False
 
 
 @dataclass
 class Counts:
-    """What a run has spent so far. `failures` counts the statuses that are not "converged"."""
+    """What a run has spent so far: `failures` are the statuses that are not "converged", `clocked` the batches that a clock cut short."""
 
     evaluations: int = 0
     inner_iterations: int = 0
     gradient_solves: int = 0
     failures: Counter[str] = field(default_factory=Counter)
+    clocked: int = 0
 
 
 class Evaluator(ABC):
@@ -60,8 +61,6 @@ class Evaluator(ABC):
 
     Attributes
     ----------
-    m : int
-        Number of objectives.
     free : array (d,) of int
         Indices, in the full vector, of the variables that a search may alter.
     lower, upper : arrays (d,)
@@ -75,7 +74,6 @@ class Evaluator(ABC):
         Called without arguments before each batch; it may end the search by raising an exception.
     """
 
-    m: int
     free: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
@@ -98,5 +96,6 @@ class Evaluator(ABC):
         evaluation, iterations = self._evaluate(Z)
         self.counts.evaluations += len(Z)
         self.counts.inner_iterations += iterations
+        self.counts.clocked += evaluation.clocked
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation

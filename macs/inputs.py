@@ -59,6 +59,7 @@ def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
     if start is not None:
+        _check_names(start, nlp.variables)
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))
@@ -75,6 +76,7 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     ValueError
         If they have another length, are no numbers, or lie outside the bounds; the message names the variable.
     """
+    _check_names(start, variables)
     Z = _array(start)
     if Z.shape[1] != len(variables):
         raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected; a start belongs to one problem and mesh")
@@ -85,6 +87,14 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
         v = variables[column]
         raise ValueError(f"start: decision {row} has {v.name} = {Z[row, column]:g}, outside its bounds ({v.lower:g}, {v.upper:g})")
     return np.clip(Z, lower, upper)
+
+
+def _check_names(start: Any, variables: Sequence[Variable]) -> None:
+    """Refuse a Front or Points whose decisions are of other variables."""
+    points = [start] if isinstance(start, Point) else start
+    for point in points if isinstance(points, Front | list | tuple) else ():
+        if isinstance(point, Point) and [v.name for v in point.variables] != [v.name for v in variables]:
+            raise ValueError("start: the points are of other variables; a start belongs to one problem and mesh")
 
 
 def _array(start: Any) -> np.ndarray:

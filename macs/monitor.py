@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from .front import Front
 
@@ -93,7 +95,8 @@ class Monitor(AbstractContextManager["Monitor"]):
     def after_iteration(self, progress: Progress) -> None:
         """Pass progress on to display and callback; raise `Stopped` if the callback returns True."""
         self.show(progress)
-        if self._callback is not None and self._callback(progress) is True:
+        answer = None if self._callback is None else self._callback(progress)
+        if isinstance(answer, bool | np.bool_) and answer:
             raise Stopped("callback")
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from problems.compiled import Variable
     from transcription.simulate import Simulation
     from transcription.trajectory import Trajectory
 
@@ -55,6 +56,11 @@ class Point:
     def decision(self) -> np.ndarray:
         """The decision vector, in the user's units; `front.variables` names its entries."""
         return self._front.decision[self.index, : self._front.lengths[self.index]]
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """What the entries of the decision vector are."""
+        return self._front.variables
 
     @property
     def parameters(self) -> dict[str, float]:

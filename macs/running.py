@@ -12,7 +12,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from .evaluation import TIMEOUT, Evaluator
+from .evaluation import Evaluator
 from .front import Front
 from .monitor import Monitor, Progress, Stopped
 
@@ -93,7 +93,7 @@ class Run:
             "seed": self.seed,
             "tolerance": self.evaluator.tolerance,
             "stopped": stopped,
-            "reproducible": stopped in ("budget", "idle") and not counts.failures[TIMEOUT],
+            "reproducible": stopped in ("budget", "idle") and not counts.clocked,
         }
 
     def _standing(self, monitor: Monitor) -> Progress:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from os import PathLike
 from typing import Any
 
@@ -77,7 +77,8 @@ class Solver(ABC):
         start : Front, Points or array (k, n), optional
             Decisions to begin with: all variables, or the free ones only.
         time_limit : float, optional
-            Seconds after which the search ends with what it has. A safety net: a run that it ends is recorded as not reproducible.
+            Seconds after which the search ends with what it has; looked at before each batch but the first, like Ctrl-C. A safety net: a
+            run that it ends is recorded as not reproducible.
         progress : bool
             Show how the search stands on the terminal.
         callback : callable, optional
@@ -101,12 +102,13 @@ class Solver(ABC):
         nlp = transcription.transcribe(problem)
         check_freedom(nlp)
         self.check_objectives(len(nlp.problem.goals))
-        about = {"inner": inner if isinstance(inner, str) else repr(inner)}
+        about = self._about()
+        level = {"inner": inner if isinstance(inner, str) else repr(inner)}
         run = Run(
             self,
             Bilevel(nlp, solver, float(tolerance)),
             goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, self._about(), stats | about),
+            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level),
             budget=evaluations,
             seed=seed,
             start=beginning(start, nlp),
@@ -164,6 +166,8 @@ class Solver(ABC):
         sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
         variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
 
+        about = self._about()
+
         def goals() -> tuple[Objective, ...]:
             return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
 
@@ -171,7 +175,7 @@ class Solver(ABC):
             self,
             box,
             goals=goals,
-            make_front=lambda state, stats: black_box_front(state.archive, state.closest, goals(), variables, self._about(), stats),
+            make_front=lambda state, stats: black_box_front(state.archive, state.closest, goals(), variables, about, stats),
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),
@@ -179,4 +183,6 @@ class Solver(ABC):
         return run.go(time_limit, progress, callback)
 
     def _about(self) -> dict[str, Any]:
-        return {"name": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
+        if not is_dataclass(self):
+            raise TypeError(f"{type(self).__name__} must be a dataclass of its settings, which its fronts record")
+        return {"name": type(self).__name__, "settings": asdict(self)}

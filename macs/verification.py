@@ -2,7 +2,7 @@
 
 1. Are the trajectories that are stored those of the decision vectors that are stored?
 2. Does the transcription, evaluated anew, give the objectives that are stored, and a feasible point?
-3. Flown by an independent integrator, do the controls lead where the transcription says, and to a feasible flight?
+3. Flown by an independent integrator, do the controls lead where the transcription says, to a feasible flight and to its objectives?
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from transcription import from_dict
-from transcription.base import NLP
-from transcription.simulate import simulate
+from transcription.base import NLP, Transcription
+from transcription.simulate import Simulation, simulate
 from transcription.trajectory import PhaseTrajectory
 
+from .evaluation import CONVERGED
 from .front import Front
 from .point import Point
 
@@ -43,6 +44,9 @@ class Check:
         Largest defect of the independent integration.
     flown : float
         Largest violation of the flown trajectory.
+    missed : float
+        Largest difference between the objectives that are stored and those that are flown, integrals and peaks included, in
+        `objective_scales`.
     reasons : tuple of str
         Why the point fails; empty if it does not.
     """
@@ -53,6 +57,7 @@ class Check:
     objectives: float
     defect: float
     flown: float
+    missed: float
     reasons: tuple[str, ...]
 
     @property
@@ -61,7 +66,15 @@ class Check:
         return not self.reasons
 
 
-def verify(front: Front, *, tolerance: float, rtol: float = 1e-10, atol: float = 1e-11, method: str = "DOP853") -> list[Check]:
+def verify(
+    front: Front,
+    *,
+    tolerance: float,
+    rtol: float = 1e-10,
+    atol: float = 1e-11,
+    method: str = "DOP853",
+    transcription: Transcription | None = None,
+) -> list[Check]:
     """Check every point of a front.
 
     Parameters
@@ -69,10 +82,12 @@ def verify(front: Front, *, tolerance: float, rtol: float = 1e-10, atol: float =
     front : Front
         Of a problem that is known or can be loaded.
     tolerance : float
-        Largest defect and violation of a flown trajectory that pass. The transcription's own violation is held against the front's
+        Largest defect, violation and miss of a flown trajectory that pass. The transcription's own violation is held against the front's
         tolerance.
     rtol, atol, method
         Of the integrator; see `Point.simulate`.
+    transcription : Transcription, optional
+        That of the front, if it is none of this project's.
 
     Returns
     -------
@@ -87,25 +102,43 @@ def verify(front: Front, *, tolerance: float, rtol: float = 1e-10, atol: float =
     problem = front.compiled()
     if front.transcription is None:
         raise ValueError("the front does not say how its problem was transcribed")
-    nlp = from_dict(front.transcription).transcribe(problem)
+    nlp = (transcription or from_dict(front.transcription)).transcribe(problem)
     if tuple(v.name for v in nlp.variables) != tuple(v.name for v in front.variables):
         raise ValueError(f"the decision vectors of this front ({len(front.variables)} entries) are not those of its transcription")
+    scales, limit = objective_scales(front), front.stats["tolerance"]
 
     def check(index: int, point: Point) -> Check:
         mismatch, where = _mismatch(point, nlp)
         objectives, violation, worst = _recomputed(point, nlp)
-        defect, flown, most = _flown(point, problem, rtol, atol, method)
-        limit = front.stats["tolerance"]
+        defect, flown, most, miss = _flown(point, problem, scales, rtol, atol, method)
         failures = (
             (not mismatch <= EQUAL, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
             (not objectives <= EQUAL, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
+            (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, recomputed {violation:.1e}"),
+            (point.status != CONVERGED, f"its status is '{point.status}'"),
             (not violation <= limit, f"violates '{worst}' by {violation:.1e} (tolerance {limit:.0e})"),
             (not defect <= tolerance, f"flown, it ends {defect:.1e} away (tolerance {tolerance:.1e})"),
             (not flown <= tolerance, f"flown, it violates '{most}' by {flown:.1e} (tolerance {tolerance:.1e})"),
+            (not miss <= tolerance, f"flown, its objectives differ by {miss:.1e} (tolerance {tolerance:.1e})"),
         )
-        return Check(index, mismatch, violation, objectives, defect, flown, tuple(reason for wrong, reason in failures if wrong))
+        return Check(index, mismatch, violation, objectives, defect, flown, miss, tuple(reason for wrong, reason in failures if wrong))
 
     return [check(index, point) for index, point in enumerate(front)]
+
+
+def objective_scales(front: Front) -> np.ndarray:
+    """What counts as one in each objective (m,): its own scale, or the largest size or the range that it has on the front."""
+    largest = np.abs(front.F).max(axis=0, initial=0.0)
+    found = np.maximum(largest, np.ptp(front.F, axis=0) if len(front) else 0.0)
+    given = [goal.scale or 0.0 for goal in front.goals]
+    return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
+
+
+def missed(flight: Simulation, point: Point, scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives and those of its flight, divided by `scales` (m,)."""
+    stored = point.objectives
+    difference = np.abs([flight.objectives[name] - value for name, value in stored.items()])
+    return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
 
 
 def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:
@@ -162,10 +195,12 @@ def _recomputed(point: Point, nlp: NLP) -> tuple[float, float, str]:
     return float(np.where(np.isnan(off), np.inf, off).max()), float(violation[0]), max(violations, key=lambda key: violations[key])
 
 
-def _flown(point: Point, problem: CompiledProblem, rtol: float, atol: float, method: str) -> tuple[float, float, str]:
-    """Largest defect and violation of the flown controls, and the constraint that is violated most."""
+def _flown(
+    point: Point, problem: CompiledProblem, scales: np.ndarray, rtol: float, atol: float, method: str
+) -> tuple[float, float, str, float]:
+    """Largest defect and violation of the flown controls, the constraint that is violated most, and the objectives' largest miss."""
     if point.trajectory is None:
-        return np.inf, np.inf, "everything"
+        return np.inf, np.inf, "everything", np.inf
     flight = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
     worst = max(flight.violations, key=lambda key: flight.violations[key], default="")
-    return flight.max_defect, flight.violation, worst
+    return flight.max_defect, flight.violation, worst, missed(flight, point, scales)

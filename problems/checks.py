@@ -85,8 +85,8 @@ def scale(value: Any, default: float, what: str) -> float:
 def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
     """A row lower <= expression <= upper, of which one side may be missing.
 
-    What counts as one in it is, unless told, the span of the limits, or else 1; but at least a thousandth of a limit's size, so that at the
-    usual tolerance of 1e-6 no limit has to hold to more than nine digits, which scaled solvers cannot reach.
+    What counts as one in it is, unless told, the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
+    the limit's size: so at the usual tolerance of 1e-6 none has to hold to more than nine digits, which scaled solvers cannot reach.
     """
     low, high = one_sided(lower, upper, what)
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]

@@ -115,7 +115,16 @@ class Phase:
         self._rates = {name: self._expression(rates[name], f"{place}: the rate of '{name}'") for name in self._states}
 
     def path(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
-        """Limit an expression all along the phase; an equality where both limits are the same."""
+        """Limit an expression all along the phase; an equality where both limits are the same.
+
+        Parameters
+        ----------
+        lower, upper : float, optional
+            At least one.
+        scale : float, optional
+            What counts as one in residuals. By default the span of two limits; of one limit, or an equality, 1 or a thousandth of its size,
+            whichever is larger.
+        """
         what = self._new_name("path", name)
         self._paths[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
 

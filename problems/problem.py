@@ -100,7 +100,7 @@ class Problem:
         return symbol
 
     def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
-        """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases."""
+        """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases; `scale` as in `Phase.path`."""
         place = f"problem '{self.name}'"
         what = f"constraint '{checks.name_of('constraint', name, self._constraints, place)}' of {place}"
         self._constraints[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
@@ -134,11 +134,15 @@ class Problem:
             self._open_links.add((numbers[0], numbers[1]))
 
     def minimize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
-        """Add an objective to be minimised: an expression of the same kind as a constraint's."""
+        """Add an objective to be minimised: an expression of the same kind as a constraint's.
+
+        `scale` is the difference in it that counts as one where objectives are compared, as `macs verify` does; by default that is found
+        from the front.
+        """
         self._objective(name, expr, unit, "minimize", scale)
 
     def maximize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
-        """Add an objective to be maximised: an expression of the same kind as a constraint's."""
+        """Add an objective to be maximised; otherwise as `minimize`."""
         self._objective(name, expr, unit, "maximize", scale)
 
     def guess(self, **parameters: float) -> None:

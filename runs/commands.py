@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import inspect
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from macs.point import Point
 from macs.solver import Solver
 from macs.storage import check_target
 from macs.tables import text_table
-from macs.verification import Check
+from macs.verification import Check, missed, objective_scales
 from macs.verification import verify as verify_front
 from problems import Problem
 from transcription.inner import NAMED
@@ -70,11 +70,13 @@ def solve(arguments: Namespace) -> int:
         # The disk filled up while the search went on: what it found is shown at least.
         print(front.table())
         raise
-    defects = [defect(point) for point in front]
-    print(front.table(defects=defects))
-    missing = sum(not value <= problem.verify_tolerance for value in defects)
+    scales = objective_scales(front)
+    flown = [as_flown(point, scales) for point in front]
+    defects = [defect for defect, _ in flown]
+    print(front.table(defects=defects, columns={"objectives off": [off for _, off in flown]}))
+    missing = sum(not max(pair) <= problem.verify_tolerance for pair in flown)
     if missing:
-        print(f"{missing} of {len(front)} points, flown, end more than {problem.verify_tolerance:g} away: see `macs verify {out}`.")
+        print(f"{missing} of {len(front)} points, flown, miss by more than {problem.verify_tolerance:g}: see `macs verify {out}`.")
     print(f"\nfront saved in {out}")
     if arguments.plot:
         draw(front, arguments.plot)
@@ -201,9 +203,12 @@ def check_picture(path: str | None) -> None:
 # What is printed
 
 
-def defect(point: Point) -> float:
-    """Largest defect of a point's flight."""
-    return np.inf if point.trajectory is None else point.simulate().max_defect
+def as_flown(point: Point, scales: np.ndarray) -> tuple[float, float]:
+    """Largest defect of a point's flight, and by how much its objectives differ from those flown, in `scales` (m,)."""
+    if point.trajectory is None:
+        return np.inf, np.inf
+    flight = point.simulate()
+    return flight.max_defect, missed(flight, point, scales)
 
 
 def draw(what: Front | Point, path: str) -> None:
@@ -239,17 +244,15 @@ def _ends(phase: Any) -> str:
     return text_table([["  state", "initial", "final", "least", "greatest"]], rows, [True, False, False, False, False])
 
 
-def verification_table(front: Front, checks: Iterable[Check]) -> str:
+def verification_table(front: Front, checks: Sequence[Check]) -> str:
     """A row for each point, and the reasons of those that fail."""
-    rows = [
-        [str(c.point), *(f"{value:.1e}" for value in (c.mismatch, c.objectives, c.violation, c.defect, c.flown)), "ok" if c.ok else "FAILS"]
-        for c in checks
-    ]
+    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.flown, c.missed) for c in checks]
+    rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
     headers = [
-        ["#", "trajectory", "objectives", "violation", "defect", "violation", ""],
-        ["", "stored - decision", "stored - anew", "anew", "flown", "flown", ""],
+        ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],
+        ["", "stored - decision", "stored - anew", "anew", "flown", "flown", "stored - flown", ""],
     ]
-    table = text_table(headers, rows, [False, False, False, False, False, False, True])
+    table = text_table(headers, rows, [False] * 7 + [True])
     reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 

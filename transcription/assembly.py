@@ -20,6 +20,8 @@ from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows
 from .trajectory import Trajectory
 
+PEAK_SAMPLES = 1024
+
 WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 
 
@@ -155,16 +157,18 @@ class Assembly:
         return Ends(slot_t0, slot_tf, np.array(initial), np.array(final), self.parameters)
 
     def _add_peaks(self, phase: CompiledPhase) -> np.ndarray:
-        """Slots of the phase's peaks: variables without bounds, of the size that the expression has in the middle of its range."""
+        """Slots of the phase's peaks: variables without bounds, of the largest size that the expression has anywhere."""
         count = phase.peaks.size1_out(0)
         if not count:
             return np.empty(0, dtype=int)
         groups = [phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *self.problem.parameters)]
-        middle = [np.array([0.5 * (v.lower + v.upper) for v in group]) for group in groups]
-        sizes = np.abs(np.array(phase.peaks(*middle))).ravel()
-        scales = np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
+        rng = np.random.default_rng(0)
+        anywhere = [np.array([rng.uniform(v.lower, v.upper, PEAK_SAMPLES) for v in group]).reshape(-1, PEAK_SAMPLES) for group in groups]
+        sizes = np.abs(np.array(phase.peaks(*anywhere)))
+        scales = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
         names = [f"{phase.name}.peak[{k}]" for k in range(count)]
-        return np.array([self.layout.add(Variable(n, -np.inf, np.inf, "", float(s))) for n, s in zip(names, scales, strict=True)])
+        variables = [Variable(name, -np.inf, np.inf, "", float(scale or 1.0)) for name, scale in zip(names, scales, strict=True)]
+        return np.array([self.layout.add(variable) for variable in variables])
 
     def _write_phase(self, i: int, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
         """Rows of phase i; its quantities q and the largest samples of its peaks."""
@@ -176,7 +180,8 @@ class Assembly:
         peak = pick(extended, peaks)
         for k in range(len(peaks)):
             samples = written.peak_samples[k, :]
-            rows.add(samples - peak[k], -np.inf, 0, self.layout.variables[peaks[k]].scale, f"peak of '{phase.name}'")
+            scale = self.layout.variables[peaks[k]].scale
+            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", marched=True)
         initials = phase.initials(first, written.first_control, s[0], s)
         finals = phase.finals(last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
@@ -198,8 +203,6 @@ class Assembly:
             rows.add(values[k], limit.lower, limit.upper, limit.scale, f"constraint '{limit.name}'")
 
     def _marches_exactly(self, rows: Rows) -> bool:
-        bare = all(label.startswith(("dynamics", "peak")) for label in rows.labels)
-        unbounded_ends = all(
-            limits == (v.lower, v.upper) for phase in self.problem.phases for v, limits in zip(phase.states, phase.final, strict=True)
-        )
-        return bare and unbounded_ends
+        phases = self.problem.phases
+        free_ends = all(limits == (v.lower, v.upper) for phase in phases for v, limits in zip(phase.states, phase.final, strict=True))
+        return free_ends and all(rows.marched)

@@ -52,7 +52,7 @@ class DFETPhase(PhaseWriter):
         )
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
-        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests))
+        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), marched=True)
         for k, limit in enumerate(phase.paths):
             rows.add(paths[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
         nu = len(phase.controls)
@@ -102,20 +102,19 @@ class DFETPhase(PhaseWriter):
         edges = s[0] + (s[1] - s[0]) * np.arange(self.n + 1) / self.n
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
-        inside = tables.state(tables.tau) @ extended[self.X]
-        closed = np.concatenate([B[:-1, None], inside, B[1:, None]], axis=1)
-        time = (edges[:-1, None] + 0.5 * (1.0 + tables.points[:-1]) * np.diff(edges)[:, None]).ravel()
-        time = np.append(time, edges[-1])
-        states = np.vstack([closed[:, :-1].reshape(-1, len(phase.states)), B[-1:]])
-        inner = tables.control(tables.points[:-1]) @ control.coefficients
-        controls = np.vstack([inner.reshape(len(time) - 1, len(phase.controls)), control.ends()[1][-1:]])
+        closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)
+        points = tables.points[:-1]
+        time = np.append((edges[:-1, None] + 0.5 * (1.0 + points) * np.diff(edges)[:, None]).ravel(), edges[-1])
+        states = np.vstack([(tables.flown(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
+        inner = (tables.control(points) @ control.coefficients).reshape(len(time) - 1, len(phase.controls))
+        controls = wrapped(np.vstack([inner, control.ends()[1][-1:]]), phase.controls)
         paths = np.array(phase.path(states.T, controls.T, time[None], s)).T
         return PhaseTrajectory(
             name=phase.name,
             time_unit=phase.time_unit,
             time=time,
             states=states,
-            controls=wrapped(controls, phase.controls),
+            controls=controls,
             paths=paths.reshape(len(time), len(phase.paths)),
             state=PiecewisePolynomial(edges, closed, "closed-legendre"),
             control=control,
@@ -148,13 +147,13 @@ def _element(tables: Tables, phase: CompiledPhase) -> ca.Function:
         return function.map(len(tau))(states, controls, times, ca.repmat(s, 1, len(tau)))
 
     inside = X @ ca.DM(tables.state(tables.tau)).T
-    closed = ca.horzcat(left, inside, right)
+    closed = ca.horzcat(left, X @ ca.DM(tables.state(tables.stages)).T, right)
     rates = over(phase.dynamics, tables.tau, inside)
     first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
     weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
-    paths = over(phase.path, tables.points, closed)
-    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown).T)
+    paths = over(phase.path, tables.points, closed @ ca.DM(tables.flown(tables.points)).T)
+    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown(tables.dense)).T)
     ends = ca.vec(_wrapped(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
     return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)

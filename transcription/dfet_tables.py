@@ -22,10 +22,9 @@ class Tables:
         Gauss-Legendre quadrature, nq = max(l, q) + 1.
     points, dense : arrays
         Where path constraints are imposed: both ends and the quadrature nodes; where peaks are sampled: also halfway between these.
-    flown : array (len(dense), nq + 2)
-        Interpolates to `dense` from values at `points`. Through the left end and the quadrature nodes passes the collocation polynomial of
-        the equivalent Runge-Kutta method, of degree l + 1; it meets the right end, too, and is more accurate by one order than the states'
-        own polynomial of degree l.
+    stages : array (l + 1,)
+        Gauss-Legendre nodes of the equivalent Runge-Kutta method. Through the states there and at both ends passes its collocation
+        polynomial, which is more accurate by one order than the states' own polynomial of degree l.
     mass : array (l + 1, l + 2)
         Integrals of a state function times the derivative of a test function: exact.
     test : array (nq, l + 2)
@@ -39,7 +38,7 @@ class Tables:
         self.tau, self.weights = polynomials.gauss_legendre(max(order, control_order) + 1)
         self.points = np.array([-1.0, *self.tau, 1.0])
         self.dense = np.sort(np.concatenate([self.points, 0.5 * (self.points[1:] + self.points[:-1])]))
-        self.flown = polynomials.basis_matrix("closed-legendre", len(self.points) - 1, self.dense)
+        self.stages = polynomials.gauss_legendre(order + 1)[0]
         derivative = polynomials.basis_derivative(basis, order + 1, self.tau)
         self.mass = self.state(self.tau).T @ (self.weights[:, None] * derivative)
         self.test = self.weights[:, None] * polynomials.basis_matrix(basis, order + 1, self.tau)
@@ -47,6 +46,10 @@ class Tables:
     def state(self, tau: np.ndarray) -> np.ndarray:
         """State functions at `tau` (k,), shape (k, l + 1)."""
         return polynomials.basis_matrix(self.state_basis, self.order, tau)
+
+    def flown(self, tau: np.ndarray) -> np.ndarray:
+        """What the collocation polynomial at `tau` (k,) takes of the states at both ends and, in between, at the stages, (k, l + 3)."""
+        return polynomials.basis_matrix("closed-legendre", self.order + 2, tau)
 
     def control(self, tau: np.ndarray) -> np.ndarray:
         """Control functions at `tau` (k,), shape (k, q + 1)."""

@@ -39,13 +39,20 @@ class Rows:
     upper: list[np.ndarray] = field(default_factory=list)
     scale: list[np.ndarray] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
+    marched: list[bool] = field(default_factory=list)
 
-    def add(self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str]) -> None:
-        """A matrix of rows, taken column by column; limits, scale and label one for each or one for all."""
+    def add(
+        self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, marched: bool = False
+    ) -> None:
+        """A matrix of rows, taken column by column; limits, scale and label one for each or one for all.
+
+        `marched` rows are satisfied by propagation, where no final value is imposed.
+        """
         count = expression.numel()
         self.expressions.append(ca.vec(expression))
         for target, value in ((self.lower, lower), (self.upper, upper), (self.scale, scale)):
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
+        self.marched.append(marched)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
 
 

@@ -195,13 +195,14 @@ def _element(
 ) -> np.ndarray:
     """States and integrals (len(DENSE), ny) on element j from `y` at its beginning; NaN if the integration breaks down."""
     t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
-    if not np.isfinite(y).all() or t1 <= t0:
-        return np.broadcast_to(y if t1 <= t0 else np.full_like(y, np.nan), (len(DENSE), len(y)))
-    right_hand_side = _right_hand_side(phase, planned, j, s)
     times = t0 + 0.5 * (1.0 + DENSE) * (t1 - t0)
     times[-1] = t1
+    if not (np.diff(times) > 0).all():
+        # An element of no length, or of one that rounding swallows.
+        return np.broadcast_to(y, (len(DENSE), len(y)))
     nowhere = np.full((len(DENSE), len(y)), np.nan)
-    if not np.isfinite(right_hand_side(t0, y)).all():
+    right_hand_side = _right_hand_side(phase, planned, j, s)
+    if not (np.isfinite(y).all() and np.isfinite(right_hand_side(t0, y)).all()):
         return nowhere
     try:
         solution = solve_ivp(right_hand_side, (t0, t1), y, method=method, rtol=max(rtol, 3e-14), atol=atol, t_eval=times)

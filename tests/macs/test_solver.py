@@ -11,6 +11,7 @@ import pytest
 from macs import MACS, Progress
 from problems import Problem, load
 from transcription import DFET
+from transcription.inner import Ipopt
 
 MESH = DFET(3, 2)
 
@@ -65,7 +66,7 @@ def test_a_callback_sees_progress_and_stops_the_search() -> None:
     def callback(progress: Progress) -> bool:
         seen.append(progress)
         assert len(progress.front) == progress.archive
-        return progress.evaluations > 200
+        return np.bool_(progress.evaluations > 200)  # type: ignore[return-value] - what comparing arrays gives
 
     front = MACS().solve(load("orbit_rise"), MESH, evaluations=5000, seed=1, callback=callback)
     assert front.stats["stopped"] == "callback"
@@ -111,3 +112,16 @@ def test_a_guess_is_among_the_first() -> None:
     assert len(front) == 1
     assert front[0].objectives["flight time"] == 50.0
     np.testing.assert_allclose(front[0].trajectory["rise"]["u"], 1.5)
+
+
+def test_a_start_of_another_problem_is_refused() -> None:
+    other = MACS().solve(load("orbit_rise"), DFET(4, 1), evaluations=30, seed=1)
+    with pytest.raises(ValueError, match="other variables"):
+        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=other)
+    with pytest.raises(ValueError, match="other variables"):
+        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=[other[0]])
+
+
+def test_a_clock_makes_a_run_not_reproducible() -> None:
+    front = MACS().solve(load("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
+    assert not front.stats["reproducible"]

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import casadi as ca
 import numpy as np
 import pytest
 from synthetic_fronts import black_box, flights
@@ -9,7 +10,7 @@ from synthetic_fronts import black_box, flights
 import problems
 from macs import MACS, Front
 from macs.verification import verify
-from transcription import parse
+from transcription import DFET, parse
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +77,22 @@ def test_what_cannot_be_verified_says_why(front):
     other = {"method": "DFET", "settings": {"elements": 3, "order": 4}}
     with pytest.raises(ValueError, match="not those of its transcription"):
         verify(altered(front, transcription=other), tolerance=1.0)
+
+
+def test_objectives_that_only_the_mesh_believes_are_found():
+    """An integrand that oscillates faster than the quadrature sees: states are exact, so only flying the objectives tells."""
+    problem = problems.Problem("ripple")
+    phase = problem.phase("run", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(0, 3), initial=0)
+    phase.dynamics(x=1)
+    problem.minimize("cost", phase.integral(1 + ca.cos(40 * x)))
+    problem.maximize("distance", phase.final(x))
+    found = MACS().solve(problem, DFET(1, 1), evaluations=60, seed=1)
+    checks = verify(found, tolerance=1e-2)
+    assert all(check.defect < 1e-9 for check in checks)
+    assert any(not check.ok and "objectives differ" in " ".join(check.reasons) for check in checks)
+
+
+def test_statuses_and_violations_that_were_touched_up_are_found(front):
+    assert all(not check.ok for check in verify(altered(front, violation=np.full(len(front), 123.0)), tolerance=1))
+    assert all(not check.ok for check in verify(altered(front, status=np.full(len(front), "failed")), tolerance=1))

@@ -66,7 +66,8 @@ def test_a_batch_comes_back_as_a_batch_and_means_what_it_says(inner, make):
     found = inner_solver(inner).solve(nlp, C)
     n, m = len(nlp.variables), len(nlp.problem.goals)
     shapes = {"z": (4, n), "F": (4, m), "violation": (4,), "status": (4,), "moved": (4,), "iterations": (4,)}
-    assert {f.name: getattr(found, f.name).shape for f in fields(found)} == shapes
+    assert {f.name: getattr(found, f.name).shape for f in fields(found) if f.name in shapes} == shapes
+    assert found.clocked is False
     assert set(found.status.tolist()) <= STATUSES and np.array_equal(C, before)
     assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all() or inner == "march" or "converged" not in found.status
     for i in range(4):
@@ -261,10 +262,26 @@ def test_two_processes_give_the_same_bits():
     assert first == second and len(first) > 100
 
 
+@pytest.mark.parametrize("wrong", [{"objective": "projecton"}, {"max_iterations": 0}, {"seconds": -1}])
+def test_settings_that_make_no_sense(wrong):
+    with pytest.raises(ValueError, match=f"Ipopt: {next(iter(wrong))}"):
+        Ipopt(**wrong)
+
+
 def test_a_time_limit_gives_a_timeout():
     nlp = DFET(20, 6).transcribe(load("goddard"))
     found = Ipopt(seconds=1e-6).solve(nlp, candidates(nlp, 2))
     assert found.status.tolist() == ["timeout", "timeout"] and (found.violation > 1e-6).all()
+    assert found.clocked
+
+
+def test_a_clock_that_ended_a_solve_is_told_even_if_the_point_is_feasible(monkeypatch):
+    nlp = DFET(4, 2).transcribe(load("goddard"))
+    good = Ipopt().solve(nlp, candidates(nlp, 1))
+    monkeypatch.setattr(Ipopt, "_solve_all", lambda self, nlp, start, guess, tolerance: (good.z, np.array(["timeout"]), np.ones(1, int)))
+    found = Ipopt().solve(nlp, candidates(nlp, 1))
+    assert found.status.tolist() == ["converged"]
+    assert found.clocked
 
 
 def test_an_iteration_limit_is_no_success():

@@ -31,4 +31,4 @@ class Auto(InnerSolver):
         for name, values in parts.items():
             values[rest] = getattr(repaired, name)
         parts["iterations"][rest] += 1
-        return InnerResult(**parts)
+        return InnerResult(**parts, clocked=repaired.clocked)

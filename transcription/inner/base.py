@@ -30,6 +30,8 @@ class InnerResult:
         Euclidean distance of the free variables from the candidate, in spans of their bounds.
     iterations : array (k,) of int
         Of the solver; a propagation counts as one.
+    clocked : bool
+        Whether a clock ended any of the work, whatever came of it: then the same candidates need not give the same result again.
     """
 
     z: np.ndarray
@@ -38,10 +40,12 @@ class InnerResult:
     status: np.ndarray
     moved: np.ndarray
     iterations: np.ndarray
+    clocked: bool = False
 
 
 class InnerSolver(ABC):
-    """Makes candidates feasible. An implementation is a frozen dataclass of its settings; it keeps nothing between two calls.
+    """Makes candidates feasible. An implementation is a frozen dataclass of its settings; nothing that it keeps between two calls
+    changes a result.
 
     The result for one candidate depends on that candidate, its warm start and the composition of the batch, and on nothing else.
     """
@@ -83,4 +87,5 @@ def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterati
         status=status,
         moved=np.where(finite, nlp.distance(Z, start), 0.0),
         iterations=iterations,
+        clocked=bool((said == TIMEOUT).any()),
     )

@@ -31,12 +31,25 @@ class Ipopt(InnerSolver):
     max_iterations : int
         Limit of each solve.
     seconds : float
-        Safety net for each solve; one that it stops has the status "timeout" and is not reproducible.
+        Safety net for each solve. What it stops has the status "timeout", unless it is feasible all the same, and is not reproducible.
+
+    Raises
+    ------
+    ValueError
+        For another objective, or limits that are not positive.
     """
 
     objective: str = "projection"
     max_iterations: int = 300
     seconds: float = 60.0
+
+    def __post_init__(self) -> None:
+        if self.objective not in ("projection", "constant"):
+            raise ValueError(f"Ipopt: objective must be 'projection' or 'constant', not {self.objective!r}")
+        if isinstance(self.max_iterations, bool) or not isinstance(self.max_iterations, int) or self.max_iterations < 1:
+            raise ValueError(f"Ipopt: max_iterations must be a whole number of at least 1, not {self.max_iterations!r}")
+        if not 0 < self.seconds < float("inf"):
+            raise ValueError(f"Ipopt: seconds must be a positive number, not {self.seconds!r}")
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`.
@@ -66,9 +79,10 @@ class Ipopt(InnerSolver):
         Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
-            if violation[row] <= tolerance and self.objective == "projection" and np.array_equal(start[row], guess[row]):
-                continue
             if not np.isfinite(guess[row]).all():
+                continue
+            if violation[row] <= tolerance and self.objective == "projection":
+                Z[row] = guess[row]
                 continue
             y0 = np.clip((guess[row] - origin) / scale, lower, upper)
             answer = solver(
