@@ -156,7 +156,7 @@ def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, poi
         from matplotlib.lines import Line2D
 
         handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(flight)]
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), frameon=False)
+        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
     goals = point._front.goals
     values = ", ".join(
         f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}"
