@@ -55,14 +55,15 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None) -> np.n
     """Choose `limit` of the points F (n, m), n > limit, with a low energy of all their pairs; the best of each objective is always kept.
 
     Vacancies are filled one at a time by the point that adds least; then members are exchanged for points left over, the best exchange
-    first, as long as one lowers the energy. So the result never has a higher energy than the `members`, if these were the limit in number.
+    first, as long as one lowers the energy. So the result has no higher energy than the `members`, if these were the limit in number and
+    had the best of each objective; a best one that they lack comes in whatever it costs.
 
     Parameters
     ----------
     F : array (n, m)
         Mutually non-dominated objectives.
     limit : int
-        How many to choose, at least m.
+        How many to choose, at least 1. Of fewer than m, only as many are kept for being best, in the order of the objectives.
     members : array (n,) of bool, optional
         Points to begin with, at most `limit`. Default: the best of each objective only.
 
@@ -72,7 +73,7 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None) -> np.n
     """
     energies = pair_energies(F)
     fixed = np.zeros(len(F), dtype=bool)
-    fixed[extremes(F)] = True
+    fixed[extremes(F)[:limit]] = True
     inside = fixed.copy() if members is None else fixed | members
     energy = energies[:, inside].sum(axis=1)
     while np.count_nonzero(inside) > limit:  # an extreme that came in makes room for itself

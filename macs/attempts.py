@@ -41,10 +41,32 @@ class Attempts:
         Z = self.state.agents.Z if rows is None else self.state.agents.Z[rows]
         return self.box.to_unit(Z[:, self.evaluator.free])
 
-    def try_out(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray) -> np.ndarray:
+    def look(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
+        """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d), and leave these as they are.
+
+        Returns
+        -------
+        array (j,) of int
+            Which of the k were evaluated: those that moved, as far as the budget goes.
+        Evaluation or None
+            What came of these; None if there were none.
+        """
+        moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
+        if not moved.size:
+            return moved, None
+        X, trial, free = X[moved], trial[moved], self.evaluator.free
+        Z = self.state.agents.Z[rows[moved]]
+        Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
+        result = self.evaluator.evaluate(Z)
+        self.state.evaluations = self.evaluator.counts.evaluations
+        self.seen.append(result)
+        return moved, result
+
+    def try_out(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
         """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d); put those that had success there.
 
         The velocity of these, and the experience of all, are made of the displacements that came back, not of those that were proposed.
+        Without `velocity` a success leaves its agent at rest.
 
         Returns
         -------
@@ -52,23 +74,18 @@ class Attempts:
             Who had success. A proposal that did not move, or for which no budget is left, is not evaluated and has none.
         """
         success = np.zeros(len(rows), dtype=bool)
-        moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
-        if not moved.size:
+        moved, result = self.look(rows, X, trial)
+        if result is None:
             return success
         rows, X, trial = rows[moved], X[moved], trial[moved]
         agents, free = self.state.agents, self.evaluator.free
-        Z = agents.Z[rows]
-        Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
-        result = self.evaluator.evaluate(Z)
-        self.state.evaluations = self.evaluator.counts.evaluations
-        self.seen.append(result)
-
         improved = constrained_dominates(result.F, result.violation, agents.F[rows], agents.violation[rows], self.evaluator.tolerance)
         better = improved | self._serves_direction(rows, result)
         proposed = self.box.difference(trial, X)
         achieved = self.box.difference(self.box.to_unit(result.Z[:, free]), X)
         self.credited[rows] |= better & ((proposed * achieved).sum(axis=1) >= CREDIT * (proposed**2).sum(axis=1))
-        agents.velocity[rows[better]] = achieved[better] + self.settings.momentum * agents.velocity[rows[better]]
+        last = self.settings.momentum * agents.velocity[rows[better]]
+        agents.velocity[rows[better]] = achieved[better] + last if velocity else 0.0
         agents.place(rows[better], result.Z[better], result.F[better], result.violation[better])
         self.state.experience = np.vstack([self.state.experience, achieved[improved]])[-self.settings.memory :]
         success[moved] = better

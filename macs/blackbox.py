@@ -88,7 +88,7 @@ class BlackBox(Evaluator):
                 self._learn(len(labels), f"{name} has {len(labels)}")
 
     @property
-    def m(self) -> int:  # type: ignore[override]
+    def m(self) -> int:
         """Number of objectives; see the notes of the class."""
         if self.m_known is None:
             self.evaluate((self.lower + self.upper)[None] / 2)
@@ -129,7 +129,7 @@ class BlackBox(Evaluator):
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
         status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
-        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, moved=np.zeros(len(Z))), 0
+        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status), 0
 
     def _learn(self, count: int, source: str) -> None:
         """Take the number of objectives from `source`, or find that it contradicts what is known."""

@@ -47,12 +47,10 @@ def pool(m: int, size: int) -> np.ndarray:
 
 
 def draw(directions: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Rows of active directions, (count,) of int: the m orthogonal ones always, others at random, none twice unless there are too few."""
+    """Rows of active directions, (count,) of int: the m orthogonal ones, others at random, and none twice before all are taken."""
     m = directions.shape[1]
-    others = np.arange(m, len(directions))
-    wanted = max(count - m, 0)
-    chosen = rng.permutation(others)[:wanted] if wanted <= len(others) else rng.choice(len(directions), wanted)
-    return np.concatenate([np.arange(m), chosen])[:count]
+    chosen = np.concatenate([np.arange(m), rng.permutation(np.arange(m, len(directions)))])[:count]
+    return np.concatenate([chosen, rng.choice(len(directions), count - len(chosen))])
 
 
 def normalised(F: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:

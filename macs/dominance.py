@@ -19,18 +19,6 @@ def dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return np.all(A <= B, axis=-1) & np.any(A < B, axis=-1)
 
 
-def weakly_dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Row by row (broadcast over leading axes): A (..., m) is nowhere worse than B (..., m). Equal rows weakly dominate each other."""
-    return np.all(A <= B, axis=-1)
-
-
-def duplicated(F: np.ndarray) -> np.ndarray:
-    """Which rows of F (n, m) repeat an earlier row exactly, (n,) of bool."""
-    repeated = np.ones(len(F), dtype=bool)
-    repeated[np.unique(F, axis=0, return_index=True)[1]] = False
-    return repeated
-
-
 def constrained_dominates(
     F: np.ndarray, violation: np.ndarray, others: np.ndarray, other_violation: np.ndarray, tolerance: float = 0.0
 ) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from numbers import Real
 from typing import Any
@@ -53,7 +53,8 @@ class MACS(Solver):
     redraw : bool, default True
         Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
     reseed : {"all", "spread"}, default "all"
-        Which points of the archive agents may be sent to: all, or only as many as there are agents, well spread (the authors' later code).
+        Which points of the archive agents may be sent to: all, or only as many as there are agents, well spread. With "spread", agents are
+        also sent to an archive of fewer points than objectives: those nearest to them (the authors' later code).
     momentum : float, default 0.7
         How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
     concentration : float, default 1.5
@@ -65,6 +66,11 @@ class MACS(Solver):
         How many of the last improvements are remembered for that, at least 1.
     shorten : bool, default False
         Shorten inertia's steps until they stay in the box, as in the paper; otherwise they are clipped to it, variable by variable.
+    social_moves : bool, default True
+        Agents go where a social action was a success. False as in the paper: social actions only offer points to the archive.
+    keep_velocity : bool, default True
+        Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
+        later code).
 
     Raises
     ------
@@ -92,6 +98,8 @@ class MACS(Solver):
     experience: float = 0.3
     memory: int = 100
     shorten: bool = False
+    social_moves: bool = True
+    keep_velocity: bool = True
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
@@ -100,7 +108,7 @@ class MACS(Solver):
         self._check_count("memory", self.memory, 1)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
-        for name in ("refine", "adaptive_coordinates", "redraw", "shorten"):
+        for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
         if self.mesh == "adaptive":
@@ -121,7 +129,19 @@ class MACS(Solver):
 
     @classmethod
     def paper(cls, **overrides: Any) -> MACS:
-        """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself."""
+        """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself.
+
+        There are as many directions as social agents, and these keep theirs. What deliberately stays different:
+
+        - Feasible points come before infeasible ones, and these by their violation; no penalty enters an objective.
+        - The budget is met exactly. The best point of each objective never leaves the archive.
+        - The scalarisation is normalised by feasible points only: the best values ever, and the worst ones in the archive.
+        - Success is dominance, or a better value for the direction; a point with equal objectives is none.
+        - A success puts its agent there at once, where the next actions of the others find it as a parent.
+        - Velocities are displacements that the inner level left, and the radius is credited with a success only for most of its own step.
+        - The parents in differential evolution are others than the agent, in social actions also other than its copies in the archive.
+        - Inertia shortens the step that it takes, not the velocity. One coordinate of differential evolution always takes part.
+        """
         settings: dict[str, Any] = {
             "refine": False,
             "adaptive_coordinates": False,
@@ -131,8 +151,13 @@ class MACS(Solver):
             "concentration": 1.0,
             "experience": 0.0,
             "shorten": True,
+            "social_moves": False,
+            "keep_velocity": False,
         }
-        return cls(**(settings | overrides))
+        paper = cls(**(settings | overrides))
+        if "directions" in overrides:
+            return paper
+        return replace(paper, directions=max(1, round(paper.social * paper.agents)))
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
         """Sample, evaluate and archive the first population.

@@ -13,6 +13,7 @@ from .agent import NO_DIRECTION, Agents
 from .archive import Archive
 from .attempts import Attempts
 from .box import Box
+from .dominance import dominates, nondominated
 from .evaluation import Evaluation, Evaluator
 
 if TYPE_CHECKING:
@@ -112,13 +113,16 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
     waiting = np.arange(len(agents))
     count, d = len(agents), len(box.lower)
 
-    def attempt(propose) -> None:
+    def attempt(propose, velocity=True) -> None:
         nonlocal waiting
         if waiting.size:
             X = attempts.positions(waiting)
-            waiting = waiting[~attempts.try_out(waiting, X, propose(waiting, X))]
+            waiting = waiting[~attempts.try_out(waiting, X, propose(waiting, X), velocity)]
 
-    attempt(lambda who, X: individual.inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng))
+    def inertia(who: np.ndarray, X: np.ndarray) -> np.ndarray:
+        return individual.inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng)
+
+    attempt(inertia, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
     for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1])]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
@@ -130,7 +134,7 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
         donors = attempts.positions()[individual.distinct_others(who, count, 3, rng)]
         return individual.differential(box, X, donors, settings.F, settings.CR, rng)
 
-    attempt(differential)
+    attempt(differential, settings.keep_velocity)
     agents.adapt_radius(attempts.credited, settings.rho, settings.contraction, settings.max_contractions)
 
 
@@ -150,7 +154,10 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
     if len(state.experience) > 3:
         pick = rng.random(len(rows)) < settings.experience
         trial = np.where(pick[:, None], social.follow_experience(box, X, state.experience, rng), trial)
-    attempts.try_out(rows, X, trial)
+    if settings.social_moves:
+        attempts.try_out(rows, X, trial, settings.keep_velocity)
+    else:
+        attempts.look(rows, X, trial)
 
 
 def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluator: Evaluator) -> None:
@@ -170,7 +177,11 @@ def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluat
 
 
 def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -> None:
-    """Give the social agents their directions, and send them to the points of the archive that are best for these."""
+    """Give the social agents their directions, and send them to the points of the archive that are best for these.
+
+    While the archive has fewer points than there are objectives nobody is sent, or, as in the authors' code, the nearest of the agents
+    that own the orthogonal directions.
+    """
     agents, archive, m = state.agents, state.archive, state.directions.shape[1]
     social_count = min(settings.social_agents(m), len(agents))
     if not social_count:
@@ -179,21 +190,37 @@ def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -
         agents.direction[:] = NO_DIRECTION
         agents.direction[:social_count] = directions.draw(state.directions, social_count, state.rng)
     owners = np.flatnonzero(agents.direction != NO_DIRECTION)
-    if len(archive) < m:
+    if len(archive) >= m:
+        if settings.reseed == "spread" and len(archive) > len(owners) >= m:
+            archive = archive.take(archives.spread(archive.F, len(owners)))
+        weights = state.directions[agents.direction[owners]]
+        costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
+    elif settings.reseed == "spread":
+        owners = owners[agents.direction[owners] < m]
+        apart = directions.normalised(archive.F[:, None] - agents.F[owners], np.zeros(m), state.nadir - state.ideal)
+        costs = np.nan_to_num(np.linalg.norm(apart, axis=-1), nan=np.finfo(float).max)
+    else:
         return
-    if settings.reseed == "spread" and len(archive) > len(owners) >= m:
-        archive = archive.take(archives.spread(archive.F, len(owners)))
-    weights = state.directions[agents.direction[owners]]
-    costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     points, columns = social.pair_up(costs)
     rows = owners[columns]
     agents.place(rows, archive.Z[points], archive.F[points], archive.violation[points])
 
 
 def _choose(seen: Evaluation, count: int, tolerance: float) -> np.ndarray:
-    """Rows of the points to start from: all, or of too many the feasible before the infeasible, in their order."""
+    """Rows, in order, of the points to start from: all, or of too many the best.
+
+    Feasible ones come before infeasible ones, and these by violation; of the feasible ones those that no other dominates come first, well
+    spread if they are too many, and then those that the fewest dominate.
+    """
+    if len(seen.F) <= count:
+        return np.arange(len(seen.F))
+    feasible = np.flatnonzero(seen.violation <= tolerance)
+    front = feasible[nondominated(seen.F[feasible])]
+    if len(front) > count:
+        return front[archives.spread(seen.F[front], count)]
     worth = np.where(seen.violation <= tolerance, 0.0, seen.violation)
-    return np.sort(np.argsort(worth, kind="stable")[:count])
+    dominators = [np.count_nonzero(dominates(seen.F[feasible], F)) for F in seen.F]
+    return np.sort(np.lexsort((dominators, ~np.isin(np.arange(len(seen.F)), front), worth))[:count])
 
 
 def _population(seen: Evaluation, rows: np.ndarray, d: int, settings: MACS) -> Agents:

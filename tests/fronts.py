@@ -26,4 +26,9 @@ def inverted_distance(F: np.ndarray, reference: np.ndarray, samples: int = 2001)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     at = np.linspace(0.0, length[-1], samples)
     even = np.column_stack([np.interp(at, length, column) for column in curve.T])
-    return float(np.linalg.norm(even[:, None] - points, axis=2).min(axis=1).mean())
+    return mean_distance(even, points)
+
+
+def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:
+    """Mean distance of the points of the reference (k, m) from the nearest of F (n, m), in the units that they have."""
+    return float(np.linalg.norm(reference[:, None] - F, axis=2).min(axis=1).mean())

@@ -14,8 +14,6 @@ SCALE = np.array([12.0, 20.0])
 class Ascent(Evaluator):
     """28 angles at the Gauss-Legendre nodes of four elements, and the time of flight; least time, greatest horizontal speed."""
 
-    m = 2
-
     def __init__(self):
         self.free = np.arange(29)
         self.lower, self.upper = np.r_[np.full(28, -np.pi / 2), 100.0], np.r_[np.full(28, np.pi / 2), 250.0]
@@ -40,7 +38,7 @@ class Ascent(Evaluator):
         return error / SCALE, jacobian / SCALE[:, None] * (self.upper - self.lower)
 
     def _evaluate(self, Z):
-        start, Z, iterations = Z, Z.copy(), 0
+        Z, iterations = Z.copy(), 0
         for _ in range(50):
             error, jacobian = self._final(Z)
             open_ = np.abs(error).max(axis=1) > self.tolerance / 2
@@ -55,5 +53,4 @@ class Ascent(Evaluator):
         violation = np.abs(self._final(Z)[0]).max(axis=1)
         speed = (THRUST * self.weights * Z[:, 28:] * np.cos(Z[:, :28])).sum(axis=1)
         status = np.where(violation <= self.tolerance, "converged", "infeasible")
-        moved = np.linalg.norm((Z - start) / (self.upper - self.lower), axis=1)
-        return Evaluation(Z, np.stack([Z[:, 28], -speed], axis=1), violation, status, moved), iterations
+        return Evaluation(Z, np.stack([Z[:, 28], -speed], axis=1), violation, status), iterations

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs.archive import Archive, insert, pair_energies, spread
-from macs.dominance import dominates
+from macs.dominance import dominates, extremes
 
 
 def empty(m):
@@ -16,8 +16,8 @@ def offer(archive, F, limit=10, violation=None):
     return insert(archive, np.zeros((len(F), 1)), F, violation, limit=limit, tolerance=1e-6)
 
 
-def total(F):
-    return pair_energies(F).sum() / 2
+def energy(F, chosen):
+    return pair_energies(F)[np.ix_(chosen, chosen)].sum() / 2
 
 
 def quarter_circle(count):
@@ -50,16 +50,33 @@ def test_nothing_infeasible_failed_or_equal_comes_in():
     assert offer(archive, [[1.0, 1.0]]).F.tolist() == [[1.0, 1.0]]
 
 
-def test_energy_never_rises_when_members_are_exchanged():
-    rng = np.random.default_rng(0)
-    F = quarter_circle(40)
-    members = np.zeros(40, dtype=bool)
-    members[[0, 39]] = True
-    members[1 + rng.permutation(38)[:8]] = True
-    chosen = spread(F, 10, members)
-    assert total(F[chosen] / np.ptp(F, axis=0)) <= total(F[members] / np.ptp(F, axis=0))
-    assert chosen[[0, 39]].all()
-    assert chosen.sum() == 10
+@given(st.integers(2, 4), st.integers(4, 12), st.integers(0, 2**32 - 1), st.booleans())
+def test_extremes_are_chosen_and_energy_never_rises_unless_they_were_missing(m, limit, seed, given_extremes):
+    rng = np.random.default_rng(seed)
+    F = np.abs(rng.normal(size=(40, m)))
+    F = (1 - F / np.linalg.norm(F, axis=1, keepdims=True)) * 10.0 ** rng.integers(-3, 4, m)
+    best, members = extremes(F), np.zeros(40, dtype=bool)
+    if given_extremes:
+        members[best] = True
+    members[rng.permutation(np.flatnonzero(~members))[: limit - members.sum()]] = True
+    chosen = spread(F, limit, members)
+    assert chosen.sum() == limit
+    assert chosen[best].all()
+    if members[best].all():
+        assert energy(F, chosen) <= energy(F, members) * (1 + 1e-9)
+
+
+def test_an_extreme_that_was_missing_comes_in_whatever_it_costs():
+    F = np.array([[0.0, 0.01, 1.0], [0.01, 0.0, 0.9], [1.0, 1.0, 0.0], [0.3, 0.5, 0.5]])
+    members = np.array([True, False, True, True])
+    chosen = spread(F, 3, members)
+    assert chosen.tolist() == [True, True, True, False]
+    assert energy(F, chosen) > energy(F, members)
+
+
+def test_fewer_than_the_objectives_are_the_best_of_the_first_of_them():
+    F = np.array([[3.0, 2.0, 2.0], [2.0, 2.0, 1.0], [1.0, 3.0, 3.0], [2.0, 1.0, 3.0]])
+    assert spread(F, 2).tolist() == [False, False, True, True]
 
 
 def test_the_archive_spreads_evenly_and_keeps_the_ends():

@@ -1,5 +1,7 @@
 """What the search makes of an evaluator that moves its candidates, and of variables that it may not alter itself."""
 
+import copy
+
 import numpy as np
 
 from macs.attempts import Attempts
@@ -10,8 +12,6 @@ from macs.search import box_of
 
 class Sticky(Evaluator):
     """Free are entries 1 and 2 of three; the last of them is always put back to 0.5, and entry 0 remembers the point it started from."""
-
-    m = 2
 
     def __init__(self):
         self.free, self.lower, self.upper, self.period = np.array([1, 2]), np.zeros(2), np.ones(2), np.zeros(2)
@@ -26,7 +26,7 @@ class Sticky(Evaluator):
         back[:, 2] = 0.5
         back[:, 0] = Z[:, 1]
         F = np.stack([back[:, 1], back[:, 1] ** 2], axis=1)
-        return Evaluation(back, F, np.zeros(len(Z)), np.full(len(Z), "converged"), np.abs(Z[:, 2] - 0.5)), 1
+        return Evaluation(back, F, np.zeros(len(Z)), np.full(len(Z), "converged")), 1
 
 
 def prepared():
@@ -49,6 +49,28 @@ def test_velocity_and_experience_are_what_was_achieved():
     assert np.allclose(state.experience, [[-0.2, 0.0]])
     assert np.allclose(state.agents.Z[2], [0.6, 0.6, 0.5])
     assert (state.agents.velocity[5] == 0.0).all()
+
+
+def test_without_velocity_a_success_leaves_its_agent_at_rest_and_a_failure_as_it_was():
+    _, state, attempts = prepared()
+    rows = np.array([2, 5])
+    X = attempts.positions(rows)
+    state.agents.velocity[:] = 0.1
+    attempts.try_out(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]), velocity=False)
+    assert np.allclose(state.agents.velocity[[2, 5, 6]], [[0.0, 0.0], [0.1, 0.1], [0.1, 0.1]])
+
+
+def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
+    box, state, attempts = prepared()
+    before, rows = copy.deepcopy(state), np.array([2, 5, 6])
+    X = attempts.positions(rows)
+    looked, result = attempts.look(rows, X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
+    assert looked.tolist() == [0, 2]
+    assert np.allclose(result.F[:, 0], [0.6, 0.5])
+    assert attempts.seen == [result]
+    assert state.evaluations == box.counts.evaluations == before.evaluations + 2
+    assert all(np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items())
+    assert len(state.experience) == 0
 
 
 def test_a_step_that_was_mostly_undone_is_a_success_without_credit():

@@ -41,6 +41,14 @@ def test_the_orthogonal_directions_are_always_drawn(m, extra, seed):
         assert len(set(rows.tolist())) == m + extra
 
 
+@given(st.integers(1, 4), st.integers(1, 40), st.integers(0, 2**32 - 1))
+def test_no_direction_is_drawn_twice_before_all_are_taken(m, count, seed):
+    directions = pool(m, 12)
+    rows = draw(directions, count, np.random.default_rng(seed))
+    assert rows.shape == (count,)
+    assert len(set(rows.tolist())) == min(count, len(directions))
+
+
 def test_scalarisation_is_safe_where_an_objective_has_no_range():
     F = np.array([[1.0, 3.0], [2.0, 3.0]])
     values = tchebycheff(F, np.full(2, 2**-0.5), np.array([1.0, 3.0]), np.array([2.0, 3.0]))

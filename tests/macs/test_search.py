@@ -5,6 +5,7 @@ import copy
 import numpy as np
 import pytest
 from ascent import Ascent
+from fronts import distance_to_curve, inverted_distance, mean_distance
 
 from macs.blackbox import BlackBox
 from macs.dominance import dominates
@@ -40,10 +41,6 @@ def zdt_front(kind):
         F = F[np.r_[True, F[1:, 1] < best[:-1]]]
         F = F[np.linspace(0, len(F) - 1, 1000).astype(int)]
     return F
-
-
-def igd(F, front):
-    return np.linalg.norm(front[:, None] - F, axis=-1).min(axis=1).mean()
 
 
 @pytest.mark.parametrize("budget", [1, 2, 9, 10, 11, 57, 200])
@@ -161,6 +158,24 @@ def test_a_start_is_evaluated_first_and_too_many_are_thinned():
     assert outside.agents.Z.max() == 2.0
 
 
+def test_of_too_many_starts_the_best_become_agents():
+    def begun(start, agents):
+        box = BlackBox(lambda X: X, [(-9, 9)] * 2, constraints=lambda X: -X[:, 0] - 1)
+        state = MACS(agents=agents, social=0).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
+        return state.agents.Z.tolist()
+
+    infeasible = [[-9, 0], [-3, 0], [-5, 0]]
+    dominated = [[4, 4], [3, 3], [4, 3]]
+    front = [[0, 2], [0.1, 1.9], [1, 1], [1.1, 0.9], [2, 0]]
+    assert begun(infeasible + dominated + front, 5) == front
+    assert begun(infeasible + dominated + front, 4)[::3] == [front[0], front[-1]]
+    assert begun(infeasible + dominated + front, 3) in ([front[0], middle, front[-1]] for middle in front[2:4])
+    assert begun(infeasible + dominated + [front[0]] * 3 + front, 5) == [front[0], *front[1:]]
+    assert begun(infeasible + dominated + front, 7) == [*dominated[1:], *front]
+    assert begun(infeasible + dominated + front, 9) == [infeasible[1], *dominated, *front]
+    assert begun(infeasible + dominated + front, 11) == infeasible + dominated + front
+
+
 def test_more_objectives_than_points_and_no_budget_are_refused():
     box = BlackBox(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
     with pytest.raises(ValueError, match="5 objectives, not 4"):
@@ -193,6 +208,8 @@ def test_more_objectives_than_points_and_no_budget_are_refused():
         {"experience": 2},
         {"concentration": 0.5},
         {"redraw": "no"},
+        {"social_moves": 1},
+        {"keep_velocity": None},
     ],
 )
 def test_settings_out_of_range_are_named(setting):
@@ -218,20 +235,8 @@ def test_fronts_of_zitzler_deb_and_thiele(kind, limit):
     values = []
     for seed in range(1, 6):
         state = run(MACS(agents=10, archive=100), BlackBox(lambda X: zdt(kind, X), bounds), 15_000, seed)
-        values.append(igd(state.archive.F, zdt_front(kind)))
+        values.append(mean_distance(zdt_front(kind), state.archive.F))
     assert np.median(values) <= limit, values
-
-
-def distances(F, front):
-    """Distance of each point to the polyline through the front, and mean distance of the evenly resampled polyline to the points."""
-    low, span = front.min(axis=0), np.ptp(front, axis=0)
-    points, corners = (F - low) / span, (front - low) / span
-    begin, side = corners[:-1], np.diff(corners, axis=0)
-    along = np.clip(((points[:, None] - begin) * side).sum(axis=-1) / (side**2).sum(axis=-1), 0.0, 1.0)
-    to_curve = np.linalg.norm(points[:, None] - begin - along[..., None] * side, axis=-1).min(axis=1)
-    length = np.r_[0.0, np.cumsum(np.linalg.norm(side, axis=1))]
-    even = np.stack([np.interp(np.linspace(0, length[-1], 1001), length, column) for column in corners.T], axis=1)
-    return to_curve, igd(points, even)
 
 
 @pytest.mark.slow
@@ -239,9 +244,8 @@ def test_the_front_of_the_lunar_ascent():
     front, gd, spread = reference() * [1, -1], [], []
     for seed in range(1, 6):
         F = run(MACS(agents=10, archive=10), Ascent(), 10_000, seed).archive.F
-        to_curve, coverage = distances(F, front)
-        gd.append(to_curve.mean())
-        spread.append(coverage)
+        gd.append(distance_to_curve(F, front).mean())
+        spread.append(inverted_distance(F, front))
     assert np.mean(gd) <= 6e-3, gd
     assert np.max(gd) <= 1e-2, gd
     assert np.mean(spread) <= 0.044, spread
@@ -249,7 +253,6 @@ def test_the_front_of_the_lunar_ascent():
 
 def test_a_short_search_of_the_lunar_ascent():
     state = run(MACS(), Ascent(), 1500)
-    to_curve, _ = distances(state.archive.F, reference() * [1, -1])
     assert len(state.archive) == 10
     assert (state.archive.violation <= 1e-9).all()
-    assert to_curve.mean() < 0.06
+    assert distance_to_curve(state.archive.F, reference() * [1, -1]).mean() < 0.06

@@ -1,0 +1,119 @@
+"""What `MACS.paper()` promises: the directions, social actions, velocities and the first re-seeding of the authors."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from macs.archive import Archive
+from macs.attempts import Attempts
+from macs.blackbox import BlackBox
+from macs.macs import MACS
+from macs.search import assign, box_of, individual_actions, social_actions
+
+
+def schaffer(X):
+    return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
+
+
+def begun(settings, function=schaffer, d=3):
+    """Settings at work on a function: its state, and the two phases of an iteration as functions."""
+    box = BlackBox(function, [(-2, 2)] * d)
+    state = settings.begin(box, 10_000, np.random.default_rng(0))
+    attempts = Attempts(settings, state, box, box_of(box), 10_000)
+    return (
+        state,
+        lambda: individual_actions(state, settings, box_of(box), attempts),
+        lambda: social_actions(state, settings, box_of(box), attempts, box),
+        attempts,
+    )
+
+
+def owned(state):
+    """Angles of the agents' directions, in degrees."""
+    sine, cosine = state.directions[state.agents.direction].T
+    return np.degrees(np.arctan2(sine, cosine))
+
+
+def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
+    settings, box = MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3)
+    state = settings.begin(box, 600, np.random.default_rng(0))
+    first = owned(state)
+    assert np.allclose(np.sort(first), np.arange(0, 91, 10))
+    assert first[:2].tolist() == [90.0, 0.0]
+    while state.evaluations < 600:
+        settings.advance(state, box, 600)
+        assert np.array_equal(owned(state), first)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"), [({"agents": 20}, 20), ({"social": 0.5}, 5), ({"social": 0.0}, 1), ({"directions": 40}, 40)]
+)
+def test_there_are_as_many_directions_as_social_agents_unless_told(overrides, expected):
+    assert MACS.paper(**overrides).directions == expected
+    assert MACS.paper(directions=None).directions is None
+
+
+def test_social_actions_only_feed_the_archive():
+    for settings in (MACS.paper(), MACS()):
+        state, individual, social, attempts = begun(settings)
+        individual()
+        before, seen = copy.deepcopy(state), len(attempts.seen)
+        social()
+        unchanged = [np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items()]
+        assert len(attempts.seen) == seen + 1
+        assert state.evaluations == before.evaluations + len(attempts.seen[-1].F)
+        assert all(unchanged) == np.array_equal(state.experience, before.experience) == (settings == MACS.paper())
+
+
+@pytest.mark.parametrize("settings", [MACS.paper(), MACS()])
+def test_inertia_erases_the_velocity(settings):
+    state, individual, *_ = begun(settings, lambda X: np.stack([X.sum(axis=1)] * 2, axis=1))
+    state.agents.Z[:], state.agents.F[:], state.agents.velocity[:] = 0.0, 0.0, -0.1
+    individual()
+    assert (np.ptp(state.agents.Z, axis=1) == 0.0).all()  # all coordinates alike: along the velocity
+    assert (state.agents.Z < 0.0).all()
+    assert (state.agents.velocity == 0.0).all() == (settings == MACS.paper())
+
+
+def test_pattern_search_leaves_its_displacement():
+    state, individual, *_ = begun(MACS.paper(), lambda X: np.stack([X.sum(axis=1)] * 2, axis=1))
+    state.agents.Z[:], state.agents.F[:] = 0.0, 0.0
+    individual()
+    assert ((state.agents.velocity < 0.0).sum(axis=1) == 1).all()
+    assert np.allclose(state.agents.velocity * 4, state.agents.Z)
+
+
+@pytest.mark.parametrize("settings", [MACS.paper(CR=1.0), MACS(CR=1.0)])
+def test_differential_evolution_leaves_none(settings):
+    # Off the diagonal everything is worse: only differences of agents on it lead along it.
+    state, individual, *_ = begun(settings, lambda X: np.stack([np.abs(X[:, 0]) + 99 * np.abs(X[:, 1] - X[:, 0])] * 2, axis=1), d=2)
+    state.agents.Z[:] = np.linspace(0.1, 1.0, 10)[:, None]
+    state.agents.F[:] = np.linspace(0.1, 1.0, 10)[:, None]
+    state.agents.velocity[:] = [0.1, -0.1]
+    before = state.agents.Z.copy()
+    individual()
+    moved = (before != state.agents.Z).any(axis=1)
+    assert 0 < moved.sum() < 10
+    assert (state.agents.velocity[moved] == 0.0).all() == (settings.momentum == 0.0)
+    assert (state.agents.velocity[~moved] == [0.1, -0.1]).all()
+
+
+@pytest.mark.parametrize("settings", [MACS.paper(), MACS()])
+def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_direction(settings):
+    box = BlackBox(schaffer, [(-2, 2)] * 3)
+    state = settings.begin(box, 100, np.random.default_rng(0))
+    state.archive = Archive(np.zeros((1, 3)), np.array([[0.0, 3.0]]), np.zeros(1))
+    state.ideal = state.nadir = state.archive.F[0]
+    state.agents.Z[:], state.agents.F[:] = 1.0, [3.0, 0.0]
+    state.agents.F[[0, 1, 2]] = [[np.nan, np.nan], [2.0, 2.0], [0.0, 3.0]]
+    assign(state, settings, box_of(box), box)
+    assert np.flatnonzero((state.agents.Z == 0.0).all(axis=1)).tolist() == ([1] if settings == MACS.paper() else [])
+
+
+def test_nothing_feasible_moves_nobody():
+    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
+    state = MACS.paper().begin(box, 100, np.random.default_rng(0))
+    before = state.agents.Z.copy()
+    assign(state, MACS.paper(), box_of(box), box)
+    assert np.array_equal(state.agents.Z, before)
