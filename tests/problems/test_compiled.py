@@ -99,3 +99,21 @@ def test_functions_are_those_that_were_stated():
     assert phase.n_quantities == 4 and compiled.phases[1].n_quantities == 3
     assert np.array(compiled.objectives([0, 1, 7, 5], [1, 3, 9], [1.5])).ravel() == pytest.approx([8, 9])
     assert float(compiled.constraints([0, 1, 7, 5], [1, 3, 9], [1.5])) == pytest.approx(7)
+
+
+def test_the_fingerprint_of_a_table_outlives_its_derivatives():
+    """CasADi keeps a table's derivatives with the table once asked for: what was solved must still be the problem of a fresh process."""
+    table = ca.interpolant("table", "bspline", [np.linspace(-1, 2, 8).tolist()], np.linspace(-1, 2, 8) ** 2)
+
+    def statement():
+        problem = Problem("table")
+        phase = problem.phase("run", t0=0, tf=(1, 2))
+        x = phase.state("x", bounds=(-1, 2), initial=0)
+        phase.dynamics(x=table(x) + phase.control("u", bounds=(0, 1)))
+        problem.minimize("time", phase.tf)
+        return problem
+
+    before = statement().compile()
+    fresh = before.fingerprint
+    before.phases[0].dynamics.jacobian()(0.5, 0.5, 0.0, [0.0, 1.0], 0)
+    assert statement().compile().fingerprint == fresh
