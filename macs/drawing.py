@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from problems.compiled import Limit, Variable
 from .plotting import COLORS, GREY, STYLE, label, new_figure
 
 if TYPE_CHECKING:
-    from transcription.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+    from transcription.trajectory import PhaseTrajectory, Trajectory
 
     from .point import Point
 
@@ -90,7 +91,8 @@ def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
         if kind == "path":
             ax.plot(phase.time, values, color=color, lw=0.9)
         else:
-            times, line = _dense(phase.state if kind == "state" else phase.control, index)
+            period = getattr(owners[kind][index], "period", None)
+            times, line = _dense(phase.state.edges, phase.state.on_element if kind == "state" else phase.controls_on, index, period)
             ax.plot(times, line, color=color, lw=1.3)
             drawn.append(line[np.isfinite(line)])
         ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
@@ -102,14 +104,19 @@ def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
     ax.set_title("; ".join(ranges), loc="right", fontsize=7, color=GREY, pad=2)
 
 
-def _dense(polynomial: PiecewisePolynomial, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values along every element, with a gap (NaN) where one ends and the next begins."""
+def _dense(
+    edges: np.ndarray, on_element: Callable[[int, np.ndarray], np.ndarray], index: int, period: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values along every element, with a gap (NaN) where one ends and the next begins, and where a periodic value wraps."""
     gap = np.array([np.nan])
     times: list[np.ndarray] = []
     values: list[np.ndarray] = []
-    for j, (left, right) in enumerate(zip(polynomial.edges[:-1], polynomial.edges[1:], strict=True)):
+    for j, (left, right) in enumerate(pairwise(edges)):
+        line = on_element(j, DENSE)[:, index]
+        if period:
+            line = np.where(np.append(np.abs(np.diff(line)) > 0.5 * period, False), np.nan, line)
         times += [0.5 * (left + right) + 0.5 * (right - left) * DENSE, gap]
-        values += [polynomial.on_element(j, DENSE)[:, index], gap]
+        values += [line, gap]
     return np.concatenate(times), np.concatenate(values)
 
 

@@ -79,6 +79,8 @@ def check_target(path: str | PathLike[str]) -> None:
     target = Path(path).resolve()
     if target.is_dir():
         raise IsADirectoryError(f"cannot write '{path}': it is a folder")
+    if target.exists() and not target.is_file():
+        raise OSError(f"cannot write '{path}': it is no ordinary file")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write '{path}': there is no folder '{target.parent}'")
     if not os.access(target.parent, os.W_OK | os.X_OK):
@@ -128,7 +130,7 @@ def from_bytes(content: bytes) -> Front:
 def _datasets(front: Front, group: str = "") -> Iterator[tuple[str, xarray.Dataset]]:
     """A front's groups by name, its root first."""
     root = root_dataset(front)
-    groups = _group_names(phase_names(front), {CLOSEST, *map(str, root.variables)})
+    groups = _group_names(phase_names(front), {CLOSEST, *map(str, root.variables), *map(str, root.sizes)})
     root.attrs[PHASES] = document(groups)
     root.attrs["has_closest"] = int(front._closest is not None)
     prefix = f"{group}/" if group else ""

@@ -105,6 +105,8 @@ def verify(
     nlp = (transcription or from_dict(front.transcription)).transcribe(problem)
     if tuple(v.name for v in nlp.variables) != tuple(v.name for v in front.variables):
         raise ValueError(f"the decision vectors of this front ({len(front.variables)} entries) are not those of its transcription")
+    if (front.lengths != len(nlp.variables)).any():
+        raise ValueError(f"a decision vector of this front has not the {len(nlp.variables)} entries of its transcription")
     scales, limit = objective_scales(front), front.stats["tolerance"]
 
     def check(index: int, point: Point) -> Check:

@@ -88,6 +88,8 @@ def show(arguments: Namespace) -> int:
     check_picture(arguments.plot)
     if arguments.csv:
         check_target(arguments.csv)
+        if Path(arguments.csv).resolve() == Path(arguments.front).resolve():
+            raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
     with refused():
         front = Front.load(arguments.front)
     point = None if arguments.point is None else find_point(front, arguments.point)

@@ -82,7 +82,7 @@ def test_a_point_is_drawn_with_all_it_has():
 
 def test_controls_jump_where_their_polynomials_do():
     control = flights()[0].trajectory["climb"].control
-    times, values = _dense(control, 0)
+    times, values = _dense(control.edges, control.on_element, 0, None)
     assert np.isnan(values).sum() == len(control.edges) - 1
     first = values[: np.flatnonzero(np.isnan(values))[0]]
     assert first[-1] == pytest.approx(control.on_element(0, np.array([1.0]))[0, 0])

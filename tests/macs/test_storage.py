@@ -14,10 +14,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
-from macs import storage
+import problems
+from macs import MACS, storage
 from macs.dataset import ARRAYS, VERSION, _arrays
 from macs.front import Front
 from macs.source import Source
+from transcription import DFET
 
 
 def same(a, b) -> bool:
@@ -309,3 +311,15 @@ def test_csv_names_units_and_keeps_every_bit(tmp_path):
     cells = [line.split(",") for line in lines[1:]]
     assert same(np.array([[float(c) for c in row[:2]] for row in cells]), front.objectives)
     assert same(np.array([[float(c) for c in row[4:]] for row in cells]), front.decision)
+
+
+def test_a_phase_may_have_the_name_of_anything_in_the_file(tmp_path):
+    problem = problems.Problem("names")
+    phase = problem.phase("point", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(0, 3), initial=0)
+    phase.dynamics(x=phase.control("u", bounds=(0, 1)))
+    problem.minimize("time", phase.tf)
+    problem.maximize("end", phase.final(x))
+    front = MACS().solve(problem, DFET(2, 1), evaluations=30, seed=1)
+    front.save(tmp_path / "front.nc")
+    np.testing.assert_array_equal(Front.load(tmp_path / "front.nc")[0].trajectory["point"]["x"], front[0].trajectory["point"]["x"])
