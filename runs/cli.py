@@ -99,7 +99,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", default="auto", help="the inner level: auto, march, ipopt, ... (default: auto)")
-    solve.add_argument("--no-refine", action="store_true", help="search without derivatives, as the paper does")
+    solve.add_argument("--no-refine", action="store_true", help="search without derivatives (no effect yet: none are used)")
     solve.add_argument("--checkpoint", metavar="FILE", help="not available yet")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
     solve.add_argument("--plot", metavar="FRONT.png", help="draw the front too")
