@@ -15,9 +15,11 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import NLP, Transcription, expanded
+from .batched import Batched
 from .guess import along
 from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows
+from .reduced import Reduced
 from .trajectory import Trajectory
 
 PEAK_SAMPLES = 1024
@@ -56,7 +58,8 @@ class Assembly:
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
-        self._largest = expanded(ca.Function("largest", [z], [ca.vertcat(*largest)], ["z"], ["peaks"]))
+        peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
+        self._largest = Batched(peaks)
         return NLP(
             problem=self.problem,
             transcription=transcription,
@@ -70,7 +73,7 @@ class Assembly:
             guess=self.guess(),
             first_guess=self.first_guess,
             march=self.march,
-            marches_exactly=self._marches_exactly(rows),
+            reduced=self._reduced(z, rows, peaks),
             tighten=self.tighten,
             unpack=self.unpack,
         )
@@ -105,10 +108,21 @@ class Assembly:
 
     def march(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.march`."""
+        return self._marched(Z)[0]
+
+    def _marched(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Propagated vectors, and the final states of all phases, also where they are imposed and so no variables."""
         extended = self.layout.extended(Z)
-        for writer in self._writers.values():
-            writer.march(extended)
-        return self.tighten(extended[:, : Z.shape[1]])
+        finals = [writer.march(extended) for writer in self._writers.values()]
+        return self.tighten(extended[:, : Z.shape[1]]), np.hstack(finals)
+
+    def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function) -> Reduced:
+        """What propagation leaves to satisfy."""
+        left = [i for i, marched in enumerate(rows.marched) if not marched]
+        function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
+        limits = [np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale)]
+        slots = np.concatenate(self._peaks)
+        return Reduced(self.layout, list(self._writers.values()), self._marched, (slots, peaks), (function, *limits))
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.tighten`."""
@@ -116,7 +130,7 @@ class Assembly:
         if not len(slots):
             return Z
         Z = Z.copy()
-        Z[:, slots] = np.array(self._largest(Z.T)).T
+        Z[:, slots] = self._largest(Z)[0]
         return Z
 
     def unpack(self, z: np.ndarray) -> Trajectory:
@@ -201,8 +215,3 @@ class Assembly:
         values = self.problem.constraints(*quantities, self.layout.pick(extended, self.parameters))
         for k, limit in enumerate(self.problem.limits):
             rows.add(values[k], limit.lower, limit.upper, limit.scale, f"constraint '{limit.name}'")
-
-    def _marches_exactly(self, rows: Rows) -> bool:
-        phases = self.problem.phases
-        free_ends = all(limits == (v.lower, v.upper) for phase in phases for v, limits in zip(phase.states, phase.final, strict=True))
-        return free_ends and all(rows.marched)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -14,7 +14,11 @@ import numpy as np
 from problems.compiled import CompiledProblem, Variable
 from problems.problem import Problem
 
+from .batched import Batched
 from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from .reduced import Reduced
 
 
 class Transcription(ABC):
@@ -67,8 +71,8 @@ class NLP:
     march : callable
         Vectors (k, n) -> vectors (k, n): the states that the dynamics give to the free variables, by propagation; not numbers, or short of
         the equations, where that fails. Only the free entries matter.
-    marches_exactly : bool
-        After `march`, only bounds of states can be violated: there are no terminal or path constraints.
+    reduced : Reduced
+        What propagation leaves to satisfy, as functions of the free variables alone.
     tighten : callable
         Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound.
     unpack : callable
@@ -87,7 +91,7 @@ class NLP:
     guess: np.ndarray
     first_guess: Callable[[np.ndarray], np.ndarray]
     march: Callable[[np.ndarray], np.ndarray]
-    marches_exactly: bool
+    reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
 
@@ -139,12 +143,16 @@ class NLP:
         return np.linalg.norm(np.where(period > 0, wrapped, difference) / self.span[self.free], axis=1)
 
     def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        F, g = (np.array(value).T for value in self.functions(Z.T))
+        F, g = self._batched(Z)
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore"):
             outside = np.maximum(self.lower - Z, Z - self.upper) / self.scale
             rows = np.maximum(self.g_lower - g, g - self.g_upper) / self.g_scale
             return F, np.maximum(np.hstack([outside, rows]), 0.0)
+
+    @cached_property
+    def _batched(self) -> Batched:
+        return Batched(self.functions)
 
     @cached_property
     def _bound_labels(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""One finite element in time: its equations, and the propagation of states through a row of such elements."""
+"""One finite element in time: its equations."""
 
 from __future__ import annotations
 
@@ -7,11 +7,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from .base import expanded
 from .dfet_tables import Tables
-
-NEWTON_ITERATIONS = 30
-NEWTON_TOLERANCE = 1e-14
 
 
 def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
@@ -20,11 +16,11 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
     left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
     start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", phase.dynamics.size1_in(3))
-    law = _unwrapped(U, phase)
+    law = unwrapped_law(U, phase)
 
     def over(function: ca.Function, tau: np.ndarray, states: ca.MX) -> ca.MX:
         times = start + 0.5 * h * ca.DM(1.0 + tau).T
-        controls = _wrapped(law @ ca.DM(tables.control(tau)).T, phase)
+        controls = wrapped_controls(law @ ca.DM(tables.control(tau)).T, phase)
         return function.map(len(tau))(states, controls, times, ca.repmat(s, 1, len(tau)))
 
     inside = X @ ca.DM(tables.state(tables.tau)).T
@@ -35,12 +31,12 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
     paths = over(phase.path, tables.points, closed @ ca.DM(tables.flown(tables.points)).T)
     peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown(tables.dense)).T)
-    ends = ca.vec(_wrapped(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
+    ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
     return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)
 
 
-def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
+def unwrapped_law(U: ca.MX, phase: CompiledPhase) -> ca.MX:
     """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
     period, divisor, _ = _periods(phase)
     if not period.any():
@@ -52,7 +48,7 @@ def _unwrapped(U: ca.MX, phase: CompiledPhase) -> ca.MX:
     return ca.horzcat(*law)
 
 
-def _wrapped(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
+def wrapped_controls(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
     """Controls (nu, k) of which the periodic ones are brought back into their bounds: see `trajectory.wrapped`."""
     period, divisor, lower = _periods(phase)
     if not period.any():
@@ -65,30 +61,3 @@ def _periods(phase: CompiledPhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Periods of the controls (nu,), 0 where there is none; the same to divide by; lower bounds."""
     period = np.array([v.period or 0.0 for v in phase.controls])
     return period, np.where(period > 0, period, 1.0), np.array([v.lower for v in phase.controls])
-
-
-def propagation(element: ca.Function, n: int, tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(initial states, U, starts, h, s), the last four a column or block for each element -> (states at the right ends, X).
-
-    On each element, Newton's method for the coefficients of the states from the first l + 1 tests; the last test gives the right end.
-    """
-    nx, order = len(phase.states), tables.order + 1
-    scale = ca.DM([v.scale for v in phase.states])
-    Y, left, U = ca.MX.sym("Y", nx * order), ca.MX.sym("left", nx), ca.MX.sym("U", *element.size_in(1))
-    start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", element.size1_in(6))
-    p = ca.MX.sym("p", nx + U.numel() + 2 + s.numel())
-    scales = ca.repmat(scale, order, 1)
-
-    def weak(Y: ca.MX, left: ca.MX, U: ca.MX, start: ca.MX, h: ca.MX, s: ca.MX) -> ca.MX:
-        return element(ca.reshape(Y * scales, nx, order), U, left, left, start, h, s)[0]
-
-    parts = ca.vertsplit(p, np.cumsum([0, nx, U.numel(), 1, 1, s.numel()]).tolist())
-    parts[1] = ca.reshape(parts[1], *U.shape)
-    residual = ca.vec(weak(Y, *parts)[:, :-1]) / scales
-    equations = expanded(ca.Function("equations", [Y, p], [residual], ["x", "p"], ["g"]))
-    options = {"error_on_fail": False, "max_iter": NEWTON_ITERATIONS, "abstol": NEWTON_TOLERANCE, "abstolStep": NEWTON_TOLERANCE}
-    newton = ca.rootfinder("newton", "fast_newton", equations, options)
-    root = newton(ca.repmat(left / scale, order, 1), ca.vertcat(left, ca.vec(U), start, h, s))
-    outputs = [weak(root, left, U, start, h, s)[:, -1], ca.reshape(root * scales, nx, order)]
-    step = ca.Function("step", [left, U, start, h, s], outputs)
-    return step.mapaccum("propagate", n)

@@ -10,7 +10,8 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from .base import expanded
-from .dfet_element import element_function, propagation
+from .dfet_element import element_function
+from .dfet_propagation import Pieces, Propagation
 from .dfet_tables import Tables
 from .guess import along, line
 from .layout import Layout
@@ -32,10 +33,12 @@ class DFETPhase(PhaseWriter):
         self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
         at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
+        self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
         self._element = expanded(element_function(tables, phase))
-        self._propagate = propagation(self._element, elements, tables, phase)
+        self._propagation = Propagation(elements, tables, phase)
+        self._outer: np.ndarray | None = None
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
@@ -80,18 +83,45 @@ class DFETPhase(PhaseWriter):
                 found.update(zip(self.U[:, :, i].ravel().tolist(), np.clip(values, control.lower, control.upper).ravel(), strict=True))
         return found
 
-    def march(self, extended: np.ndarray) -> None:
+    def march(self, extended: np.ndarray) -> np.ndarray:
         """See `PhaseWriter.march`."""
-        k, nx, nu = len(extended), len(self.phase.states), len(self.phase.controls)
+        right, X = self._propagation.fly(self._pieces(extended))
+        self._layout.write(extended, self.X, X)
+        self._layout.write(extended, self.B[1:], right)
+        return right[:, -1]
+
+    def sensitivity(self, extended: np.ndarray, S: np.ndarray, interior: bool) -> np.ndarray:
+        """See `PhaseWriter.sensitivity`."""
+        k, nx, d = len(extended), len(self.phase.states), S.shape[2]
+        X = extended[:, self.X]
+        D = self._propagation.derivatives(self._pieces(extended), extended[:, self.B[:-1]], X, interior=interior)
+        if self._outer is None:  # times, parameters and controls are free variables or constants: their derivatives never change
+            self._outer = self._outer_sensitivity(S[0])
+        outer = D[..., nx:] @ self._outer
+        S_left, ends = S[:, self.ends.initial], []
+        for j in range(self.n):
+            S_out = D[:, j, :, :nx] @ S_left + outer[:, j]
+            S_left = S_out[:, :nx]
+            ends.append(S_left)
+            if interior:
+                self._layout.write(S, self.X[j], S_out[:, nx:].reshape(k, -1, nx, d))
+        self._layout.write(S, self.B[1:], np.stack(ends, axis=1))
+        return S_left
+
+    def _outer_sensitivity(self, S: np.ndarray) -> np.ndarray:
+        """Derivatives (N, nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element."""
+        t0, tf = S[self.ends.statics[:2]]
+        edges = np.arange(self.n)[:, None] / self.n
+        start, length = t0 + (tf - t0) * edges, np.broadcast_to((tf - t0) / self.n, (self.n, len(t0)))
+        statics = np.broadcast_to(S[self.ends.statics], (self.n, len(self.ends.statics), len(t0)))
+        return np.concatenate([S[self.U.reshape(self.n, -1)], start[:, None], length[:, None], statics], axis=1)
+
+    def _pieces(self, extended: np.ndarray) -> Pieces:
+        """What propagation needs to know."""
         s = extended[:, self.ends.statics]
-        h = (s[:, 1] - s[:, 0]) / self.n
-        U = extended[:, self.U].reshape(k * self.n * self.U.shape[1], nu).T
-        starts = s[:, :1] + h[:, None] * np.arange(self.n)
-        right, X = self._propagate(
-            extended[:, self.ends.initial].T, U, starts.reshape(1, -1), np.repeat(h, self.n)[None], np.repeat(s, self.n, axis=0).T
-        )
-        self._layout.write(extended, self.X, np.array(X).T.reshape(k, self.n, -1, nx))
-        self._layout.write(extended, self.B[1:], np.array(right).T.reshape(k, self.n, nx))
+        h = (s[:, 1:2] - s[:, :1]) * np.full(self.n, 1.0 / self.n)
+        starts = s[:, :1] + h * np.arange(self.n)
+        return Pieces(extended[:, self.ends.initial], extended[:, self.U], starts, h, s)
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""

@@ -29,6 +29,11 @@ class Tables:
         Integrals of a state function times the derivative of a test function: exact.
     test : array (nq, l + 2)
         Test functions at the quadrature nodes times the weights.
+    recover : array (nq, l + 1)
+        The first l + 1 tests solved for the states' coefficients: these are the left end plus h times the rates at the quadrature nodes
+        times this.
+    implicit : array (nq, nq)
+        The same for the states at the quadrature nodes: the transposed matrix of the equivalent Runge-Kutta method.
     """
 
     def __init__(self, order: int, control_order: int, basis: str) -> None:
@@ -42,6 +47,8 @@ class Tables:
         derivative = polynomials.basis_derivative(basis, order + 1, self.tau)
         self.mass = self.state(self.tau).T @ (self.weights[:, None] * derivative)
         self.test = self.weights[:, None] * polynomials.basis_matrix(basis, order + 1, self.tau)
+        self.recover = -0.5 * self.test[:, :-1] @ np.linalg.inv(self.mass[:, :-1])
+        self.implicit = self.recover @ self.state(self.tau).T
 
     def state(self, tau: np.ndarray) -> np.ndarray:
         """State functions at `tau` (k,), shape (k, l + 1)."""

@@ -58,6 +58,6 @@ class Layout:
 
     @staticmethod
     def write(extended: np.ndarray, slots: np.ndarray, values: np.ndarray) -> None:
-        """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape); constants stay what they are."""
+        """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape, ...); constants stay what they are."""
         flat, mask = slots.ravel(), slots.ravel() >= 0
-        extended[:, flat[mask]] = values.reshape(len(extended), slots.size)[:, mask]
+        extended[:, flat[mask]] = values.reshape(len(extended), slots.size, *extended.shape[2:])[:, mask]

@@ -71,6 +71,8 @@ class PhaseWriter(ABC):
 
     phase: CompiledPhase
     ends: Ends
+    interior: np.ndarray
+    """Slots of the states that `sensitivity` fills in only on demand."""
 
     @abstractmethod
     def write(self, extended: ca.MX, rows: Rows) -> Written:
@@ -85,8 +87,28 @@ class PhaseWriter(ABC):
         """The user's guess of the controls, where there is one, by slot."""
 
     @abstractmethod
-    def march(self, extended: np.ndarray) -> None:
-        """Fill in the states of extended vectors by propagation from the initial ones."""
+    def march(self, extended: np.ndarray) -> np.ndarray:
+        """Fill in the states of extended vectors (k, ...) by propagation from the initial ones; returns the final states (k, nx), also
+        where they are imposed and so no variables."""
+
+    @abstractmethod
+    def sensitivity(self, extended: np.ndarray, S: np.ndarray, interior: bool) -> np.ndarray:
+        """Derivatives of the states of extended vectors (k, ...), which are propagated, by the free variables.
+
+        Parameters
+        ----------
+        extended : array (k, e)
+        S : array (k, e, d)
+            Derivatives of extended vectors. The rows of times, parameters, controls and initial states are given; the rows of the other
+            states are to be filled in.
+        interior : bool
+            Also inside the elements; otherwise only at their ends.
+
+        Returns
+        -------
+        array (k, nx, d)
+            Of the final states, also where they are imposed.
+        """
 
     @abstractmethod
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:

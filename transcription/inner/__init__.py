@@ -5,5 +5,6 @@ from .base import InnerResult, InnerSolver
 from .catalogue import NAMED, inner_solver
 from .ipopt import Ipopt
 from .march import March
+from .newton import Newton
 
-__all__ = ["NAMED", "Auto", "InnerResult", "InnerSolver", "Ipopt", "March", "inner_solver"]
+__all__ = ["NAMED", "Auto", "InnerResult", "InnerSolver", "Ipopt", "March", "Newton", "inner_solver"]

@@ -1,34 +1,33 @@
-"""The default inner level: the fastest that is exact."""
+"""The default inner level: fast where it converges, and a nonlinear program for the rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base import NLP
 from .base import CONVERGED, InnerResult, InnerSolver, started
 from .ipopt import Ipopt
-from .march import March
+from .newton import Newton
 
 
 @dataclass(frozen=True)
 class Auto(InnerSolver):
-    """Propagation where nothing but bounds of states can be violated, with a projection for what leaves those; a projection elsewhere."""
+    """Newton's method over propagated states, which needs one propagation where these are feasible already; a projection by IPOPT for what
+    it leaves infeasible."""
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
-        projection = Ipopt()
-        if not nlp.marches_exactly:
-            return projection.solve(nlp, candidates, warm, tolerance=tolerance)
-        flown = March().solve(nlp, candidates, warm, tolerance=tolerance)
-        rest = np.flatnonzero(flown.status != CONVERGED)
+        found = Newton().solve(nlp, candidates, warm, tolerance=tolerance)
+        rest = np.flatnonzero(found.status != CONVERGED)
         if not len(rest):
-            return flown
+            return found
         start = started(nlp, candidates, warm)
-        repaired = projection.solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
-        parts = {name: getattr(flown, name).copy() for name in ("z", "F", "violation", "status", "moved", "iterations")}
+        repaired = Ipopt().solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
+        parts = {name: getattr(found, name).copy() for name in ("z", "F", "violation", "status", "moved")}
         for name, values in parts.items():
             values[rest] = getattr(repaired, name)
-        parts["iterations"][rest] += 1
-        return InnerResult(**parts, clocked=repaired.clocked)
+        parts["iterations"] = found.iterations.copy()
+        parts["iterations"][rest] += repaired.iterations
+        return replace(found, **parts, clocked=repaired.clocked, fallbacks=len(rest))

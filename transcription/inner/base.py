@@ -32,6 +32,8 @@ class InnerResult:
         Of the solver; a propagation counts as one.
     clocked : bool
         Whether a clock ended any of the work, whatever came of it: then the same candidates need not give the same result again.
+    fallbacks : int
+        How many candidates a faster method left to a slower one.
     """
 
     z: np.ndarray
@@ -41,6 +43,7 @@ class InnerResult:
     moved: np.ndarray
     iterations: np.ndarray
     clocked: bool = False
+    fallbacks: int = 0
 
 
 class InnerSolver(ABC):

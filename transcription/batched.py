@@ -1,0 +1,131 @@
+"""CasADi Functions called for many columns at once: without copies, and compiled once that pays."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+PAYS = 100_000_000
+"""Instructions after which a Function is worth compiling: about half a second of CasADi's virtual machine."""
+LONG = 60_000
+"""Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
+BLOCK = 64
+"""Most calls at once: each number of them needs a Function of its own."""
+
+log = logging.getLogger(__name__)
+
+
+class Batched:
+    """A Function of dense inputs, for arrays with one row for each call.
+
+    Where a C compiler is present, a Function that has worked enough is compiled. The compiled one does the same operations in the same
+    order; it is taken only if it gives the same bits on the batch at hand. Set the environment variable MACS_COMPILE to 0 to never compile.
+
+    Parameters
+    ----------
+    function : casadi.Function
+    compiled : bool
+        Whether it may be compiled; not where it has a rootfinder or the like.
+    """
+
+    def __init__(self, function: ca.Function, *, compiled: bool = True) -> None:
+        self._function = function
+        self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
+        self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
+        self._may_compile = compiled and os.environ.get("MACS_COMPILE", "1") != "0"
+        self._length = _length(function)
+        self._work = 0
+
+    def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
+        """Outputs (k, nonzeros of each) for k calls.
+
+        Every input holds what the calls take one after the other, column by column: its leading axis is k, or a multiple of it.
+
+        Raises
+        ------
+        RuntimeError
+            If the Function fails, as a user's Callback may.
+        """
+        k = len(inputs[0])
+        arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
+        outputs = self._evaluate(arrays, k)
+        self._work += k * self._length
+        if self._may_compile and self._work > PAYS:
+            self._compile(arrays, outputs)
+        return outputs
+
+    def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
+        outputs = [np.empty((k, size)) for size in self._sizes]
+        for first in range(0, k, BLOCK):
+            last = min(first + BLOCK, k)
+            buffer, evaluate = self._block(last - first)
+            for i, values in enumerate(arrays):
+                if values.size:
+                    share = len(values) // k
+                    buffer.set_arg(i, values[first * share : last * share].data)
+            for i, values in enumerate(outputs):
+                if values.size:
+                    buffer.set_res(i, values[first:last].data)
+            evaluate()
+            if buffer.ret():
+                raise RuntimeError(f"{self._function.name()} failed")
+        return outputs
+
+    def _block(self, size: int) -> tuple[Any, Callable[[], None]]:
+        if size not in self._blocks:
+            self._blocks[size] = (self._function if size == 1 else self._function.map(size)).buffer()
+        return self._blocks[size]
+
+    def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
+        """Replace the Function by its compiled form, if there is one and it agrees to the last bit."""
+        self._may_compile = False
+        if self._length > LONG:
+            return
+        interpreted, blocks = self._function, self._blocks
+        library = _library(interpreted)
+        if library is None:
+            return
+        self._function, self._blocks = library, {}
+        found = self._evaluate(arrays, len(arrays[0]))
+        if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(found, expected, strict=True)):
+            log.info("%s: compiled values differ in the last bits; it stays interpreted", interpreted.name())
+            self._function, self._blocks = interpreted, blocks
+
+
+def _library(function: ca.Function) -> ca.Function | None:
+    """The function compiled by the C compiler of this machine; None where there is none, or it fails."""
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if not compiler:
+        return None
+    with tempfile.TemporaryDirectory(prefix="macs_") as folder:
+        try:
+            generator = ca.CodeGenerator("compiled.c")
+            generator.add(function)
+            generator.generate(folder + os.sep)
+            # Contracted or reordered operations would round differently.
+            options = ["-shared", "-fPIC", "-O1", "-ffp-contract=off"]
+            command = [*compiler.split(), *options, "compiled.c", "-o", "compiled.so", "-lm"]
+            subprocess.run(command, cwd=folder, check=True, capture_output=True)
+            return ca.external(function.name(), str(Path(folder) / "compiled.so"))
+        except (OSError, subprocess.CalledProcessError, RuntimeError) as error:
+            log.info("%s is not compiled: %s", function.name(), error)
+            return None
+
+
+def _length(function: ca.Function) -> int:
+    """Instructions of a Function, those of the Functions that it calls included; none of what is not made of instructions."""
+    if function.is_a("SXFunction"):
+        return function.n_instructions()
+    if not function.is_a("MXFunction"):
+        return 0
+    calls = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CALL)
+    return function.n_instructions() + sum(_length(function.instruction_MX(i).which_function()) for i in calls)

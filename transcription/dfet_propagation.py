@@ -1,0 +1,197 @@
+"""The initial value problem of a phase, element after element, and its derivatives.
+
+On each element the first l + 1 tests give the states at the quadrature nodes, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that
+system is small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element;
+elsewhere, and for whatever these five leave unsolved, a rootfinder iterates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from .base import expanded
+from .batched import Batched
+from .dfet_element import unwrapped_law, wrapped_controls
+from .dfet_tables import Tables
+from .elimination import eliminate
+
+ITERATIONS = 30
+TOLERANCE = 1e-14
+WRITTEN_OUT = 5
+"""Newton steps that are written out, after an explicit guess."""
+SOLVED = 1e-12
+"""Largest scaled residual at which these are enough."""
+SMALL, SHORT = 48, 30_000
+"""Most unknowns, and most instructions, of an element whose Newton steps are written out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """What goes into the elements of k flights of a phase: `initial` (k, nx), controls `U` (k, N, q + 1, nu), `starts` and lengths `h`
+    (k, N), and `s` (k, 2 + parameters)."""
+
+    initial: np.ndarray
+    U: np.ndarray
+    starts: np.ndarray
+    h: np.ndarray
+    s: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Pieces:
+        """Those of some flights."""
+        return Pieces(self.initial[rows], self.U[rows], self.starts[rows], self.h[rows], self.s[rows])
+
+    @property
+    def rows(self) -> tuple[np.ndarray, ...]:
+        """U, starts, h and s, with one row for each element of each flight."""
+        k, n = self.starts.shape
+        return self.U.reshape(k * n, -1), self.starts.reshape(-1, 1), self.h.reshape(-1, 1), np.repeat(self.s, n, axis=0)
+
+
+class Propagation:
+    """Flies the elements of a phase; see the module.
+
+    Parameters
+    ----------
+    elements : int
+    tables : Tables
+    phase : CompiledPhase
+    """
+
+    def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:
+        self.n, self.tables, self.phase = elements, tables, phase
+        equations = _equations(tables, phase, ca.MX)
+        self._robust = Batched(_iterated(equations, tables, phase).mapaccum("robust", elements), compiled=False)
+        self._quick: Batched | None = None
+        if len(phase.states) * len(tables.tau) <= SMALL and expanded(phase.dynamics).is_a("SXFunction"):
+            written = _equations(tables, phase, ca.SX)
+            step = _written_out(written, tables, phase)
+            if step.n_instructions() <= SHORT:
+                equations, self._quick = written, Batched(step.mapaccum("quick", elements))
+        self._equations = equations
+        self._gradients: dict[bool, tuple[Batched, np.ndarray, np.ndarray]] = {}
+
+    def fly(self, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
+        """States at the right ends (k, N, nx) and coefficients of the states (k, N, l + 1, nx)."""
+        k, n, nx = len(pieces.initial), self.n, len(self.phase.states)
+        if self._quick is None:
+            right, X = self._robust(pieces.initial, *pieces.rows)
+        else:
+            right, X, residual = self._quick(pieces.initial, *pieces.rows)
+            unsolved = np.flatnonzero(~(residual.max(axis=1) <= SOLVED))
+            if len(unsolved):
+                rest = pieces.take(unsolved)
+                right[unsolved], X[unsolved] = self._robust(rest.initial, *rest.rows)
+        return right.reshape(k, n, nx), X.reshape(k, n, -1, nx)
+
+    def derivatives(self, pieces: Pieces, left: np.ndarray, X: np.ndarray, *, interior: bool) -> np.ndarray:
+        """How the right ends follow the left ends and everything else, at flown states.
+
+        Parameters
+        ----------
+        pieces : Pieces
+        left, X : arrays (k, N, nx), (k, N, l + 1, nx)
+        interior : bool
+            Also of the coefficients of the states.
+
+        Returns
+        -------
+        array (k, N, nx [+ (l + 1) nx], nx + (q + 1) nu + 2 + len(s))
+            By the left end, the controls' coefficients (nu fastest), the start, the length, and s.
+        """
+        k, n, nx = left.shape
+        if interior not in self._gradients:
+            self._gradients[interior] = _gradient(self._equations, self.tables, self.phase, interior)
+        function, rows, columns = self._gradients[interior]
+        Y = (self.tables.state(self.tables.tau) @ X).reshape(k * n, -1)
+        (values,) = function(Y, left.reshape(k * n, nx), *pieces.rows)
+        outputs = nx * (1 + X.shape[2] * interior)
+        result = np.zeros((k, n, outputs, nx + pieces.U.shape[2] * pieces.U.shape[3] + 2 + pieces.s.shape[1]))
+        result[:, :, rows, columns] = values.reshape(k, n, len(rows))
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """One element, symbolically: inputs (Y as a column, left, U, start, h, s), the residual of Y, the rates at Y and the results."""
+
+    symbols: tuple[Any, ...]
+    residual: Any
+    rates: Any
+    right: Any
+    X: Any
+
+
+def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
+    """The element's equations in symbols of one of CasADi's kinds."""
+    nx, nu, nq, parameters = len(phase.states), len(phase.controls), len(tables.tau), phase.dynamics.size1_in(3)
+    y, left, U = symbol.sym("y", nx * nq), symbol.sym("left", nx), symbol.sym("U", nu, tables.control_order + 1)
+    start, h, s = symbol.sym("start"), symbol.sym("h"), symbol.sym("s", parameters)
+    controls = wrapped_controls(unwrapped_law(U, phase) @ ca.DM(tables.control(tables.tau)).T, phase)
+    Y, scales = ca.reshape(y, nx, nq), ca.DM([v.scale for v in phase.states])
+    rates = ca.horzcat(
+        *(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)),
+    )
+    residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ ca.DM(tables.implicit))) / ca.repmat(scales, nq, 1)
+    X = ca.repmat(left, 1, tables.order + 1) + h * (rates @ ca.DM(tables.recover))
+    right = left + 0.5 * h * (rates @ ca.DM(tables.weights))
+    return _Equations((y, left, U, start, h, s), residual, rates, right, X)
+
+
+def _written_out(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(left, U, start, h, s) -> (right, X, largest residual) by Newton steps from the states that the rates at the left end give."""
+    y, left, *others = element.symbols
+    whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X])
+    jacobian = ca.Function("jacobian", list(element.symbols), [ca.jacobian(element.residual, y)])
+    nq, h = len(tables.tau), others[2]
+    Y = ca.repmat(left, nq, 1)
+    Y = Y + h * ca.vec(whole(Y, left, *others)[1] @ ca.DM(tables.implicit))
+    for _ in range(WRITTEN_OUT):
+        Y = Y - eliminate(ca.sparsify(jacobian(Y, left, *others)), whole(Y, left, *others)[0])
+    residual, _, right, X = whole(Y, left, *others)
+    return ca.Function("step", [left, *others], [ca.densify(right), ca.densify(X), ca.mmax(ca.fabs(residual))], {"cse": True})
+
+
+def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(left, U, start, h, s) -> (right, X) by CasADi's Newton method, which does not give up early."""
+    _, left, U, *others = element.symbols
+    nx, nq = len(phase.states), len(tables.tau)
+    scales = ca.repmat(ca.DM([v.scale for v in phase.states]), nq, 1)
+    p = ca.MX.sym("p", nx + U.numel() + sum(symbol.numel() for symbol in others))
+    parts = ca.vertsplit(p, np.cumsum([0, nx, U.numel(), *(symbol.numel() for symbol in others)]).tolist())
+    parts[1] = ca.reshape(parts[1], *U.shape)
+    whole = ca.Function("whole", list(element.symbols), [element.residual, element.right, element.X])
+    x = ca.MX.sym("x", nx * nq)
+    equations = expanded(ca.Function("equations", [x, p], [whole(x * scales, *parts)[0]], ["x", "p"], ["g"]))
+    options = {"error_on_fail": False, "max_iter": ITERATIONS, "abstol": TOLERANCE, "abstolStep": TOLERANCE}
+    newton = ca.rootfinder("newton", "fast_newton", equations, options)
+    root = newton(ca.repmat(left, nq, 1) / scales, ca.vertcat(left, ca.vec(U), *others)) * scales
+    return ca.Function("step", [left, U, *others], [ca.densify(value) for value in whole(root, left, U, *others)[1:]])
+
+
+def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> tuple[Batched, np.ndarray, np.ndarray]:
+    """(y, left, U, start, h, s) -> the nonzero derivatives of (right [, X]) by (left, U, start, h, s), and their rows and columns."""
+    y, *inputs = element.symbols
+    along = ca.vertcat(*(ca.vec(symbol) for symbol in inputs))
+    results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
+    by_states, by_inputs = ca.jacobian(element.residual, y), ca.jacobian(element.residual, along)
+    direct, through = ca.jacobian(results, along), ca.jacobian(results, y)
+
+    def solve(matrix: Any, right: Any) -> Any:
+        return eliminate(matrix, right) if isinstance(matrix, ca.SX) else ca.solve(matrix, right, "qr")
+
+    if results.numel() < along.numel():
+        total = direct - solve(by_states.T, through.T).T @ by_inputs
+    else:
+        total = direct - through @ solve(by_states, by_inputs)
+    if isinstance(total, ca.MX):
+        total = ca.densify(total)
+    rows, columns = (np.array(index, dtype=int) for index in total.sparsity().get_triplet())
+    nonzeros = ca.vertcat(*total.nonzeros())
+    function = ca.Function("gradient", [y, *inputs], [nonzeros], {"cse": isinstance(total, ca.SX)})
+    return Batched(function, compiled=isinstance(total, ca.SX)), rows, columns
