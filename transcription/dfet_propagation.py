@@ -74,7 +74,8 @@ class Propagation:
             if step.n_instructions() <= SHORT:
                 equations, self._quick = written, Batched(step.mapaccum("quick", elements))
         self._equations = equations
-        self._gradients: dict[bool, tuple[Batched, np.ndarray, np.ndarray]] = {}
+        self._gradients: dict[bool, Batched] = {}
+        self._nodes = tables.state(tables.tau)
 
     def fly(self, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
         """States at the right ends (k, N, nx) and coefficients of the states (k, N, l + 1, nx)."""
@@ -107,13 +108,9 @@ class Propagation:
         k, n, nx = left.shape
         if interior not in self._gradients:
             self._gradients[interior] = _gradient(self._equations, self.tables, self.phase, interior)
-        function, rows, columns = self._gradients[interior]
-        Y = (self.tables.state(self.tables.tau) @ X).reshape(k * n, -1)
-        (values,) = function(Y, left.reshape(k * n, nx), *pieces.rows)
-        outputs = nx * (1 + X.shape[2] * interior)
-        result = np.zeros((k, n, outputs, nx + pieces.U.shape[2] * pieces.U.shape[3] + 2 + pieces.s.shape[1]))
-        result[:, :, rows, columns] = values.reshape(k, n, len(rows))
-        return result
+        Y = (self._nodes @ X).reshape(k * n, -1)
+        (values,) = self._gradients[interior](Y, left.reshape(k * n, nx), *pieces.rows)
+        return values.reshape(k, n, -1, nx * (1 + X.shape[2] * interior)).swapaxes(2, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +171,8 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
     return ca.Function("step", [left, U, *others], [ca.densify(value) for value in whole(root, left, U, *others)[1:]])
 
 
-def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> tuple[Batched, np.ndarray, np.ndarray]:
-    """(y, left, U, start, h, s) -> the nonzero derivatives of (right [, X]) by (left, U, start, h, s), and their rows and columns."""
+def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> Batched:
+    """(y, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s)."""
     y, *inputs = element.symbols
     along = ca.vertcat(*(ca.vec(symbol) for symbol in inputs))
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
@@ -189,9 +186,5 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
         total = direct - solve(by_states.T, through.T).T @ by_inputs
     else:
         total = direct - through @ solve(by_states, by_inputs)
-    if isinstance(total, ca.MX):
-        total = ca.densify(total)
-    rows, columns = (np.array(index, dtype=int) for index in total.sparsity().get_triplet())
-    nonzeros = ca.vertcat(*total.nonzeros())
-    function = ca.Function("gradient", [y, *inputs], [nonzeros], {"cse": isinstance(total, ca.SX)})
-    return Batched(function, compiled=isinstance(total, ca.SX)), rows, columns
+    symbolic = isinstance(total, ca.SX)
+    return Batched(ca.Function("gradient", [y, *inputs], [ca.densify(total)], {"cse": symbolic}), compiled=symbolic)

@@ -85,7 +85,8 @@ class Reduced:
     def fly(self, Z: np.ndarray) -> Flown:
         """Propagate vectors (k, n), of which only the free entries matter."""
         Z, finals = self._march(Z)
-        return Flown(Z, np.hstack([finals[:, self._imposed], Z[:, self._dependent], self._rest(Z)[0]]))
+        parts = [finals[:, self._imposed], Z[:, self._dependent]]
+        return Flown(Z, np.hstack([*parts, self._rest(Z)[0]] if self._rest_jacobian.shape[0] else parts))
 
     def derivatives(self, flown: Flown, rows: np.ndarray) -> np.ndarray:
         """Total derivatives by the free variables of the rows that a mask chooses, (k, count, d)."""

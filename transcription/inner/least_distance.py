@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 ITERATIONS = 12
+STUCK = 1e-6
 MET = 1e-6
 REGULAR = 1e-12
 """Part of the largest diagonal entry that is added to it: rows may say the same thing twice."""
@@ -34,28 +35,39 @@ def least_distance(
         Whether the constraints are met.
     """
     k, r, _ = A.shape
-    multipliers, size = np.zeros((k, r)), np.einsum("krd,krd->kr", A, A) + 1e-300
+    low, high = box
     equation = lower == upper
-    x = np.clip(center, *box)
-    sets = None
+    only_equations = bool(equation.all())
+    transposed, size = A.transpose(0, 2, 1), np.einsum("krd,krd->kr", A, A) + 1e-300
+    multipliers, shifted, x = np.zeros((k, r)), center, np.clip(center, low, high)
+    values = _times(A, x)
+    inside, above, active = None, equation, np.ones((k, r), dtype=bool)
     for _ in range(ITERATIONS):
-        shifted = center - (multipliers[:, None, :] @ A)[:, 0]
-        inside = (shifted > box[0]) & (shifted < box[1])
-        values = (A @ x[:, :, None])[:, :, 0]
-        above = equation | (multipliers * size + values > upper)
-        active = above | (multipliers * size + values < lower)
-        if sets is not None and np.array_equal(inside, sets[0]) and np.array_equal(active, sets[1]):
+        before = inside, active
+        inside = (shifted > low) & (shifted < high)
+        if not only_equations:
+            above = equation | (multipliers * size + values > upper)
+            active = above | (multipliers * size + values < lower)
+        if before[0] is not None and np.array_equal(inside, before[0]) and np.array_equal(active, before[1]):
             break
-        sets = inside, active
+        # A row all of whose variables are clipped could not be moved at all.
+        stuck = (np.einsum("krd,krd,kd->kr", A, A, inside) < STUCK * size) & active
+        inside = inside | stuck.any(axis=1, keepdims=True)
         # Where a variable is clipped, x stays at its bound; elsewhere x = center - A' multipliers.
-        fixed = (A @ np.where(inside, center, x)[:, :, None])[:, :, 0]
-        B = A * inside[:, None, :] * active[:, :, None]
-        gram = B @ B.transpose(0, 2, 1)
+        B = A * inside[:, None, :]
+        right = _times(A, np.where(inside, center, x)) - np.where(above, upper, lower)
+        if not only_equations:
+            B, right = B * active[:, :, None], np.where(active, right, 0.0)
+        gram = B @ transposed if only_equations else B @ B.transpose(0, 2, 1)
         diagonal = np.einsum("kii->ki", gram)
         diagonal += np.where(active, REGULAR * diagonal.max(axis=1, keepdims=True) + 1e-300, 1.0)
-        right = np.where(active, fixed - np.where(above, upper, lower), 0.0)
         multipliers = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
-        x = np.clip(center - (multipliers[:, None, :] @ A)[:, 0], *box)
-    values = (A @ x[:, :, None])[:, :, 0]
+        shifted = center - _times(transposed, multipliers)
+        x = np.clip(shifted, low, high)
+        values = _times(A, x)
     missed = np.maximum(np.maximum(lower - values, values - upper), 0.0).max(axis=1)
     return x, missed <= MET
+
+
+def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return (A @ x[:, :, None])[:, :, 0]
