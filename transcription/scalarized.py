@@ -25,13 +25,16 @@ ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
 PEAK_LIMIT = 100.0
 """How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
+AT_END, RESTARTS = 1e-2, 3
+"""How near, in periods, to an end of its widened box a periodic variable is stopped by it; how often it may begin anew."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
-ADAPTIVE = (("mu_strategy", "adaptive"),)
+Strategy = tuple[tuple[str, object], ...]
+ADAPTIVE: Strategy = (("mu_strategy", "adaptive"),)
 """Few iterations from good points and poor ones; measured against all of IPOPT's other strategies."""
-NEAR = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
+NEAR: Strategy = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
 """Stays closer to where it starts."""
-SLOW = (("mu_init", 1e-1),)
+SLOW: Strategy = (("mu_init", 1e-1),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +63,15 @@ class Solved:
     status: str
     iterations: int
     clocked: bool = False
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What a program is built for."""
+
+    tolerance: float
+    max_iterations: int
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +138,16 @@ def scalarize(
         If shapes do not match, a weight is negative or none that matters is positive, the start is no number, or a peak is used otherwise
         than minimised or bounded above.
     """
+    start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     task = _task(nlp, start, reference, weights, ceiling)
-    settings = (tolerance, max_iterations, seconds)
-    first = _attempt(nlp, task, start, settings, ADAPTIVE)
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     ahead = 0.0 if feasible else np.inf
+    first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     if first.clocked or (first.status == CONVERGED and task.value(first.F) <= ahead + tolerance):
         return first
-    second = _attempt(nlp, task, start, settings, NEAR if feasible else SLOW)
+    second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
     best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
 
@@ -177,12 +190,22 @@ def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarra
     return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
 
 
-def _attempt(
-    nlp: NLP, task: _Task, start: np.ndarray, settings: tuple[float, int, float], strategy: tuple[tuple[str, object], ...]
-) -> Solved:
-    """One run of IPOPT."""
-    tolerance, max_iterations, seconds = settings
-    solver = _program(nlp, min(1e-8, 0.1 * tolerance), max_iterations, seconds, strategy)
+def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: Strategy) -> Solved:
+    """A run of IPOPT, and another one from where it stopped if that was an end of the widened box of a periodic variable."""
+    iterations = 0
+    for _ in range(RESTARTS + 1):
+        solved, stuck = _attempt(nlp, task, start, settings, strategy)
+        iterations += solved.iterations
+        if not stuck or solved.clocked:
+            break
+        start = solved.z
+    return replace(solved, iterations=iterations)
+
+
+def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: Strategy) -> tuple[Solved, bool]:
+    """One run of IPOPT, and whether it stopped at an end of a widened box."""
+    tolerance = settings.tolerance
+    solver = _program(nlp, settings, strategy)
     lower, upper = scaled_bounds(nlp)
     y = np.clip((start - origin(nlp)) / nlp.scale, lower, upper)
     upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
@@ -197,7 +220,9 @@ def _attempt(
     )
     stats = solver.stats()
     words, iterations = stats["return_status"], int(stats["iter_count"])
-    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + np.array(answer["x"]).ravel()[:-1] * nlp.scale)[None])[0]
+    y = np.array(answer["x"]).ravel()[:-1]
+    stuck = bool(((nlp.period > 0) & (np.minimum(y - lower, upper - y) * nlp.scale < AT_END * nlp.period)).any())
+    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
     F, violation = nlp.evaluate(z[None])
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
         z, said = start, FAILED
@@ -206,7 +231,7 @@ def _attempt(
         said = CONVERGED if words in SOLVED else SAID.get(words, FAILED)
     else:
         said = INFEASIBLE if words in SOLVED else SAID.get(words, FAILED)
-    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words)
+    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words), stuck
 
 
 def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
@@ -217,7 +242,7 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=32)
-def _program(nlp: NLP, feasibility: float, max_iterations: int, seconds: float, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
+def _program(nlp: NLP, settings: _Settings, strategy: Strategy) -> ca.Function:
     """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)
     n, m = len(nlp.variables), len(nlp.problem.goals)
@@ -227,10 +252,10 @@ def _program(nlp: NLP, feasibility: float, max_iterations: int, seconds: float, 
     above = (F - shift) * inverse
     rows = ca.vertcat(g / nlp.g_scale, above - x[n] * slope, above)
     parts = expanded(ca.Function("program", [x, p], [x[n], rows], ["x", "p"], ["f", "g"]))
-    options = quiet(seconds, max_iterations) | {
+    options = quiet(settings.seconds, settings.max_iterations) | {
         "ipopt.tol": ACCURACY,
         "ipopt.acceptable_tol": 100 * ACCURACY,
-        "ipopt.constr_viol_tol": feasibility,
+        "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
         "ipopt.nlp_scaling_method": "none",
         "ipopt.bound_relax_factor": 0.0,
     }
