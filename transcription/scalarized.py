@@ -30,8 +30,14 @@ AT_END, RESTARTS = 1e-2, 3
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 Strategy = tuple[tuple[str, object], ...]
-ADAPTIVE: Strategy = (("mu_strategy", "adaptive"),)
-"""Few iterations from good points and poor ones; measured against all of IPOPT's other strategies."""
+ADAPTIVE: Strategy = (
+    ("mu_strategy", "adaptive"),
+    ("fast_step_computation", "yes"),
+    ("mumps_scaling", 0),
+    ("mumps_permuting_scaling", 0),
+    ("mumps_pivot_order", 0),
+)
+"""Few iterations from good points and poor ones, and cheap ones: what is scaled already needs neither scaling nor refinement."""
 NEAR: Strategy = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
 """Stays closer to where it starts."""
 SLOW: Strategy = (("mu_init", 1e-1),)
