@@ -7,14 +7,12 @@ from collections import Counter
 import numpy as np
 
 from transcription.base import NLP
-from transcription.scalarized import Solved, objective_scales, scalarize
+from transcription.scalarized import Solved, scalarize
 
 from .evaluation import CONVERGED, Counts
 
 HOPELESS = 100.0
 """Propagated states that miss bounds or constraints by more scales than this are worse to start from than a straight line."""
-SLACK = 1e-9
-"""By how much, in its natural scale, an objective that was minimised may rise again while the next one is: an interior for IPOPT."""
 
 LIMIT, BETTER = 1e-8, 1e-7
 """By what fraction of an objective's range a limit may be missed, and by what alpha an answer counts as better than another."""
@@ -88,8 +86,8 @@ class Descents:
                 best = solved
             if best.status != CONVERGED:
                 break
-            # The least value seen under these limits, so that solves that end a little above it do not push it up.
-            ceiling[j] = best.F[j] + SLACK * objective_scales(self.nlp, best.z)[j]
+            # No slack: where the front is steep, what it gives away in one objective is its square root in another.
+            ceiling[j] = best.F[j]
         assert best is not None
         return best
 

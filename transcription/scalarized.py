@@ -23,8 +23,10 @@ from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, back_in_bounds, origi
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
-PEAK_LIMIT = 100.0
+PEAK_LIMIT = 3.0
 """How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
+SAMPLES = 31
+"""Where the slopes of objectives are looked at to know their scales."""
 AT_END, RESTARTS = 1e-2, 3
 """How near, in periods, to an end of its widened box a periodic variable is stopped by it; how often it may begin anew."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -158,11 +160,16 @@ def scalarize(
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
 
 
-def objective_scales(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """What each objective would change by, to first order at z (n,), if all variables moved by their scales; 1 where that is nothing."""
-    slopes = np.array(gradients(nlp)(z)[0]) * nlp.scale
-    sizes = np.abs(slopes).sum(axis=1)
-    return np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
+@lru_cache(maxsize=16)
+def objective_scales(nlp: NLP) -> np.ndarray:
+    """What counts as one in each objective (m,) as long as nobody knows the front: what it would change by, to first order, if all
+    variables moved by their scales; the median over the box, 1 where that is nothing.
+    """
+    rng = np.random.default_rng(0)
+    lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
+    slopes = [np.array(gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower))[0]) for _ in range(SAMPLES)]
+    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=0)
+    return np.where(sizes > 0, sizes, 1.0)
 
 
 @lru_cache(maxsize=8)
@@ -191,7 +198,7 @@ def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarra
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
-    scale = objective_scales(nlp, start)
+    scale = objective_scales(nlp)
     slope = np.where(moving, weights, 0.0) / scale
     return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
 
