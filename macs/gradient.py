@@ -16,6 +16,7 @@ from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription.base import Transcription
+from transcription.optimality import optimality
 from transcription.scalarized import Solved
 
 from .descents import Descents
@@ -231,8 +232,6 @@ class _Job:
 
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
         """Solves as a front, certified; objectives in `ranges` (m,)."""
-        from transcription.optimality import optimality
-
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         counts = self.descents.counts
         certificates = [optimality(self.nlp, z, ranges) for z in Z]

@@ -68,6 +68,39 @@ def shuttle(tf: object = (1.0, 3.0)) -> Problem:
     return problem
 
 
+def compass() -> Problem:
+    """A course u, periodic, from the origin at unit speed: as far west as possible, which is the end of the box of u; and north."""
+    problem = Problem("compass")
+    walk = problem.phase("walk", t0=0, tf=2)
+    x, y = walk.state("x", bounds=(-5, 5), initial=0), walk.state("y", bounds=(-5, 5), initial=0)
+    u = walk.control("u", bounds=(-ca.pi, ca.pi), period=2 * ca.pi)
+    walk.dynamics(x=ca.cos(u), y=ca.sin(u))
+    problem.minimize("x", walk.final(x))
+    problem.minimize("y", walk.final(y))
+    return problem
+
+
+def with_peak(use: str) -> Problem:
+    problem = shuttle()
+    phase = problem.phases["trip"]
+    peak, low = phase.peak(phase["v"]), -phase.peak(-phase["v"])
+    if use == "maximised":
+        problem.maximize("speed", peak)
+    elif use == "minimum minimised":
+        problem.minimize("least speed", low)
+    elif use == "bounded below":
+        problem.constraint("fast enough", peak**3, lower=0.1)
+    elif use == "equal":
+        problem.constraint("just so", peak, lower=1, upper=1)
+    elif use == "minimum maximised":
+        problem.maximize("least speed", low + phase.tf)
+    elif use == "minimum bounded below":
+        problem.constraint("not too slow", low, lower=-4)
+    elif use == "convex and rising":
+        problem.minimize("speed", ca.exp(peak) + peak**3)
+    return problem
+
+
 def nlp_of(problem: Problem, mesh: DFET | None = None) -> NLP:
     """The NLP on a mesh of four elements of order 2."""
     return (mesh or DFET(4, 2)).transcribe(problem)

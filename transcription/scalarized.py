@@ -19,30 +19,43 @@ import numpy as np
 from problems.peaks import refuse_peaks
 
 from .base import NLP, expanded
+from .derivatives import objective_scales
 from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, back_in_bounds, origin, quiet, scaled_bounds
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
 PEAK_LIMIT = 3.0
 """How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
-SAMPLES = 31
-"""Where the slopes of objectives are looked at to know their scales."""
 AT_END, RESTARTS = 1e-2, 3
-"""How near, in periods, to an end of its widened box a periodic variable is stopped by it; how often it may begin anew."""
+"""How near, in widths of its box, a variable is to an end that stops it; how often a solve may begin anew for that."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
-Strategy = tuple[tuple[str, object], ...]
-ADAPTIVE: Strategy = (
+
+@dataclass(frozen=True)
+class _Manner:
+    """How IPOPT goes about it: its options, how far free variables may move in spans, whether alpha may not exceed the start's."""
+
+    options: tuple[tuple[str, object], ...]
+    radius: float = np.inf
+    held: bool = False
+
+
+ADAPTIVE = _Manner((
     ("mu_strategy", "adaptive"),
     ("fast_step_computation", "yes"),
     ("mumps_scaling", 0),
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
-)
+))  # fmt: skip
 """Few iterations from good points and poor ones, and cheap ones: what is scaled already needs neither scaling nor refinement."""
-NEAR: Strategy = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
-"""Stays closer to where it starts."""
-SLOW: Strategy = (("mu_init", 1e-1),)
+NEAR = _Manner(
+    (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4)),
+    radius=0.1,
+    held=True,
+)
+"""Stays in the basin of a feasible start."""
+SLOW = _Manner((("mu_init", 0.1),))
+"""IPOPT as it comes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,33 +164,13 @@ def scalarize(
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    ahead = 0.0 if feasible else np.inf
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
-    if first.clocked or (first.status == CONVERGED and task.value(first.F) <= ahead + tolerance):
+    worse = feasible and task.value(first.F) > tolerance
+    if first.clocked or (first.status == CONVERGED and not worse):
         return first
     second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
     best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
-
-
-@lru_cache(maxsize=16)
-def objective_scales(nlp: NLP) -> np.ndarray:
-    """What counts as one in each objective (m,) as long as nobody knows the front: what it would change by, to first order, if all
-    variables moved by their scales; the median over the box, 1 where that is nothing.
-    """
-    rng = np.random.default_rng(0)
-    lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
-    slopes = [np.array(gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower))[0]) for _ in range(SAMPLES)]
-    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=0)
-    return np.where(sizes > 0, sizes, 1.0)
-
-
-@lru_cache(maxsize=8)
-def gradients(nlp: NLP) -> ca.Function:
-    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
-    z = ca.MX.sym("z", len(nlp.variables))
-    F, g = nlp.functions(z)
-    return expanded(ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"]))
 
 
 def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> _Task:
@@ -203,38 +196,39 @@ def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarra
     return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
 
 
-def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: Strategy) -> Solved:
-    """A run of IPOPT, and another one from where it stopped if that was an end of the widened box of a periodic variable."""
+def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> Solved:
+    """A run of IPOPT, and more from where it stopped, as long as that is an end of a box that the problem does not have."""
     iterations = 0
     for _ in range(RESTARTS + 1):
-        solved, stuck = _attempt(nlp, task, start, settings, strategy)
+        solved, stuck = _attempt(nlp, task, start, settings, manner)
         iterations += solved.iterations
         if not stuck or solved.clocked:
             break
         start = solved.z
+    if stuck and solved.status == CONVERGED:
+        solved = replace(solved, status=FAILED)
     return replace(solved, iterations=iterations)
 
 
-def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: Strategy) -> tuple[Solved, bool]:
-    """One run of IPOPT, and whether it stopped at an end of a widened box."""
+def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> tuple[Solved, bool]:
+    """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    solver = _program(nlp, settings, strategy)
-    lower, upper = scaled_bounds(nlp)
-    y = np.clip((start - origin(nlp)) / nlp.scale, lower, upper)
-    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
+    solver = _program(nlp, settings, manner.options)
+    y = np.clip((start - origin(nlp)) / nlp.scale, *scaled_bounds(nlp))
+    lower, upper, made_up = _box(nlp, y, manner.radius)
     none = np.full(2 * len(task.used), -np.inf)
     answer = solver(
         x0=np.append(y, 0.0),
         p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
         lbx=np.append(lower, -np.inf),
-        ubx=np.append(upper, np.inf),
+        ubx=np.append(upper, 0.0 if manner.held else np.inf),
         lbg=np.concatenate([nlp.g_lower / nlp.g_scale, none]),
         ubg=np.concatenate([nlp.g_upper / nlp.g_scale, np.where(task.used, 0.0, np.inf), task.top]),
     )
     stats = solver.stats()
     words, iterations = stats["return_status"], int(stats["iter_count"])
     y = np.array(answer["x"]).ravel()[:-1]
-    stuck = bool(((nlp.period > 0) & (np.minimum(y - lower, upper - y) * nlp.scale < AT_END * nlp.period)).any())
+    stuck = bool((made_up & (np.stack([y - lower, upper - y]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
     z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
     F, violation = nlp.evaluate(z[None])
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
@@ -247,6 +241,16 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words), stuck
 
 
+def _box(nlp: NLP, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bounds of the scaled variables around y, (n,) each, and which of them the problem does not have, (2, n)."""
+    lower, upper = scaled_bounds(nlp)
+    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
+    reach = np.full(len(y), np.inf)
+    reach[nlp.free] = radius * (nlp.span / nlp.scale)[nlp.free]
+    low, high = np.maximum(lower, y - reach), np.minimum(upper, y + reach)
+    return low, high, np.stack([low > lower, high < upper]) | (nlp.period > 0)
+
+
 def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
     """Feasible before infeasible, by what they miss; then by alpha."""
     missed = max(solved.violation, task.excess(solved.F))
@@ -255,7 +259,7 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=32)
-def _program(nlp: NLP, settings: _Settings, strategy: Strategy) -> ca.Function:
+def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
     """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)
     n, m = len(nlp.variables), len(nlp.problem.goals)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from smooth_problems import corners, nlp_of, shuttle, slide, two_wells, vector
+from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells, vector, with_peak
 
-from problems import Problem, load
+from problems import load
 from problems.goddard import reference
 from transcription import DFET, NLP
 from transcription.inner import inner_solver
@@ -136,18 +135,6 @@ def test_a_guarded_solve_makes_no_objective_worse(seed: int, orbits: bool) -> No
     assert again.status == "converged" and np.all((again.F - solved.F) / ranges <= 1e-7)
 
 
-def compass() -> Problem:
-    """A course u, periodic, from the origin at unit speed: as far west as possible, which is the end of the box of u; and north."""
-    problem = Problem("compass")
-    walk = problem.phase("walk", t0=0, tf=2)
-    x, y = walk.state("x", bounds=(-5, 5), initial=0), walk.state("y", bounds=(-5, 5), initial=0)
-    u = walk.control("u", bounds=(-ca.pi, ca.pi), period=2 * ca.pi)
-    walk.dynamics(x=ca.cos(u), y=ca.sin(u))
-    problem.minimize("x", walk.final(x))
-    problem.minimize("y", walk.final(y))
-    return problem
-
-
 @pytest.mark.parametrize("course", [2.8, -2.8, 0.3, 3.1415])
 def test_a_periodic_control_passes_the_end_of_its_box(course: float) -> None:
     nlp = nlp_of(compass())
@@ -174,27 +161,6 @@ def test_a_peak_that_is_bounded_above() -> None:
     problem.constraint("thrust", problem.phases["trip"].peak(problem.phases["trip"]["u"] ** 2), upper=4.0)
     solved = solve(nlp_of(problem), [0, INF], [1, 1])
     assert solved.status == "converged" and solved.F[0] == pytest.approx(np.sqrt(2), abs=1e-6)
-
-
-def with_peak(use: str) -> Problem:
-    problem = shuttle()
-    phase = problem.phases["trip"]
-    peak, low = phase.peak(phase["v"]), -phase.peak(-phase["v"])
-    if use == "maximised":
-        problem.maximize("speed", peak)
-    elif use == "minimum minimised":
-        problem.minimize("least speed", low)
-    elif use == "bounded below":
-        problem.constraint("fast enough", peak**3, lower=0.1)
-    elif use == "equal":
-        problem.constraint("just so", peak, lower=1, upper=1)
-    elif use == "minimum maximised":
-        problem.maximize("least speed", low + phase.tf)
-    elif use == "minimum bounded below":
-        problem.constraint("not too slow", low, lower=-4)
-    elif use == "convex and rising":
-        problem.minimize("speed", ca.exp(peak) + peak**3)
-    return problem
 
 
 @pytest.mark.parametrize(
