@@ -18,8 +18,7 @@ from .point import Point
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
     """Raise ValueError for arguments of `solve` and `minimize` that make no sense."""
-    if isinstance(evaluations, bool) or not isinstance(evaluations, int | np.integer) or evaluations < 1:
-        raise ValueError(f"evaluations must be a whole number of at least 1, not {evaluations!r}")
+    check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
     for name, value in (("tolerance", tolerance), ("time_limit", time_limit)):
@@ -31,6 +30,12 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
         raise ValueError(f"callback must be callable, not {callback!r}")
     if checkpoint is not None:
         raise ValueError("checkpoint: not available yet")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Raise ValueError unless `value` is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
 def check_problem(problem: Any, transcription: Any) -> None:

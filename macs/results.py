@@ -14,37 +14,53 @@ from transcription.sampling import excursions
 from .archive import Archive
 from .evaluation import CONVERGED, FAILED, INFEASIBLE
 from .front import Front
+from .point import Point
 
 
-def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Front:
-    """A front of trajectories; violations are taken anew from the NLP, not from whoever found the points."""
-
-    def of(points: Archive, **more: Any) -> Front:
-        F, violation = nlp.evaluate(points.Z) if len(points) else (points.F, points.violation)
-        flights = [nlp.unpack(z) for z in points.Z]
-        return Front(
-            F=F,
-            decision=points.Z,
-            violation=violation,
-            status=_status(violation, stats["tolerance"]),
-            goals=nlp.problem.goals,
-            variables=nlp.variables,
-            violations=[nlp.violations(z) for z in points.Z],
-            trajectories=flights,
-            excursions=[excursions(nlp.problem, flight) for flight in flights],
-            problem=nlp.problem,
-            transcription=nlp.transcription.to_dict(),
-            solver=solver,
-            stats=stats,
-            **more,
-        )
-
+def trajectory_front(
+    nlp: NLP,
+    archive: Archive,
+    closest: Archive,
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+    optimality: Sequence[float | None] | None = None,
+) -> Front:
+    """A front of the trajectories in an archive; `optimality` has an entry for each, if they were certified."""
     if len(archive):
-        return of(archive)
-    nearest = of(closest)[0]
+        return vectors_front(nlp, archive.Z, solver, stats, optimality=optimality)
+    nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
+    return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+
+
+def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Front:
+    """A front of vectors (k, n) of an NLP; `more` is for `Front`.
+
+    Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
+    """
+    F, violation = nlp.evaluate(Z) if len(Z) else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    flights = [nlp.unpack(z) for z in Z]
+    given = {"status": _status(violation, stats["tolerance"])} | more
+    return Front(
+        F=F,
+        decision=Z,
+        violation=violation,
+        goals=nlp.problem.goals,
+        variables=nlp.variables,
+        violations=[nlp.violations(z) for z in Z],
+        trajectories=flights,
+        excursions=[excursions(nlp.problem, flight) for flight in flights],
+        problem=nlp.problem,
+        transcription=nlp.transcription.to_dict(),
+        solver=solver,
+        stats=stats,
+        **given,
+    )
+
+
+def nearest_misses(nearest: Point) -> str:
+    """What keeps the least infeasible point from being feasible."""
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
-    why = f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
-    return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
+    return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
 
 
 def black_box_front(

@@ -1,0 +1,75 @@
+"""Which scalarised problems make a front: references and weights spread evenly between its ends."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import comb
+
+import numpy as np
+
+from .directions import simplex_lattice
+
+METHODS = ("pascoletti-serafini", "epsilon")
+NO_RANGE = 1e-9
+"""An objective that differs by less than this fraction of its size between the ends is in conflict with no other."""
+
+Task = tuple[np.ndarray, np.ndarray]
+"""Reference and weights, as `transcription.scalarized.scalarize` takes them."""
+
+
+def check_points(points: int, m: int) -> None:
+    """Raise ValueError for a number of points with which m objectives make no front."""
+    if m == 1:
+        raise ValueError("a problem with one objective has no front to sweep; use optimize")
+    if points < m:
+        raise ValueError(f"points must be at least {m}, one for each objective, not {points}")
+
+
+def targets(ends: np.ndarray, points: int, method: str) -> list[Task]:
+    """Problems whose answers, with the ends, make a front of at most `points` points.
+
+    Parameters
+    ----------
+    ends : array (m, m)
+        Objectives, minimised, of the end that is best in each of them.
+    points : int
+        Ends included.
+    method : "pascoletti-serafini" or "epsilon"
+
+    Returns
+    -------
+    list of (reference (m,), weights (m,))
+        Neighbours in the list are neighbours on the front, as far as there is such an order. Empty if the objectives are not in conflict.
+    """
+    ideal, nadir = ends.min(axis=0), ends.max(axis=0)
+    ranges = nadir - ideal
+    conflict = ranges > NO_RANGE * np.maximum(np.abs(ideal), np.abs(nadir))
+    if conflict.sum() < 2:
+        return []
+    return (_down if method == "pascoletti-serafini" else _limited)(ends, ideal, np.where(conflict, ranges, 0.0), points)
+
+
+def _down(ends: np.ndarray, ideal: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """From a lattice on the simplex between the ends, all ranges at once."""
+    m = len(ends)
+    divisions = 1
+    while comb(divisions + m, m - 1) <= points:
+        divisions += 1
+    inner = [share for share in simplex_lattice(m, divisions) if share.max() < 1.0]
+    return [(share @ ends, ranges) for share in inner]
+
+
+def _limited(ends: np.ndarray, ideal: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """The first objective that is in conflict, at all combinations of evenly spread limits of the others."""
+    m, first = len(ends), int(np.flatnonzero(ranges > 0)[0])
+    others = [i for i in range(m) if i != first]
+    levels = int((points - m) ** (1.0 / (m - 1)) + 1e-9)
+    # Of two objectives, the loosest limit gives an end; of more, combinations with it are new.
+    shares = np.arange(1, levels + 1) / (levels + (m == 2))
+    tasks = []
+    for combination in product(shares, repeat=m - 1):
+        reference = ideal.copy()
+        reference[first] = 0.0
+        reference[others] += np.array(combination) * ranges[others]
+        tasks.append((reference, np.where(np.arange(m) == first, ranges, 0.0)))
+    return tasks
