@@ -120,9 +120,9 @@ class Assembly:
         """What propagation leaves to satisfy."""
         left = [i for i, marched in enumerate(rows.marched) if not marched]
         function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
-        limits = [np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale)]
+        lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
         slots = np.concatenate(self._peaks)
-        return Reduced(self.layout, list(self._writers.values()), self._marched, (slots, peaks), (function, *limits))
+        return Reduced(self.layout, list(self._writers.values()), self._marched, (slots, peaks), (function, lower, upper, scale))
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.tighten`."""

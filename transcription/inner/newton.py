@@ -102,7 +102,7 @@ def _towards(
     reduced: Reduced, flown: Flown, watched: np.ndarray, pull: np.ndarray, span: np.ndarray, box: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched (k, rows)."""
-    rows = watched.any(axis=0)
+    rows = np.asarray(watched.any(axis=0))
     if not rows.any():
         return np.clip(pull, *box)
     scale = reduced.scale[rows]
