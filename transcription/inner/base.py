@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import NLP
+from ..programs import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
-CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
+__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "started"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,8 @@ import casadi as ca
 import numpy as np
 
 from ..base import NLP, expanded
-from .base import FAILED, INFEASIBLE, TIMEOUT, InnerResult, InnerSolver, result, started
-
-_SAID = {
-    "Infeasible_Problem_Detected": INFEASIBLE,
-    "Maximum_CpuTime_Exceeded": TIMEOUT,
-    "Maximum_WallTime_Exceeded": TIMEOUT,
-}
+from ..programs import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
 
 
 @dataclass(frozen=True)
@@ -75,7 +70,7 @@ class Ipopt(InnerSolver):
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
         solver, lower, upper = _program(nlp, self, tolerance)
-        scale, origin = nlp.scale, _origin(nlp)
+        scale, zero = nlp.scale, origin(nlp)
         Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
@@ -84,52 +79,33 @@ class Ipopt(InnerSolver):
             if violation[row] <= tolerance and self.objective == "projection":
                 Z[row] = guess[row]
                 continue
-            y0 = np.clip((guess[row] - origin) / scale, lower, upper)
+            y0 = np.clip((guess[row] - zero) / scale, lower, upper)
             answer = solver(
                 x0=y0, p=start[row, nlp.free], lbx=lower, ubx=upper, lbg=nlp.g_lower / nlp.g_scale, ubg=nlp.g_upper / nlp.g_scale
             )
             stats = solver.stats()
-            Z[row] = _back_in_bounds(nlp, origin + np.array(answer["x"]).ravel() * scale)
-            said[row] = _SAID.get(stats["return_status"], FAILED)
+            Z[row] = back_in_bounds(nlp, zero + np.array(answer["x"]).ravel() * scale)
+            said[row] = SAID.get(stats["return_status"], FAILED)
             iterations[row] = stats["iter_count"]
         return nlp.tighten(Z), said, iterations
 
 
 @lru_cache(maxsize=8)
 def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
-    """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y.
-
-    Periodic variables get one more period on either side, so that a bound never stops them.
-    """
+    """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
-    origin = _origin(nlp)
-    z = origin + y * nlp.scale
+    z = origin(nlp) + y * nlp.scale
     _, g = nlp.functions(z)
     constant = settings.objective == "constant"
     f = ca.MX(1) if constant else ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free])
     parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
     solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
-    return solver, (nlp.lower - nlp.period - origin) / nlp.scale, (nlp.upper + nlp.period - origin) / nlp.scale
-
-
-def _origin(nlp: NLP) -> np.ndarray:
-    """Where y = 0: the lower bounds, so that a narrow range far from zero (a radius, a date) keeps its digits."""
-    return np.where(np.isfinite(nlp.lower), nlp.lower, 0.0)
+    return solver, *scaled_bounds(nlp)
 
 
 def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
-    options: dict[str, Any] = {
-        "print_time": False,
-        "error_on_fail": False,
-        "record_time": False,
-        "show_eval_warnings": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.max_iter": settings.max_iterations,
-        "ipopt.max_wall_time": settings.seconds,
-        "ipopt.tol": 0.1 * tolerance,
-        "ipopt.constr_viol_tol": 0.1 * tolerance,
-    }
+    options = quiet(settings.seconds, settings.max_iterations)
+    options |= {"ipopt.tol": 0.1 * tolerance, "ipopt.constr_viol_tol": 0.1 * tolerance}
     if settings.objective == "projection":
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
         options |= {
@@ -142,10 +118,3 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
             "ipopt.acceptable_iter": 0,
         }
     return options
-
-
-def _back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """Periodic variables wrapped, the others clipped."""
-    out = np.flatnonzero((nlp.period > 0) & ((z < nlp.lower) | (z > nlp.upper)))
-    z[out] = nlp.lower[out] + np.mod(z[out] - nlp.lower[out], nlp.period[out])
-    return np.clip(z, nlp.lower, nlp.upper)
