@@ -30,6 +30,18 @@ def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
     _finite(problem.constraints, (*quantities, p), [f"constraint '{limit.name}' {place}" for limit in problem.limits])
 
 
+def samples(problem: CompiledProblem, count: int = 64) -> list[np.ndarray]:
+    """What objectives and constraints may see: columns of quantities of each phase and of parameters, (size, count) each."""
+    rng = np.random.default_rng(0)
+    p = _within(rng, [(v.lower, v.upper) for v in problem.parameters])
+    found = []
+    for phase in problem.phases:
+        names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
+        labels = {name: [name] * getattr(phase, name).size1_out(0) for name in names}
+        found.append(_quantities(phase, labels, p, rng))
+    return [values[:, :count] for values in (*found, p)]
+
+
 def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Samples of what objectives and constraints see of a phase, shape (n_quantities, SAMPLES)."""
     t0, tf = _times(phase, rng)

@@ -1,0 +1,237 @@
+"""Gradient solves of one Pareto point: every scalarisation of several objectives as one nonlinear program.
+
+    minimise alpha   subject to   F_i(z) - reference_i <= alpha weights_i,   F_i(z) <= ceiling_i,   all rows and bounds of the NLP.
+
+With positive weights this is Pascoletti and Serafini, "Scalarizing vector optimization problems", JOTA 42(4), 1984: from the reference
+along the weights to the front. A weight of 0 makes the reference a hard limit, so that one positive weight is the epsilon-constraint
+method; an infinite reference leaves an objective out, so that one positive weight and nothing else is plain minimisation. With the
+objectives of a feasible point as the reference, alpha <= 0 says that none got worse than there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from problems.peaks import refuse_peaks
+
+from .base import NLP, expanded
+from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, back_in_bounds, origin, quiet, scaled_bounds
+
+ACCURACY = 1e-9
+"""IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
+PEAK_LIMIT = 100.0
+"""How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
+ADAPTIVE = (("mu_strategy", "adaptive"),)
+"""Few iterations from good points and poor ones; measured against all of IPOPT's other strategies."""
+NEAR = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
+"""Stays closer to where it starts."""
+SLOW = (("mu_init", 1e-1),)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What came of one solve.
+
+    Attributes
+    ----------
+    z : array (n,)
+        The vector that was found, within its bounds, periodic variables wrapped; the start where nothing was.
+    F : array (m,)
+        Objectives there, all minimised.
+    violation : float
+        Largest scaled residual of the NLP there; infinite where it is no number.
+    status : str
+        "converged" (a local optimum, and feasible by `NLP.evaluate` and within all limits), "infeasible", "failed" or "timeout".
+    iterations : int
+        Of IPOPT.
+    clocked : bool
+        Whether a clock ended any of the work: then the same solve need not give the same again.
+    """
+
+    z: np.ndarray
+    F: np.ndarray
+    violation: float
+    status: str
+    iterations: int
+    clocked: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """One scalarisation in numbers near one.
+
+    Row i is (F_i - shift_i) / scale_i <= slope_i a, with a = 0 at the start; (F_i - shift_i) / scale_i <= top_i is its hard limit.
+    """
+
+    shift: np.ndarray
+    scale: np.ndarray
+    slope: np.ndarray
+    used: np.ndarray
+    top: np.ndarray
+
+    def value(self, F: np.ndarray) -> float:
+        """The least a that F (m,) allows."""
+        moving = self.slope > 0
+        return float(np.max((F - self.shift)[moving] / (self.scale * self.slope)[moving]))
+
+    def excess(self, F: np.ndarray) -> float:
+        """How far F (m,) exceeds hard limits, in scales."""
+        over = (F - self.shift) / self.scale
+        hard = self.used & (self.slope == 0)
+        return float(np.fmax(over - self.top, np.where(hard, over, -np.inf)).max(initial=0.0))
+
+
+def scalarize(
+    nlp: NLP,
+    start: np.ndarray,
+    *,
+    reference: np.ndarray,
+    weights: np.ndarray,
+    ceiling: np.ndarray | None = None,
+    tolerance: float = 1e-6,
+    max_iterations: int = 500,
+    seconds: float = 60.0,
+) -> Solved:
+    """Go down from a point to the front: least alpha with F - reference <= alpha weights.
+
+    Parameters
+    ----------
+    nlp : NLP
+    start : array (n,)
+        A full vector; its states need not obey the dynamics. From a point near the answer the solve takes a few iterations.
+    reference, weights : arrays (m,)
+        For minimised objectives. Weights are not negative, and say what counts as much in each objective; weight 0: a hard limit at the
+        reference. Reference +inf: the objective does not matter.
+    ceiling : array (m,), optional
+        Hard limits of the objectives beside; +inf for none.
+    tolerance : float
+        Largest scaled residual of a feasible point.
+    max_iterations, seconds : int, float
+        Limits of IPOPT. The time is a safety net: what it ends is not reproducible.
+
+    Returns
+    -------
+    Solved
+        A local optimum. It may be worse than a feasible start: where that matters, compare, or give the start's objectives as ceiling.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not match, a weight is negative or none that matters is positive, the start is no number, or a peak is used otherwise
+        than minimised or bounded above.
+    """
+    task = _task(nlp, start, reference, weights, ceiling)
+    settings = (tolerance, max_iterations, seconds)
+    first = _attempt(nlp, task, start, settings, ADAPTIVE)
+    F, violation = nlp.evaluate(start[None])
+    feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
+    ahead = 0.0 if feasible else np.inf
+    if first.clocked or (first.status == CONVERGED and task.value(first.F) <= ahead + tolerance):
+        return first
+    second = _attempt(nlp, task, start, settings, NEAR if feasible else SLOW)
+    best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
+    return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
+
+
+def objective_scales(nlp: NLP, z: np.ndarray) -> np.ndarray:
+    """What each objective would change by, to first order at z (n,), if all variables moved by their scales; 1 where that is nothing."""
+    slopes = np.array(gradients(nlp)(z)[0]) * nlp.scale
+    sizes = np.abs(slopes).sum(axis=1)
+    return np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
+
+
+@lru_cache(maxsize=8)
+def gradients(nlp: NLP) -> ca.Function:
+    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
+    z = ca.MX.sym("z", len(nlp.variables))
+    F, g = nlp.functions(z)
+    return expanded(ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"]))
+
+
+def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> _Task:
+    n, m = len(nlp.variables), len(nlp.problem.goals)
+    limits = np.full(m, np.inf) if ceiling is None else np.asarray(ceiling, dtype=float)
+    reference, weights = np.asarray(reference, dtype=float), np.asarray(weights, dtype=float)
+    for name, value, size in (("start", start, n), ("reference", reference, m), ("weights", weights, m), ("ceiling", limits, m)):
+        if np.shape(value) != (size,) or np.isnan(value).any():
+            raise ValueError(f"scalarize: {name} must be {size} numbers, not {value!r}")
+    used = reference < np.inf
+    moving = used & (weights > 0)
+    if not (np.isfinite(weights) & (weights >= 0)).all() or not moving.any() or not np.isfinite(reference[used]).all():
+        raise ValueError(
+            f"scalarize: weights must not be negative, and one with a finite reference positive, not {weights} for {reference}"
+        )
+    F = nlp.evaluate(start[None])[0][0]
+    F = np.where(np.isfinite(F), F, np.where(used, reference, 0.0))
+    # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
+    alpha = np.max((F[moving] - reference[moving]) / weights[moving])
+    shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
+    scale = objective_scales(nlp, start)
+    slope = np.where(moving, weights, 0.0) / scale
+    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
+
+
+def _attempt(
+    nlp: NLP, task: _Task, start: np.ndarray, settings: tuple[float, int, float], strategy: tuple[tuple[str, object], ...]
+) -> Solved:
+    """One run of IPOPT."""
+    tolerance, max_iterations, seconds = settings
+    solver = _program(nlp, min(1e-8, 0.1 * tolerance), max_iterations, seconds, strategy)
+    lower, upper = scaled_bounds(nlp)
+    y = np.clip((start - origin(nlp)) / nlp.scale, lower, upper)
+    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
+    none = np.full(2 * len(task.used), -np.inf)
+    answer = solver(
+        x0=np.append(y, 0.0),
+        p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
+        lbx=np.append(lower, -np.inf),
+        ubx=np.append(upper, np.inf),
+        lbg=np.concatenate([nlp.g_lower / nlp.g_scale, none]),
+        ubg=np.concatenate([nlp.g_upper / nlp.g_scale, np.where(task.used, 0.0, np.inf), task.top]),
+    )
+    stats = solver.stats()
+    words, iterations = stats["return_status"], int(stats["iter_count"])
+    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + np.array(answer["x"]).ravel()[:-1] * nlp.scale)[None])[0]
+    F, violation = nlp.evaluate(z[None])
+    if not (np.isfinite(F).all() and np.isfinite(violation[0])):
+        z, said = start, FAILED
+        F, violation = nlp.evaluate(z[None])
+    elif violation[0] <= tolerance and task.excess(F[0]) <= tolerance:
+        said = CONVERGED if words in SOLVED else SAID.get(words, FAILED)
+    else:
+        said = INFEASIBLE if words in SOLVED else SAID.get(words, FAILED)
+    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words)
+
+
+def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
+    """Feasible before infeasible, by what they miss; then by alpha."""
+    missed = max(solved.violation, task.excess(solved.F))
+    value = task.value(solved.F)
+    return (missed if missed > tolerance else 0.0, value if np.isfinite(value) else np.inf)
+
+
+@lru_cache(maxsize=32)
+def _program(nlp: NLP, feasibility: float, max_iterations: int, seconds: float, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
+    """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
+    refuse_peaks(nlp.problem)
+    n, m = len(nlp.variables), len(nlp.problem.goals)
+    x, p = ca.MX.sym("x", n + 1), ca.MX.sym("p", 3 * m)
+    shift, inverse, slope = ca.vertsplit(p, m)
+    F, g = nlp.functions(origin(nlp) + x[:n] * nlp.scale)
+    above = (F - shift) * inverse
+    rows = ca.vertcat(g / nlp.g_scale, above - x[n] * slope, above)
+    parts = expanded(ca.Function("program", [x, p], [x[n], rows], ["x", "p"], ["f", "g"]))
+    options = quiet(seconds, max_iterations) | {
+        "ipopt.tol": ACCURACY,
+        "ipopt.acceptable_tol": 100 * ACCURACY,
+        "ipopt.constr_viol_tol": feasibility,
+        "ipopt.nlp_scaling_method": "none",
+        "ipopt.bound_relax_factor": 0.0,
+    }
+    return ca.nlpsol("scalarized", "ipopt", parts, options | {f"ipopt.{name}": value for name, value in strategy})
