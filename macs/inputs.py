@@ -15,6 +15,8 @@ from transcription.base import NLP, Transcription
 from .front import Front
 from .point import Point
 
+OTHER = "start: the points are of other variables; a start belongs to one problem"
+
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
     """Raise ValueError for arguments of `solve` and `minimize` that make no sense."""
@@ -52,14 +54,17 @@ def check_freedom(nlp: NLP) -> None:
 def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
 
-    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables.
+    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
+    meshes are interpolated.
     """
     rows = []
     if np.isfinite(nlp.guess).any():
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
-    if start is not None:
-        _check_names(start, nlp.variables)
+    points = _points(start)
+    if points:
+        rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
+    elif start is not None:
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))
@@ -76,10 +81,13 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     ValueError
         If they have another length, are no numbers, or lie outside the bounds; the message names the variable.
     """
-    _check_names(start, variables)
-    Z = _array(start)
+    points = _points(start)
+    for point in points:
+        if [v.name for v in point.variables] != [v.name for v in variables]:
+            raise ValueError(OTHER)
+    Z = _array([point.decision for point in points] or start)
     if Z.shape[1] != len(variables):
-        raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected; a start belongs to one problem and mesh")
+        raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected")
     lower, upper, scale = (np.array([getattr(v, name) for v in variables]) for name in ("lower", "upper", "scale"))
     wrong = ~np.isfinite(Z) | (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
     if wrong.any():
@@ -89,21 +97,22 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     return np.clip(Z, lower, upper)
 
 
-def _check_names(start: Any, variables: Sequence[Variable]) -> None:
-    """Refuse a Front or Points whose decisions are of other variables."""
-    points = [start] if isinstance(start, Point) else start
-    for point in points if isinstance(points, Front | list | tuple) else ():
-        if isinstance(point, Point) and [v.name for v in point.variables] != [v.name for v in variables]:
-            raise ValueError("start: the points are of other variables; a start belongs to one problem and mesh")
+def _points(start: Any) -> list[Point]:
+    """The Points that a start consists of; none if it is an array."""
+    points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Front | list | tuple) else []
+    return points if all(isinstance(point, Point) for point in points) else []
+
+
+def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
+    """The vector (n,) of a point, interpolated if it is on another mesh."""
+    if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
+        return point.decision
+    if point.source is None or point.source.fingerprint != nlp.problem.fingerprint or point.trajectory is None:
+        raise ValueError(OTHER)
+    return nlp.interpolate(point.trajectory)
 
 
 def _array(start: Any) -> np.ndarray:
-    if isinstance(start, Point):
-        start = [start]
-    if isinstance(start, Front):
-        start = start.decision
-    elif isinstance(start, Sequence) and start and all(isinstance(point, Point) for point in start):
-        start = [point.decision for point in start]
     try:
         Z = np.atleast_2d(np.array(start, dtype=float))
     except (TypeError, ValueError):

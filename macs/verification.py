@@ -100,16 +100,25 @@ def verify(
         If the front is of a black box, or its problem or transcription cannot be made again.
     """
     problem = front.compiled()
-    if front.transcription is None:
-        raise ValueError("the front does not say how its problem was transcribed")
-    nlp = (transcription or from_dict(front.transcription)).transcribe(problem)
-    if tuple(v.name for v in nlp.variables) != tuple(v.name for v in front.variables):
-        raise ValueError(f"the decision vectors of this front ({len(front.variables)} entries) are not those of its transcription")
-    if (front.lengths != len(nlp.variables)).any():
-        raise ValueError(f"a decision vector of this front has not the {len(nlp.variables)} entries of its transcription")
+    nlps: dict[Transcription, NLP] = {}
+
+    def nlp_of(point: Point) -> NLP:
+        if point.transcription is None:
+            raise ValueError("the front does not say how its problem was transcribed")
+        method = transcription or from_dict(point.transcription)
+        if method not in nlps:
+            nlps[method] = method.transcribe(problem)
+        nlp = nlps[method]
+        if tuple(v.name for v in nlp.variables) != tuple(v.name for v in point.variables):
+            raise ValueError(
+                f"the decision vector of point {point.index} ({len(point.variables)} entries) is not that of its transcription "
+                f"({len(nlp.variables)} entries)"
+            )
+        return nlp
+
     scales, limit = objective_scales(front), front.stats["tolerance"]
 
-    def check(index: int, point: Point) -> Check:
+    def check(index: int, point: Point, nlp: NLP) -> Check:
         mismatch, where = _mismatch(point, nlp)
         objectives, violation, worst = _recomputed(point, nlp)
         defect, flown, most, miss = _flown(point, problem, scales, rtol, atol, method)
@@ -125,7 +134,9 @@ def verify(
         )
         return Check(index, mismatch, violation, objectives, defect, flown, miss, tuple(reason for wrong, reason in failures if wrong))
 
-    return [check(index, point) for index, point in enumerate(front)]
+    # All of them first: what is wrong with the front as such is said before any flight.
+    programs = [nlp_of(point) for point in front]
+    return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
 
 
 def objective_scales(front: Front) -> np.ndarray:
