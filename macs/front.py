@@ -223,6 +223,38 @@ class Front:
 
     # What it becomes
 
+    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8) -> Front:
+        """The front with each point solved anew on a mesh of its own, refined until what the point promises can be flown.
+
+        Errors are estimated by integration element by element, by looking at states, controls and path constraints between the nodes, and
+        by the objectives as flown. Elements are split where a solution is not smooth, and get a higher order where it is; controls that
+        leave their bounds between nodes are written by their Bernstein coefficients, which bound them. A point keeps its place along the
+        front: from its old objectives it is solved along the front's ranges (Pascoletti and Serafini); the best point of each objective is
+        that of the refined front.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest defect, and largest amount by which states and path constraints may leave their limits between nodes, in scales; ten
+            times this, in ranges of the front, is by how much objectives may still change from mesh to mesh, or when flown.
+        limit : int
+            How many meshes are tried for each point.
+
+        Returns
+        -------
+        Front
+            As many points. Those that do not meet the tolerance say why (`Point.note`), and `message` says how many do. Ctrl-C ends the
+            work with what there is.
+
+        Raises
+        ------
+        ValueError
+            For a black box, a problem that cannot be found, another transcription than DFET, and arguments that make no sense.
+        """
+        from .refining import refine_mesh
+
+        return refine_mesh(self, tolerance, limit)
+
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.
 

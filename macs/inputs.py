@@ -24,15 +24,19 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
         raise ValueError(f"evaluations must be a whole number of at least 1, not {evaluations!r}")
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
-    for name, value in (("tolerance", tolerance), ("time_limit", time_limit)):
-        if value is None and name == "time_limit":
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
-            raise ValueError(f"{name} must be a positive number, not {value!r}")
+    check_positive("tolerance", tolerance)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
     if callback is not None and not callable(callback):
         raise ValueError(f"callback must be callable, not {callback!r}")
     if checkpoint is not None:
         raise ValueError("checkpoint: not available yet")
+
+
+def check_positive(name: str, value: Any) -> None:
+    """Raise ValueError that names what is no positive number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
 
 
 def check_problem(problem: Any, transcription: Any) -> None:

@@ -20,24 +20,8 @@ def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mappi
     """A front of trajectories; violations are taken anew from the NLP, not from whoever found the points."""
 
     def of(points: Archive, **more: Any) -> Front:
-        F, violation = nlp.evaluate(points.Z) if len(points) else (points.F, points.violation)
-        flights = [nlp.unpack(z) for z in points.Z]
-        return Front(
-            F=F,
-            decision=points.Z,
-            violation=violation,
-            status=_status(violation, stats["tolerance"]),
-            goals=nlp.problem.goals,
-            variables=nlp.variables,
-            violations=[nlp.violations(z) for z in points.Z],
-            trajectories=flights,
-            excursions=[excursions(nlp.problem, flight) for flight in flights],
-            problem=nlp.problem,
-            transcription=nlp.transcription.to_dict(),
-            solver=solver,
-            stats=stats,
-            **more,
-        )
+        columns = trajectory_columns(nlp, points.Z, stats["tolerance"])
+        return Front(**columns, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats, **more)
 
     if len(archive):
         return of(archive)
@@ -45,6 +29,24 @@ def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mappi
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
     why = f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
     return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
+
+
+def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
+    """What a Front holds of vectors (k, n) of one NLP: k entries each."""
+    k = len(Z)
+    F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    flights = [nlp.unpack(z) for z in Z]
+    return {
+        "F": F,
+        "decision": Z,
+        "violation": violation,
+        "status": _status(violation, tolerance),
+        "variables": [nlp.variables] * k,
+        "violations": [nlp.violations(z) for z in Z],
+        "trajectories": flights,
+        "excursions": [excursions(nlp.problem, flight) for flight in flights],
+        "transcription": [nlp.transcription.to_dict()] * k,
+    }
 
 
 def black_box_front(

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,10 +147,9 @@ def objective_scales(front: Front) -> np.ndarray:
     return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
 
 
-def missed(flight: Simulation, point: Point, scales: np.ndarray) -> float:
-    """The largest difference between a point's objectives and those of its flight, divided by `scales` (m,)."""
-    stored = point.objectives
-    difference = np.abs([flight.objectives[name] - value for name, value in stored.items()])
+def missed(flight: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives, by name, and those of its flight, divided by `scales` (m,)."""
+    difference = np.abs([flight.objectives[name] - value for name, value in objectives.items()])
     return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
 
 
@@ -216,4 +215,4 @@ def _flown(
         return np.inf, np.inf, "everything", np.inf
     flight = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
     worst = max(flight.violations, key=lambda key: flight.violations[key], default="")
-    return flight.max_defect, flight.violation, worst, missed(flight, point, scales)
+    return flight.max_defect, flight.violation, worst, missed(flight, point.objectives, scales)

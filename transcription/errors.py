@@ -15,6 +15,8 @@ from .trajectory import PhaseTrajectory, Trajectory
 
 STEEP = 3.0
 """A control is steep where it changes so many times faster than on average over its element."""
+ON_BOUND = 1e-3
+"""A control is on a bound if it is nearer than this, in spans."""
 FLAT = 1e-4
 """What varies by less than this, in spans of its bounds, on an element is as good as constant: how it decays says nothing."""
 
@@ -28,6 +30,8 @@ class PhaseErrors:
     defect : array (N,)
         Largest difference between the state at the end of an element and what an integrator makes of the state at its beginning and of its
         controls, in spans of the states' bounds; infinite where the integration breaks down.
+    integral : array (N,)
+        The same for integrals, of which the transcription has a quadrature at its nodes, in sizes of their sums over all elements.
     excess : array (N,)
         How far states and path constraints leave their limits between nodes, in their scales.
     leaving : array (N,)
@@ -41,6 +45,7 @@ class PhaseErrors:
     """
 
     defect: np.ndarray
+    integral: np.ndarray
     excess: np.ndarray
     leaving: np.ndarray
     tail: np.ndarray
@@ -70,31 +75,51 @@ def _errors(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray
     names = {v.name for v in phase.controls}
     nothing = np.zeros(len(elements))
     controls, states = _coefficients(flown)
-    steep = [_steepest(flown, j) for j in elements]
+    defect, integral = local_defects(phase, flown, parameters, rtol, atol, method)
     return PhaseErrors(
-        defect=local_defects(phase, flown, parameters, rtol, atol, method),
+        defect=defect,
+        integral=integral,
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
         tail=np.abs(controls[:, -2:]).max(axis=(1, 2), initial=0.0) if controls.shape[1] > 1 else nothing,
         rate=np.minimum(decay_rates(states), decay_rates(controls)),
-        steep=np.array(steep),
+        steep=np.array([_steepest(flown, j) for j in elements]),
     )
 
 
 def local_defects(
     phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
-) -> np.ndarray:
-    """See `PhaseErrors.defect`."""
-    span = np.array([v.span for v in phase.states])
+) -> tuple[np.ndarray, np.ndarray]:
+    """See `PhaseErrors.defect` and `PhaseErrors.integral`."""
+    elements, span = len(flown.state.edges) - 1, np.array([v.span for v in phase.states])
     s = np.concatenate([[flown.t0, flown.tf], parameters])
-    integrals = np.zeros(phase.integrands.size1_out(0))
-    tolerances = atol * np.concatenate([span, np.ones(len(integrals))])
+    nothing = np.zeros(phase.integrands.size1_out(0))
+    tolerances = atol * np.concatenate([span, np.ones(len(nothing))])
+    starts = [np.concatenate([start, nothing]) for start in flown.edge_states[:-1]]
+    reached = np.array([fly_element(phase, flown, j, starts[j], s, rtol, tolerances, method)[-1] for j in range(elements)])
+    defect = (np.abs(reached[:, : len(span)] - flown.edge_states[1:]) / span).max(axis=1)
+    if not len(nothing):
+        return _or_infinite(defect), np.zeros(elements)
+    integrals = _quadrature(phase, flown, s)
+    sizes = np.abs(integrals).sum(axis=0)
+    difference = np.abs(reached[:, len(span) :] - integrals) / np.where(sizes > 0, sizes, 1.0)
+    return _or_infinite(defect), _or_infinite(difference.max(axis=1))
+
+
+def _quadrature(phase: CompiledPhase, flown: PhaseTrajectory, s: np.ndarray) -> np.ndarray:
+    """Integrals (N, k) over each element by Gauss-Legendre's rule on as many nodes as the trajectory has inside it."""
+    edges = flown.state.edges
+    tau, weights = gauss_legendre(max(1, (len(flown.time) - 1) // (len(edges) - 1) - 1))
     found = []
-    for j, (start, end) in enumerate(zip(flown.edge_states[:-1], flown.edge_states[1:], strict=True)):
-        reached = fly_element(phase, flown, j, np.concatenate([start, integrals]), s, rtol, tolerances, method)[-1, : len(span)]
-        amount = (np.abs(reached - end) / span).max()
-        found.append(amount if np.isfinite(amount) else np.inf)
+    for j, length in enumerate(np.diff(edges)):
+        times = edges[j] + 0.5 * (1.0 + tau) * length
+        values = np.array(phase.integrands(flown.state.on_element(j, tau).T, flown.controls_on(j, tau).T, times[None], s))
+        found.append(0.5 * length * values @ weights)
     return np.array(found)
+
+
+def _or_infinite(values: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(values), values, np.inf)
 
 
 def decay_rates(coefficients: np.ndarray) -> np.ndarray:
@@ -129,8 +154,12 @@ def _coefficients(flown: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steepest(flown: PhaseTrajectory, j: int) -> float:
-    """Where on element j, in (-1, 1), a control changes much faster than on average; NaN if none does."""
-    values = flown.control.on_element(j, DENSE) / np.array([v.span for v in flown.control_variables])
+    """See `PhaseErrors.steep`, on element j."""
+    variables = flown.control_variables
+    values = flown.control.on_element(j, DENSE) / np.array([v.span for v in variables])
+    for i, v in enumerate(variables):
+        if v.period is None and not np.isnan(place := _switch(values[:, i], v.lower / v.span)):
+            return place
     if not values.size:
         return np.nan
     middle = 0.5 * (DENSE[1:] + DENSE[:-1])
@@ -141,3 +170,14 @@ def _steepest(flown: PhaseTrajectory, j: int) -> float:
     ratio = np.where(mean > FLAT, slopes.max(axis=0) / np.where(mean > 0, mean, 1.0), 0.0)
     column = int(np.argmax(ratio))
     return float(middle[np.argmax(slopes[:, column])]) if ratio[column] >= STEEP else np.nan
+
+
+def _switch(values: np.ndarray, lower: float) -> float:
+    """Where a control, given at `DENSE` in spans, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
+    on = np.minimum(np.abs(values - lower), np.abs(values - lower - 1.0)) < ON_BOUND
+    changes = 0.5 * (DENSE[1:] + DENSE[:-1])[on[1:] != on[:-1]]
+    if not len(changes) or np.ptp(values) < 10.0 * ON_BOUND:
+        return np.nan
+    if on[0] and on[-1]:
+        return float(0.5 * (changes[0] + changes[-1]))
+    return float(changes[-1] if on[0] else changes[0])
