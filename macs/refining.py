@@ -16,6 +16,7 @@ from transcription.dfet import DFET
 from transcription.optimality import optimality
 from transcription.trajectory import Trajectory
 
+from .dominance import extremes
 from .evaluation import CONVERGED
 from .inputs import check_positive
 from .point import Point
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from .front import Front
 
 
+OPTIMAL = 1e-6
+"""A point whose optimality is at most this need not be solved anew on its own mesh."""
 LEAST_TOLERANCE = 1e-10
 """Below, double precision and the integrator cannot tell."""
 
@@ -95,11 +98,11 @@ class Refinement:
     def __init__(self, front: Front, tolerance: float, rounds: int) -> None:
         self.front, self.tolerance, self.rounds = front, tolerance, rounds
         self.problem = front.compiled()
-        good = front.status == CONVERGED
-        ranges = np.ptp(front.F[good], axis=0) if good.any() else np.zeros(len(front.goals))
+        self.good = np.flatnonzero(front.status == CONVERGED)
+        ranges = np.ptp(front.F[self.good], axis=0) if len(self.good) else np.zeros(len(front.goals))
         self.ranges = np.where(ranges > 0, ranges, objective_scales(front))
-        self.resolver = Resolver(self.ranges, front.F[good], 0.1 * tolerance)
-        self.points = {i: self._begin(i) for i in np.flatnonzero(good).tolist()}
+        self.resolver = Resolver(self.ranges, front.F[self.good], 0.1 * tolerance)
+        self.points = {i: self._begin(i) for i in self.good.tolist()}
 
     def go(self) -> Front:
         """The refined front; after Ctrl-C, what there is of it."""
@@ -107,6 +110,7 @@ class Refinement:
 
         started, interrupted = time.perf_counter(), False
         try:
+            self._polish()
             for _ in range(self.rounds):
                 self._round()
         except KeyboardInterrupt:
@@ -137,8 +141,22 @@ class Refinement:
         method = None if point.transcription is None else from_dict(point.transcription)
         if not isinstance(method, DFET) or point.trajectory is None:
             raise ValueError(f"only meshes of DFET can be refined; point {i} is of {type(method).__name__}")
-        best = [k for k in range(F.shape[1]) if len(F) > 1 and i == int(np.lexsort([*F.T, F[:, k]])[0])]
-        return _Refined(point, best[0] if best else None, method, point.trajectory, judge(self.problem, point.trajectory, self.tolerance))
+        best: Any = np.flatnonzero(self.good[extremes(F[self.good])] == i) if len(self.good) > 1 else []
+        verdict = judge(self.problem, point.trajectory, self.tolerance)
+        return _Refined(point, int(best[0]) if len(best) else None, method, point.trajectory, verdict)
+
+    def _polish(self) -> None:
+        """Points that nobody has found to be optimal are solved on the meshes that they have: rough controls would ask for finer ones."""
+        rough: dict[DFET, list[int]] = {}
+        for i, point in self.points.items():
+            if point.point.optimality is None or point.point.optimality > OPTIMAL:
+                rough.setdefault(point.method, []).append(i)
+        for method, members in rough.items():
+            nlp = method.transcribe(self.problem)
+            for i in members:
+                solved = self.resolver.solve(nlp, self.points[i].point.F, self.points[i].end, self._starts(i, nlp))
+                if solved.status == CONVERGED and solved.by_gradients:
+                    self._take(self.points[i], method, solved)
 
     def _round(self) -> None:
         """Every point that needs it: solved anew on a finer mesh, and looked at. Those that share a mesh follow each other."""
@@ -162,10 +180,14 @@ class Refinement:
         if solved.status != CONVERGED:
             point.active, point.trouble = False, f"on the next finer mesh it is '{solved.status}'"
             return
-        point.change = float((np.abs(solved.F - point.F) / self.ranges).max())
-        point.method, point.solved, point.trajectory = method, solved, nlp.unpack(solved.z)
-        point.verdict = judge(self.problem, point.trajectory, self.tolerance)
+        change = float((np.abs(solved.F - point.F) / self.ranges).max())
+        self._take(point, method, solved)
+        point.change = change
         point.active = bool(self._complaints(point))
+
+    def _take(self, point: _Refined, method: DFET, solved: Resolved) -> None:
+        point.method, point.solved, point.trajectory = method, solved, solved.nlp.unpack(solved.z)
+        point.verdict = judge(self.problem, point.trajectory, self.tolerance)
 
     def _starts(self, i: int, nlp: NLP) -> Iterator[np.ndarray]:
         """Its own trajectory, then those of the points nearest to it, on its mesh."""
@@ -185,7 +207,7 @@ class Refinement:
         off, settled = self._missed(point), COST * self.tolerance
         if not found and not off <= settled:
             found.append(f"flown, its objectives differ by {off:.1e} of the front's range")
-        if point.solved is None:
+        if np.isinf(point.change):
             found.append("it was not solved on a finer mesh")
         elif not point.change <= settled:
             found.append(f"its objectives still change by {point.change:.1e} of the front's range from mesh to mesh")
