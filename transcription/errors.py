@@ -81,7 +81,7 @@ def _errors(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray
         integral=integral,
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
-        tail=np.abs(controls[:, -2:]).max(axis=(1, 2), initial=0.0) if controls.shape[1] > 1 else nothing,
+        tail=np.abs(controls[:, 1:][:, -2:]).max(axis=(1, 2), initial=0.0),
         rate=np.minimum(decay_rates(states), decay_rates(controls)),
         steep=np.array([_steepest(flown, j) for j in elements]),
     )
@@ -134,7 +134,10 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
         # Two coefficients are no series: nothing speaks against a higher degree.
         return rates
     size = np.maximum.accumulate(np.abs(coefficients[:, :0:-1]), axis=1)[:, ::-1]
-    degree = np.arange(1, k)
+    if k > 3:
+        # Of an even or odd function every other coefficient is 0, and so might be the last.
+        size = size[:, :-1]
+    degree = np.arange(size.shape[1])
     slope = degree - degree.mean()
     logarithms = np.log(np.maximum(size, 1e-14))
     found = -np.einsum("k,nkc->nc", slope, logarithms) / (slope**2).sum()
@@ -150,7 +153,8 @@ def _coefficients(flown: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
         tau = gauss_legendre(k)[0]
         values = np.array([piece.on_element(j, tau) for j in range(len(piece.edges) - 1)])
         found.append(legendre_coefficients(values) / np.array([v.span for v in variables]))
-    return found[0], found[1]
+    # States pass through the stages and both ends of an element, but by collocation their degree is one less: the last is always 0.
+    return found[0], found[1][:, :-1]
 
 
 def _steepest(flown: PhaseTrajectory, j: int) -> float:

@@ -12,10 +12,10 @@ import numpy as np
 
 SMOOTH = 0.8
 """Rate of decay of Legendre coefficients from which on a higher degree is worth more than shorter elements."""
+SLOWEST = 1e-3
+"""A rate below this is none."""
 HIGHEST = 10
 """Highest order."""
-MODEST = 1e4
-"""Error, in units of the goal, up to which a higher degree alone is tried."""
 WORST_SHARE = 0.1
 """Elements whose error is at least this share of the largest are refined together."""
 LAYER = 0.3
@@ -30,8 +30,8 @@ def refine(
     """A finer mesh of one phase.
 
     The elements of large error are refined; if none reaches the goal, those with the largest ones. Of these, the smooth ones ask for a
-    higher order, by as much as their rate promises to be enough; the others, and all at the highest order, are cut: around the place where
-    a control is steep, else in halves.
+    higher order, as far as their rate promises to be enough, if that is not above the highest; the others are cut: around the place where a
+    control is steep, else in halves.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ def refine(
     """
     error = np.where(np.isnan(error), np.inf, error)
     marked = error >= min(1.0, WORST_SHARE * error.max(initial=0.0))
-    smooth = (rate >= SMOOTH) & np.isnan(steep) & (error <= MODEST)
-    if order >= HIGHEST:
-        smooth[:] = False
-    raised = order + max((degrees(error[j], rate[j], order) for j in np.flatnonzero(marked & smooth)), default=0)
+    more = np.array([degrees(e, r) for e, r in zip(error, rate, strict=True)])
+    smooth = np.isnan(steep) & (rate >= SMOOTH) & (order + more <= HIGHEST)
+    raised = order + int(min(more[marked & smooth].max(initial=0.0), max(2, order // 2 + 1)))
     cut = [j for j in np.flatnonzero(marked & ~smooth) if edges[j + 1] - edges[j] >= 2.0 * shortest]
     worst_first = sorted(cut, key=lambda j: (-error[j], j))
-    return split(edges, {int(j): cuts(steep[j]) for j in worst_first}, most), min(raised, HIGHEST)
+    return split(edges, {int(j): cuts(steep[j]) for j in worst_first}, most), raised
 
 
-def degrees(error: float, rate: float, order: int) -> int:
+def degrees(error: float, rate: float) -> float:
     """How many degrees more bring a smooth element's error down to 1: at its ends it falls by exp(-2 rate) with each. At least one."""
-    wanted = np.ceil(np.log(max(error, 1.0)) / (2.0 * rate)) if rate > 0 else np.inf
-    return int(np.clip(wanted, 1, max(2, order // 2 + 1)))
+    if error <= 1.0 or rate == np.inf:
+        return 1.0 if np.isfinite(error) else np.inf
+    return max(1.0, float(np.ceil(np.log(error) / (2.0 * rate)))) if rate > SLOWEST else np.inf
 
 
 def cuts(steep: float) -> list[float]:
