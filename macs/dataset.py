@@ -1,7 +1,8 @@
 """A front as labelled arrays and back: the root Dataset, and one for each phase's trajectories.
 
-Nothing here knows files. Floats go through untouched. Points whose meshes differ in size are padded with NaN; their true lengths stand
-beside them (`nodes`, `elements`, ...). A Dataset's attributes are strings and integers; what has structure is JSON.
+Nothing here knows files. Floats go through untouched. Decisions have a column for each variable that any point has, and `place`, where in
+the point's own vector it stands, -1 if it has no such variable. Trajectories whose meshes differ in size are padded with NaN; their true
+lengths stand beside them (`node_count`, `element_count`, ...). A Dataset's attributes are strings and integers; what has structure is JSON.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from transcription.trajectory import PhaseTrajectory, Trajectory
 
 FORMAT = "MACS front"
-VERSION = 1
+VERSION = 2
 
 ARRAYS = {
     "time": ("node",),
@@ -54,7 +55,9 @@ def root_dataset(front: Front) -> xarray.Dataset:
         "status": (("point",), front.status),
         "parameters": (("point", "parameter"), np.array(parameters, dtype=float).reshape(len(front), len(names))),
         "decision": (("point", "variable"), front.decision),
-        "decision_length": (("point",), front.lengths),
+        "place": (("point", "variable"), _places(front)),
+        "transcription": (("point",), words([document(transcription) for transcription in front.transcriptions])),
+        "note": (("point",), words(front._notes)),
         "optimality": (("point",), np.array([np.nan if point.optimality is None else point.optimality for point in front])),
         "objective_unit": (("objective",), words(front.units)),
         "objective_sense": (("objective",), words(front.senses)),
@@ -71,10 +74,12 @@ def root_columns(root: xarray.Dataset) -> dict[str, Any]:
     """What `Front` is made of, but its trajectories, from `root_dataset`. Raises KeyError or ValueError where something is missing."""
     signs = np.where(root["objective_sense"].values == "minimize", 1.0, -1.0)
     scales = root["objective_scale"].values
-    transcription, solver, stats = (json.loads(str(root.attrs[key])) for key in ("transcription", "solver", "stats"))
+    solver, stats = (json.loads(str(root.attrs[key])) for key in ("solver", "stats"))
+    variables = read_variables(root, "variable")
+    own = [np.argsort(row)[np.count_nonzero(row < 0) :] for row in root["place"].values]
     return {
         "F": root["objectives"].values * signs,
-        "decision": [row[:length] for row, length in zip(root["decision"].values, root["decision_length"].values, strict=True)],
+        "decision": [row[columns] for row, columns in zip(root["decision"].values, own, strict=True)],
         "violation": root["violation"].values,
         "status": root["status"].values,
         "goals": [
@@ -83,12 +88,13 @@ def root_columns(root: xarray.Dataset) -> dict[str, Any]:
                 root["objective"].values, root["objective_unit"].values, root["objective_sense"].values, scales, strict=True
             )
         ],
-        "variables": read_variables(root, "variable"),
+        "variables": [[variables[column] for column in columns.tolist()] for columns in own] if own else variables,
+        "notes": [str(note) for note in root["note"].values],
         "violations": read_named(root, "violations", "constraint"),
         "excursions": read_named(root, "excursions", "quantity"),
         "optimality": root["optimality"].values,
         "problem": _read_source(root.attrs),
-        "transcription": transcription,
+        "transcription": [json.loads(str(text)) for text in root["transcription"].values],
         "solver": solver,
         "stats": stats,
         "message": str(root.attrs["message"]),
@@ -102,15 +108,13 @@ def phase_names(front: Front) -> list[str]:
 
 
 def phase_dataset(front: Front, name: str) -> xarray.Dataset:
-    """The trajectories of one phase, all points. Raises KeyError if there is no such phase, ValueError if bases differ."""
+    """The trajectories of one phase, all points. Raises KeyError if there is no such phase."""
     import xarray
 
     phases = [None if point.trajectory is None else point.trajectory[name] for point in front]
     first = next((phase for phase in phases if phase is not None), None)
     if first is None:
         raise KeyError(f"no point has a phase '{name}'")
-    if any(phase is not None and (phase.state.basis, phase.control.basis) != (first.state.basis, first.control.basis) for phase in phases):
-        raise ValueError(f"phase '{name}': the points' trajectories are in different bases")
     rows = [None if phase is None else _arrays(phase) for phase in phases]
     variables: dict[str, Any] = {
         array: (("point", *dimensions), _padded([None if row is None else row[array] for row in rows], _arrays(first)[array].shape))
@@ -119,13 +123,9 @@ def phase_dataset(front: Front, name: str) -> xarray.Dataset:
     variables |= {f"{dimension}_count": (("point",), _counts(rows, dimension)) for dimension in LENGTHS}
     variables |= variable_columns(first.state_variables, "state") | variable_columns(first.control_variables, "control")
     variables |= variable_columns(first.path_limits, "path")
-    attributes = {
-        "phase": name,
-        "time_unit": first.time_unit,
-        "state_basis": first.state.basis,
-        "control_basis": first.control.basis,
-    }
-    return xarray.Dataset(variables, attrs=attributes)
+    variables["state_basis"] = (("point",), words(["" if phase is None else phase.state.basis for phase in phases]))
+    variables["control_basis"] = (("point",), words(["" if phase is None else phase.control.basis for phase in phases]))
+    return xarray.Dataset(variables, attrs={"phase": name, "time_unit": first.time_unit})
 
 
 def trajectories(root: xarray.Dataset, phases: Sequence[xarray.Dataset]) -> list[Trajectory | None] | None:
@@ -165,8 +165,8 @@ def _read_phase(data: xarray.Dataset) -> list[PhaseTrajectory | None]:
             states=array["states"],
             controls=array["controls"],
             paths=array["paths"],
-            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data.attrs["state_basis"])),
-            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data.attrs["control_basis"])),
+            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data["state_basis"].values[i])),
+            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data["control_basis"].values[i])),
             state_variables=states,
             control_variables=controls,
             path_limits=limits,
@@ -210,11 +210,17 @@ def _attributes(front: Front) -> dict[str, Any]:
         "format_version": VERSION,
         **_source(front.source),
         **{key: document(stats[key]) for key in ("seed", "evaluations", "tolerance", "wall_time", "versions")},
-        "transcription": document(front.transcription),
         "solver": document(front.solver),
         "stats": document(stats),
         "message": front.message,
     }
+
+
+def _places(front: Front) -> np.ndarray:
+    places = np.full(front.decision.shape, -1, dtype=np.int32)
+    for row, columns in zip(places, front._decisions.places, strict=True):
+        row[columns] = np.arange(len(columns))
+    return places
 
 
 def _source(source: Source | None) -> dict[str, str]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
 
+from .decisions import Decisions
 from .point import Point
 from .source import Source
 from .stats import STATS, versions
@@ -31,14 +32,14 @@ class Front:
     ----------
     F : array (n, m)
         Objectives, all minimised.
-    decision : array (n, D), or n arrays of different lengths
+    decision : n arrays
         Decision vectors in the user's units.
     violation, status : (n,)
         Largest scaled residual of any constraint; "converged", "infeasible", "failed" or "timeout".
     goals : tuple of Objective
         The m objectives as the user stated them.
-    variables : tuple of Variable
-        The D entries of the decision vector.
+    variables : tuple of Variable, or n of them
+        The entries of the decision vectors: the same for all points, or for each its own.
     violations : n dicts, optional
         Scaled residual by constraint.
     trajectories : n Trajectories, optional
@@ -46,10 +47,14 @@ class Front:
     excursions : n dicts or None, optional
         What leaves its bounds between nodes, scaled, by name.
     optimality : n floats or None, optional
+    notes : n str, optional
+        What there is to say of a point: why its mesh could not be refined enough, say.
     problem : CompiledProblem or Source, optional
         None for black boxes.
-    transcription, solver : dict, optional
-        `{"method": ..., "settings": {...}}` and `{"name": ..., "settings": {...}}`.
+    transcription : dict, or n of them, optional
+        `{"method": ..., "settings": {...}}`: how the problem was written for all points, or for each; None for black boxes.
+    solver : dict, optional
+        `{"name": ..., "settings": {...}}`.
     stats : dict, optional
         What the front cost; missing entries of `STATS` are added.
     message : str
@@ -61,10 +66,14 @@ class Front:
 
     Attributes
     ----------
-    F, violation, status, goals, variables, transcription, solver, stats, message, source
+    F, violation, status, goals, solver, stats, message, source
         As above; `source` says which problem it is, None for a black box.
+    transcriptions : tuple of n dicts or None
+        How the problem was written for each point. Points on one mesh share one dict.
+    variables : tuple of Variable (D)
+        Every variable that any point has. Those of one point, in the order of its decision vector, are `Point.variables`.
     decision : array (n, D)
-        Padded with NaN beyond `lengths` (n,), should the points' meshes differ in size.
+        A column for each of `variables`; NaN where a point, on a mesh of its own, has no such variable. `Point.decision` is without these.
     """
 
     def __init__(
@@ -75,13 +84,14 @@ class Front:
         violation: Any,
         status: Any,
         goals: Sequence[Objective],
-        variables: Sequence[Variable] = (),
+        variables: Sequence[Variable | Sequence[Variable]] = (),
         violations: Sequence[Mapping[str, float] | None] | None = None,
         trajectories: Sequence[Trajectory | None] | None = None,
         excursions: Sequence[Mapping[str, float] | None] | None = None,
         optimality: Sequence[float | None] | None = None,
+        notes: Sequence[str | None] | None = None,
         problem: CompiledProblem | Source | None = None,
-        transcription: Mapping[str, Any] | None = None,
+        transcription: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
         solver: Mapping[str, Any] | None = None,
         stats: Mapping[str, Any] | None = None,
         message: str = "",
@@ -89,8 +99,6 @@ class Front:
         sort: bool = True,
     ):
         self.goals = tuple(goals)
-        self.variables = tuple(variables)
-        self.transcription = None if transcription is None else dict(transcription)
         self.solver = dict(solver or {})
         self.stats: dict[str, Any] = {**STATS, "failures": {}, "versions": versions(), **(stats or {})}
         self.stats["failures"] = dict(self.stats["failures"])
@@ -105,11 +113,16 @@ class Front:
         self.F = _frozen(rows[order])
         self.violation = _frozen(np.asarray(_column(violation, n, "violation"), dtype=float)[order])
         self.status = _frozen(np.asarray(_column(status, n, "status"), dtype=str)[order])
-        self.decision, self.lengths = _decisions([_column(decision, n, "decision")[i] for i in order], len(self.variables))
+        common = not len(variables) or isinstance(variables[0], Variable)
+        own = variables if common else [_column(variables, n, "variables")[i] for i in order]
+        self._decisions = Decisions.of([_column(decision, n, "decision")[i] for i in order], own)
+        given = [transcription] * n if transcription is None or isinstance(transcription, Mapping) else transcription
+        self.transcriptions = _shared([_column(given, n, "transcription")[i] for i in order])
         self._violations = [_column(violations, n, "violations")[i] for i in order]
         self._trajectories = [_column(trajectories, n, "trajectories")[i] for i in order]
         self._excursions = [_column(excursions, n, "excursions")[i] for i in order]
         self._optimality = [_number(_column(optimality, n, "optimality")[i]) for i in order]
+        self._notes = [_column(notes, n, "notes")[i] or "" for i in order]
 
     # What it holds
 
@@ -136,6 +149,16 @@ class Front:
     def objectives(self) -> np.ndarray:
         """Objectives (n, m) in the user's units and senses."""
         return self.F * self._signs
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """See the class."""
+        return self._decisions.variables
+
+    @property
+    def decision(self) -> np.ndarray:
+        """See the class."""
+        return self._decisions.values
 
     @property
     def closest(self) -> Point | None:
@@ -189,14 +212,48 @@ class Front:
         front = Front.__new__(Front)
         front.__dict__.update(self.__dict__)
         index = np.asarray(rows, dtype=int)
-        for name in ("F", "violation", "status", "decision", "lengths"):
+        for name in ("F", "violation", "status"):
             setattr(front, name, _frozen(getattr(self, name)[index]))
-        for name in ("_violations", "_trajectories", "_excursions", "_optimality"):
+        front._decisions = self._decisions.take(index)
+        front.transcriptions = tuple(self.transcriptions[i] for i in index)
+        for name in ("_violations", "_trajectories", "_excursions", "_optimality", "_notes"):
             setattr(front, name, [getattr(self, name)[i] for i in index])
         front.stats = dict(self.stats)
         return front
 
     # What it becomes
+
+    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8) -> Front:
+        """The front with each point solved anew on a mesh of its own, refined until what the point promises can be flown.
+
+        Errors are estimated by integration element by element, by looking at states, controls and path constraints between the nodes, and
+        by the objectives as flown. Elements are split where a solution is not smooth, and get a higher order where it is; controls that
+        leave their bounds between nodes are written by their Bernstein coefficients, which bound them. A point keeps its place along the
+        front: from its old objectives it is solved along the front's ranges (Pascoletti and Serafini); the best point of each objective is
+        that of the refined front.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest defect, and largest amount by which states and path constraints may leave their limits between nodes, in scales; ten
+            times this, in ranges of the front, is by how much objectives may still change from mesh to mesh, or when flown.
+        limit : int
+            How many meshes are tried for each point.
+
+        Returns
+        -------
+        Front
+            As many points. Those that do not meet the tolerance say why (`Point.note`), and `message` says how many do. Ctrl-C ends the
+            work with what there is.
+
+        Raises
+        ------
+        ValueError
+            For a black box, a problem that cannot be found, another transcription than DFET, and arguments that make no sense.
+        """
+        from .refining import refine_mesh
+
+        return refine_mesh(self, tolerance, limit)
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.
@@ -257,7 +314,7 @@ class Front:
         FileNotFoundError
             If there is no such file.
         ValueError
-            If it is not a front, is damaged, of a newer format, or of another problem.
+            If it is not a front, is damaged, of another version of the format, or of another problem.
         """
         from .storage import load
 
@@ -265,12 +322,14 @@ class Front:
 
     @staticmethod
     def merge(fronts: Sequence[Front]) -> Front:
-        """The non-dominated feasible points of several fronts of one problem and transcription; what they cost is summed.
+        """The non-dominated feasible points of several fronts of one problem; what they cost is summed.
+
+        Points of different meshes are taken at their word: a coarse mesh may promise more than can be flown, and so push out better points.
 
         Raises
         ------
         ValueError
-            If there is none, or they differ in problem, objectives or variables.
+            If there is none, or they differ in problem or objectives, or black boxes in variables.
         """
         from .merging import merge
 
@@ -301,10 +360,14 @@ def _column(values: Any, n: int, name: str) -> Any:
     return values
 
 
-def _decisions(rows: Sequence[Any], width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of any lengths as one array, padded with NaN to at least `width`, and their lengths."""
-    lengths = np.array([len(row) for row in rows], dtype=int)
-    decision = np.full((len(rows), max([width, *lengths])), np.nan)
-    for row, values, length in zip(decision, rows, lengths, strict=True):
-        row[:length] = values
-    return _frozen(decision), _frozen(lengths)
+def _shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
+    """Equal ones as one object."""
+    distinct: list[dict[str, Any]] = []
+    found: list[dict[str, Any] | None] = []
+    for given in dicts:
+        known = next((one for one in distinct if one == given), None)
+        if known is None and given is not None:
+            known = dict(given)
+            distinct.append(known)
+        found.append(known)
+    return tuple(found)

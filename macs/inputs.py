@@ -15,17 +15,17 @@ from transcription.base import NLP, Transcription
 from .front import Front
 from .point import Point
 
+OTHER = "start: the points are of other variables; a start belongs to one problem"
+
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
     """Raise ValueError for arguments of `solve` and `minimize` that make no sense."""
     check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
-    for name, value in (("tolerance", tolerance), ("time_limit", time_limit)):
-        if value is None and name == "time_limit":
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
-            raise ValueError(f"{name} must be a positive number, not {value!r}")
+    check_positive("tolerance", tolerance)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
     if callback is not None and not callable(callback):
         raise ValueError(f"callback must be callable, not {callback!r}")
     if checkpoint is not None:
@@ -36,6 +36,12 @@ def check_count(name: str, value: Any, least: int) -> None:
     """Raise ValueError unless `value` is a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def check_positive(name: str, value: Any) -> None:
+    """Raise ValueError that names what is no positive number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
 
 
 def check_problem(problem: Any, transcription: Any) -> None:
@@ -57,14 +63,17 @@ def check_freedom(nlp: NLP) -> None:
 def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
 
-    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables.
+    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
+    meshes are interpolated.
     """
     rows = []
     if np.isfinite(nlp.guess).any():
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
-    if start is not None:
-        _check_names(start, nlp.variables)
+    points = _points(start)
+    if points:
+        rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
+    elif start is not None:
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))
@@ -81,10 +90,13 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     ValueError
         If they have another length, are no numbers, or lie outside the bounds; the message names the variable.
     """
-    _check_names(start, variables)
-    Z = _array(start)
+    points = _points(start)
+    for point in points:
+        if [v.name for v in point.variables] != [v.name for v in variables]:
+            raise ValueError(OTHER)
+    Z = _array([point.decision for point in points] or start)
     if Z.shape[1] != len(variables):
-        raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected; a start belongs to one problem and mesh")
+        raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected")
     lower, upper, scale = (np.array([getattr(v, name) for v in variables]) for name in ("lower", "upper", "scale"))
     wrong = ~np.isfinite(Z) | (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
     if wrong.any():
@@ -94,21 +106,22 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     return np.clip(Z, lower, upper)
 
 
-def _check_names(start: Any, variables: Sequence[Variable]) -> None:
-    """Refuse a Front or Points whose decisions are of other variables."""
-    points = [start] if isinstance(start, Point) else start
-    for point in points if isinstance(points, Front | list | tuple) else ():
-        if isinstance(point, Point) and [v.name for v in point.variables] != [v.name for v in variables]:
-            raise ValueError("start: the points are of other variables; a start belongs to one problem and mesh")
+def _points(start: Any) -> list[Point]:
+    """The Points that a start consists of; none if it is an array."""
+    points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Front | list | tuple) else []
+    return points if all(isinstance(point, Point) for point in points) else []
+
+
+def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
+    """The vector (n,) of a point, interpolated if it is on another mesh."""
+    if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
+        return point.decision
+    if point.source is None or point.source.fingerprint != nlp.problem.fingerprint or point.trajectory is None:
+        raise ValueError(OTHER)
+    return nlp.interpolate(point.trajectory)
 
 
 def _array(start: Any) -> np.ndarray:
-    if isinstance(start, Point):
-        start = [start]
-    if isinstance(start, Front):
-        start = start.decision
-    elif isinstance(start, Sequence) and start and all(isinstance(point, Point) for point in start):
-        start = [point.decision for point in start]
     try:
         Z = np.atleast_2d(np.array(start, dtype=float))
     except (TypeError, ValueError):

@@ -9,8 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from transcription.base import Transcription
+from transcription.dfet import DFET
+
 from . import search
+from .dominance import dominates
 from .evaluation import Evaluator
+from .front import Front
 from .search import SearchState
 from .solver import Solver
 
@@ -30,8 +35,12 @@ class MACS(Solver):
         Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
     refine : bool, default True
         Accepted, and without effect yet.
-    mesh : str, default "fixed"
-        How the discretisation of a trajectory is chosen. "adaptive" is not available yet.
+    mesh : {"fixed", "adaptive"}, default "fixed"
+        "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
+        `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
+        boxes have no mesh.
+    mesh_tolerance : float, default 1e-7
+        For an adaptive mesh: largest difference of a flown state from the transcription's, in spans of its bounds.
     rho : float, default 1.0
         Radius of the pattern search to begin with, in (0, 1], as a fraction of half the span of each variable (Table I: 1).
     F : float, default 0.9
@@ -82,6 +91,7 @@ class MACS(Solver):
     archive: int = 10
     refine: bool = True
     mesh: str = "fixed"
+    mesh_tolerance: float = 1e-7
     rho: float = 1.0
     F: float = 0.9
     CR: float = 0.9
@@ -111,10 +121,9 @@ class MACS(Solver):
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
-        if self.mesh == "adaptive":
-            raise ValueError("MACS: mesh='adaptive' is not available yet")
-        if self.mesh != "fixed":
-            raise ValueError(f"MACS: mesh must be 'fixed', not {self.mesh!r}")
+        if self.mesh not in ("fixed", "adaptive"):
+            raise ValueError(f"MACS: mesh must be 'fixed' or 'adaptive', not {self.mesh!r}")
+        self._check_range("mesh_tolerance", "[1e-10, 1]", lambda x: 1e-10 <= x <= 1)
         if self.reseed not in ("all", "spread"):
             raise ValueError(f"MACS: reseed must be 'all' or 'spread', not {self.reseed!r}")
         self._check_range("rho", "(0, 1]", lambda x: 0 < x <= 1)
@@ -191,6 +200,20 @@ class MACS(Solver):
         """Refuse an archive that could not keep the best points of all m objectives."""
         if self.archive < m:
             raise ValueError(f"MACS: archive must hold at least one point for each of the {m} objectives, not {self.archive}")
+
+    def check_transcription(self, transcription: Transcription) -> None:
+        """Refuse to adapt meshes of methods whose meshes nobody knows how to refine."""
+        if self.mesh == "adaptive" and not isinstance(transcription, DFET):
+            raise ValueError(f"MACS: mesh='adaptive' needs DFET, not {type(transcription).__name__}")
+
+    def finish(self, front: Front) -> Front:
+        """On an adaptive mesh, the refined front."""
+        if self.mesh == "fixed" or not len(front):
+            return front
+        refined = front.refine_mesh(tolerance=self.mesh_tolerance)
+        # A point that did not get there may promise too much: it is not believed to dominate any.
+        believed = refined.F[[i for i, point in enumerate(refined) if not point.note]]
+        return refined[np.flatnonzero(~np.any(dominates(believed, refined.F[:, None]), axis=1))]
 
     def coordinates_to_scan(self, d: int, archived: int, m: int) -> int:
         """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from .columns import document
 from .dominance import nondominated
 from .evaluation import CONVERGED
 from .front import Front
@@ -33,13 +32,14 @@ def merge(fronts: Sequence[Front]) -> Front:
         violation=[point.violation for point in kept],
         status=[point.status for point in kept],
         goals=known.goals,
-        variables=known.variables,
+        variables=[point.variables for point in kept] or known.variables,
         violations=[point.violations for point in kept],
         trajectories=[point.trajectory for point in kept],
         excursions=[point.excursions for point in kept],
         optimality=[point.optimality for point in kept],
         problem=known.problem or known.source,
-        transcription=known.transcription,
+        notes=[point.note for point in kept],
+        transcription=[point.transcription for point in kept],
         solver=_solver(fronts),
         stats=_stats(fronts),
         message="" if kept else next((front.message for front in fronts if front.closest is closest), fronts[0].message),
@@ -57,11 +57,9 @@ def _check(one: Front, other: Front) -> None:
         raise ValueError(f"fronts of different problems do not merge: {problem(one)} and {problem(other)}{why}")
     if one.goals != other.goals:
         raise ValueError(f"fronts with different objectives do not merge: {_objectives(one)} and {_objectives(other)}")
-    if one.variables != other.variables or document(one.transcription) != document(other.transcription):
-        raise ValueError(
-            f"fronts with different decision vectors do not merge: {one.transcription or [v.name for v in one.variables]} and "
-            f"{other.transcription or [v.name for v in other.variables]}"
-        )
+    if not one.source and one.variables != other.variables:
+        names = [", ".join(v.name for v in front.variables) for front in (one, other)]
+        raise ValueError(f"fronts of black boxes with different variables do not merge: {names[0]} and {names[1]}")
 
 
 def _objectives(front: Front) -> str:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from transcription.trajectory import Trajectory
 
     from .front import Front
+    from .source import Source
 
 
 class Point:
@@ -54,19 +55,34 @@ class Point:
 
     @property
     def decision(self) -> np.ndarray:
-        """The decision vector, in the user's units; `front.variables` names its entries."""
-        return self._front.decision[self.index, : self._front.lengths[self.index]]
+        """The decision vector, in the user's units; `variables` names its entries."""
+        return self._front._decisions.row(self.index)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
         """What the entries of the decision vector are."""
-        return self._front.variables
+        return self._front._decisions.variables_of(self.index)
+
+    @property
+    def transcription(self) -> dict[str, Any] | None:
+        """How the problem was written for this point, as `Transcription.to_dict` has it. None for a black box."""
+        return self._front.transcriptions[self.index]
+
+    @property
+    def note(self) -> str:
+        """What there is to say of the point; mostly nothing."""
+        return self._front._notes[self.index]
+
+    @property
+    def source(self) -> Source | None:
+        """Which problem the point is of. None for a black box."""
+        return self._front.source
 
     @property
     def parameters(self) -> dict[str, float]:
         """Static decision variables by name. Of a black box, these are all there are."""
         if self._front.source is None:
-            return dict(zip((v.name for v in self._front.variables), self.decision.tolist(), strict=False))
+            return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
     @property

@@ -37,30 +37,32 @@ def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Map
 
     Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
     """
-    F, violation = nlp.evaluate(Z) if len(Z) else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
-    flights = [nlp.unpack(z) for z in Z]
-    given = {"status": _status(violation, stats["tolerance"])} | more
-    return Front(
-        F=F,
-        decision=Z,
-        violation=violation,
-        goals=nlp.problem.goals,
-        variables=nlp.variables,
-        violations=[nlp.violations(z) for z in Z],
-        trajectories=flights,
-        excursions=[excursions(nlp.problem, flight) for flight in flights],
-        problem=nlp.problem,
-        transcription=nlp.transcription.to_dict(),
-        solver=solver,
-        stats=stats,
-        **given,
-    )
+    columns = trajectory_columns(nlp, Z, stats["tolerance"])
+    return Front(**(columns | {"goals": nlp.problem.goals, "problem": nlp.problem, "solver": solver, "stats": stats} | more))
 
 
 def nearest_misses(nearest: Point) -> str:
     """What keeps the least infeasible point from being feasible."""
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
     return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
+
+
+def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
+    """What a Front holds of vectors (k, n) of one NLP: k entries each."""
+    k = len(Z)
+    F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    flights = [nlp.unpack(z) for z in Z]
+    return {
+        "F": F,
+        "decision": Z,
+        "violation": violation,
+        "status": _status(violation, tolerance),
+        "variables": [nlp.variables] * k,
+        "violations": [nlp.violations(z) for z in Z],
+        "trajectories": flights,
+        "excursions": [excursions(nlp.problem, flight) for flight in flights],
+        "transcription": [nlp.transcription.to_dict()] * k,
+    }
 
 
 def black_box_front(

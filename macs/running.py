@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 IDLE_ITERATIONS = 100
 """A search that evaluated nothing in so many iterations on end has nothing left to try."""
+ENDED = ("budget", "idle")
+"""What ends a run that nobody stopped."""
 
 
 @dataclass
@@ -93,7 +95,7 @@ class Run:
             "seed": self.seed,
             "tolerance": self.evaluator.tolerance,
             "stopped": stopped,
-            "reproducible": stopped in ("budget", "idle") and not counts.clocked,
+            "reproducible": stopped in ENDED and not counts.clocked,
         }
 
     def _standing(self, monitor: Monitor) -> Progress:

@@ -22,7 +22,7 @@ from .front import Front
 from .inputs import beginning, check_freedom, check_problem, check_run, decisions
 from .monitor import Progress
 from .results import black_box_front, trajectory_front
-from .running import Run
+from .running import ENDED, Run
 
 Callback = Callable[[Progress], Any]
 
@@ -44,6 +44,13 @@ class Solver(ABC):
 
     def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
         """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
+
+    def check_transcription(self, transcription: Transcription) -> None:  # noqa: B027
+        """Raise ValueError if the settings do not suit the transcription. Called before any work."""
+
+    def finish(self, front: Front) -> Front:
+        """What is left to do with the front of a search that ended by itself. Nothing, for most solvers."""
+        return front
 
     def solve(
         self,
@@ -98,6 +105,7 @@ class Solver(ABC):
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
+        self.check_transcription(transcription)
         solver = inner_solver(inner)
         nlp = transcription.transcribe(problem)
         check_freedom(nlp)
@@ -113,7 +121,8 @@ class Solver(ABC):
             seed=seed,
             start=beginning(start, nlp),
         )
-        return run.go(time_limit, progress, callback)
+        front = run.go(time_limit, progress, callback)
+        return self.finish(front) if front.stats["stopped"] in ENDED else front
 
     def minimize(
         self,

@@ -68,8 +68,12 @@ def save_csv(front: Front, path: str | PathLike[str]) -> None:
     columns = [(goal.name, goal.unit) for goal in front.goals]
     decisions = [(variable.name, variable.unit) for variable in front.variables]
     writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in [*columns, ("violation", ""), ("status", ""), *decisions]])
-    for point, objectives in zip(front, front.objectives.tolist(), strict=True):
-        writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *map(repr, point.decision.tolist())])
+    for point, objectives, place in zip(front, front.objectives.tolist(), front._decisions.places, strict=True):
+        # Of a variable that the point, on a mesh of its own, does not have, the cell is empty.
+        cells = [""] * len(front.variables)
+        for column, value in zip(place.tolist(), point.decision.tolist(), strict=True):
+            cells[column] = repr(value)
+        writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *cells])
     check_target(path)
     write_whole(path, text.getvalue().encode())
 
@@ -122,8 +126,9 @@ def from_bytes(content: bytes) -> Front:
         if _text(file.attrs.get("format")) != FORMAT:
             raise ValueError("it is a netCDF file of something else")
         version = int(np.ravel(file.attrs["format_version"])[0])
-        if version > VERSION:
-            raise ValueError(f"its format is version {version}, this MACS knows up to {VERSION}: update it")
+        if version != VERSION:
+            older = "update MACS" if version > VERSION else "an earlier MACS wrote it"
+            raise ValueError(f"its format is version {version}, this MACS reads version {VERSION}: {older}")
         return _read_front(file)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from .front import Front
+    from .point import Point
 
 LEFT = str.ljust
 RIGHT = str.rjust
@@ -68,6 +69,8 @@ def front_table(front: Front, defects: Sequence[float] | None = None, columns: M
     for header, values in more.items():
         add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
     add("status", "", front.status.tolist(), True)
+    if len({id(one) for one in front.transcriptions}) > 1:
+        add("elements", "", [_elements(point) for point in front])
     if front.source is not None:
         add("between nodes", "leaves bounds", [_excursion(point.excursions) for point in front], True)
     table = text_table([titles, units], list(zip(*cells, strict=True)), left)
@@ -79,13 +82,31 @@ def headline(front: Front) -> str:
     seed, count = front.stats["seed"], len(front)
     parts = [
         f"{count} point{'' if count == 1 else 's'}" if count else "no feasible point",
-        call(front.transcription["method"], front.transcription["settings"]) if front.transcription else "",
+        _transcribed(front),
         front.solver.get("name", ""),
         f"{front.stats['evaluations']:,} evaluations".replace(",", " "),
         "" if seed is None else f"seed {seed}" if not isinstance(seed, list) else f"{len(seed)} seeds",
         duration(front.stats["wall_time"]),
     ]
     return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
+
+
+def _transcribed(front: Front) -> str:
+    """How the problem was written for the points, or for the nearest where there is none."""
+    given = front if len(front) or front.closest is None else front.closest.alone()
+    distinct = list({id(one): one for one in given.transcriptions if one is not None}.values())
+    if not distinct:
+        return ""
+    if len(distinct) == 1 and not distinct[0]["settings"].get("mesh"):
+        return call(distinct[0]["method"], distinct[0]["settings"])
+    methods = ", ".join(dict.fromkeys(one["method"] for one in distinct))
+    return f"{methods} on {'one refined mesh' if len(distinct) == 1 else f'{len(distinct)} meshes'}"
+
+
+def _elements(point: Point) -> str:
+    """Elements of each phase."""
+    flight = point.trajectory
+    return "?" if flight is None else "+".join(str(len(phase.state.edges) - 1) for phase in flight.values())
 
 
 def call(name: str, settings: Mapping[str, Any]) -> str:
@@ -133,6 +154,7 @@ def _footer(front: Front) -> list[str]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"
         lines.append(f"{ended}: the same seed need not give this front again.")
+    lines += [f"Point {point.index}: {point.note}" for point in front if point.note]
     if front.message:
         lines.append(front.message)
     return lines

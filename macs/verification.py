@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,16 +100,25 @@ def verify(
         If the front is of a black box, or its problem or transcription cannot be made again.
     """
     problem = front.compiled()
-    if front.transcription is None:
-        raise ValueError("the front does not say how its problem was transcribed")
-    nlp = (transcription or from_dict(front.transcription)).transcribe(problem)
-    if tuple(v.name for v in nlp.variables) != tuple(v.name for v in front.variables):
-        raise ValueError(f"the decision vectors of this front ({len(front.variables)} entries) are not those of its transcription")
-    if (front.lengths != len(nlp.variables)).any():
-        raise ValueError(f"a decision vector of this front has not the {len(nlp.variables)} entries of its transcription")
+    nlps: dict[Transcription, NLP] = {}
+
+    def nlp_of(point: Point) -> NLP:
+        if point.transcription is None:
+            raise ValueError("the front does not say how its problem was transcribed")
+        method = transcription or from_dict(point.transcription)
+        if method not in nlps:
+            nlps[method] = method.transcribe(problem)
+        nlp = nlps[method]
+        if tuple(v.name for v in nlp.variables) != tuple(v.name for v in point.variables):
+            raise ValueError(
+                f"the decision vector of point {point.index} ({len(point.variables)} entries) is not that of its transcription "
+                f"({len(nlp.variables)} entries)"
+            )
+        return nlp
+
     scales, limit = objective_scales(front), front.stats["tolerance"]
 
-    def check(index: int, point: Point) -> Check:
+    def check(index: int, point: Point, nlp: NLP) -> Check:
         mismatch, where = _mismatch(point, nlp)
         objectives, violation, worst = _recomputed(point, nlp)
         defect, flown, most, miss = _flown(point, problem, scales, rtol, atol, method)
@@ -125,7 +134,9 @@ def verify(
         )
         return Check(index, mismatch, violation, objectives, defect, flown, miss, tuple(reason for wrong, reason in failures if wrong))
 
-    return [check(index, point) for index, point in enumerate(front)]
+    # All of them first: what is wrong with the front as such is said before any flight.
+    programs = [nlp_of(point) for point in front]
+    return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
 
 
 def objective_scales(front: Front) -> np.ndarray:
@@ -136,10 +147,9 @@ def objective_scales(front: Front) -> np.ndarray:
     return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
 
 
-def missed(flight: Simulation, point: Point, scales: np.ndarray) -> float:
-    """The largest difference between a point's objectives and those of its flight, divided by `scales` (m,)."""
-    stored = point.objectives
-    difference = np.abs([flight.objectives[name] - value for name, value in stored.items()])
+def missed(flight: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives, by name, and those of its flight, divided by `scales` (m,)."""
+    difference = np.abs([flight.objectives[name] - value for name, value in objectives.items()])
     return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
 
 
@@ -205,4 +215,4 @@ def _flown(
         return np.inf, np.inf, "everything", np.inf
     flight = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
     worst = max(flight.violations, key=lambda key: flight.violations[key], default="")
-    return flight.max_defect, flight.violation, worst, missed(flight, point, scales)
+    return flight.max_defect, flight.violation, worst, missed(flight, point.objectives, scales)

@@ -210,7 +210,7 @@ def as_flown(point: Point, scales: np.ndarray) -> tuple[float, float]:
     if point.trajectory is None:
         return np.inf, np.inf
     flight = point.simulate()
-    return flight.max_defect, missed(flight, point, scales)
+    return flight.max_defect, missed(flight, point.objectives, scales)
 
 
 def draw(what: Front | Point, path: str) -> None:

@@ -76,6 +76,7 @@ class Assembly:
             reduced=self._reduced(z, rows, peaks),
             tighten=self.tighten,
             unpack=self.unpack,
+            interpolate=self.interpolate,
         )
 
     def guess(self) -> np.ndarray:
@@ -139,6 +140,22 @@ class Assembly:
         phases = tuple(self._writers[i].unpack(extended) for i in range(len(self.problem.phases)))
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
+
+    def interpolate(self, trajectory: Trajectory) -> np.ndarray:
+        """See `NLP.interpolate`."""
+        extended = self.layout.extended(np.zeros((1, len(self.layout.variables))))
+        write = self.layout.write
+        write(extended, self.parameters, np.array([[trajectory.parameters[v.name] for v in self.problem.parameters]]))
+        for writer in self._writers.values():
+            flown = trajectory[writer.phase.name]
+            write(extended, writer.ends.statics[:2], np.array([[flown.t0, flown.tf]]))
+            states = flown.edge_states
+            write(extended, writer.ends.initial, states[None, 0])
+            write(extended, writer.ends.final, states[None, -1])
+            writer.interpolate(extended, flown)
+        Z = extended[:, : len(self.layout.variables)]
+        lower, upper = (np.array([getattr(v, side) for v in self.layout.variables]) for side in ("lower", "upper"))
+        return self.tighten(np.clip(Z, lower, upper))[0]
 
     def _ends(self, i: int) -> Ends:
         """Slots of the ends of phase i: new variables, but for those that a link shares with a phase written before."""

@@ -77,6 +77,9 @@ class NLP:
         Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound.
     unpack : callable
         A vector (n,) -> Trajectory.
+    interpolate : callable
+        A Trajectory of the same problem, by whatever method or mesh -> the vector (n,) nearest to it: its times and parameters, its states
+        and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
     """
 
     problem: CompiledProblem
@@ -94,6 +97,7 @@ class NLP:
     reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
+    interpolate: Callable[[Trajectory], np.ndarray]
 
     @cached_property
     def lower(self) -> np.ndarray:

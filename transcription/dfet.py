@@ -11,17 +11,23 @@ elements converge with order 2(l+1).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
 from .assembly import Assembly
 from .base import NLP, Transcription
 from .dfet_phase import DFETPhase
 from .dfet_tables import Tables
+from .layout import Layout
+from .phase_mesh import PhaseMesh, as_meshes
+from .phase_writer import Ends
 
 
 @dataclass(frozen=True)
@@ -39,17 +45,21 @@ class DFET(Transcription):
     basis : "lobatto" or "bernstein"
         Lagrange polynomials on Gauss-Lobatto nodes for states and tests and on Gauss-Legendre nodes for controls, which are then bounded at
         the nodes; or Bernstein polynomials for all three, whose coefficients bound the whole polynomial.
+    mesh : mapping, optional
+        Phases that have elements of their own: name -> (edges, order), edges relative to the phase, increasing from 0 to 1. The degree of
+        their controls is `control_order` where that is given, else their order. The other phases have `elements` equal ones of `order`.
 
     Raises
     ------
     ValueError
-        For numbers that are not positive integers, or an unknown basis.
+        For numbers that are not positive integers, an unknown basis, or edges that do not increase from 0 to 1.
     """
 
     elements: int
     order: int
     control_order: int | None = None
     basis: str = "lobatto"
+    mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         least = {"elements": 1, "order": 0, "control_order": 0}
@@ -58,14 +68,50 @@ class DFET(Transcription):
                 raise ValueError(f"DFET: {name} must be an integer of at least {least[name]}, not {value!r}")
         if self.basis not in ("lobatto", "bernstein"):
             raise ValueError(f"DFET: basis must be 'lobatto' or 'bernstein', not {self.basis!r}")
+        if self.mesh is not None:
+            try:
+                object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
+            except ValueError as error:
+                raise ValueError(f"DFET: {error}") from None
 
     @property
     def degree_of_controls(self) -> int:
-        """q."""
+        """q, in the phases that have no mesh of their own."""
         return self.order if self.control_order is None else self.control_order
+
+    @property
+    def meshes(self) -> dict[str, PhaseMesh]:
+        """The phases that have elements of their own."""
+        return dict(self.mesh or ())
+
+    def mesh_of(self, phase: str) -> PhaseMesh:
+        """The mesh of a phase, by its name."""
+        return self.meshes.get(phase) or PhaseMesh.uniform(self.elements, self.order)
+
+    def remeshed(self, meshes: Mapping[str, PhaseMesh], *, basis: str | None = None) -> DFET:
+        """The same method on other meshes, and in another basis where one is given."""
+        return replace(self, mesh={**self.meshes, **meshes}, basis=basis or self.basis)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Transcription.to_dict`."""
+        meshes = {name: mesh.to_dict() for name, mesh in self.meshes.items()} or None
+        settings = {"elements": self.elements, "order": self.order, "control_order": self.control_order, "basis": self.basis}
+        return {"method": "DFET", "settings": settings | {"mesh": meshes}}
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`."""
         compiled = problem.compile() if isinstance(problem, Problem) else problem
-        tables = Tables(self.order, self.degree_of_controls, self.basis)
-        return Assembly(compiled, lambda phase, layout, ends: DFETPhase(self.elements, tables, phase, layout, ends)).nlp(self)
+        names = [phase.name for phase in compiled.phases]
+        for name in self.meshes:
+            if name not in names:
+                raise ValueError(f"DFET: a mesh is given for phase '{name}'; the phases of '{compiled.name}' are {', '.join(names)}")
+
+        @cache
+        def tables(order: int) -> Tables:
+            return Tables(order, order if self.control_order is None else self.control_order, self.basis)
+
+        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> DFETPhase:
+            mesh = self.mesh_of(phase.name)
+            return DFETPhase(mesh, tables(mesh.order), phase, layout, ends)
+
+        return Assembly(compiled, writer).nlp(self)

@@ -15,19 +15,23 @@ from .dfet_propagation import Pieces, Propagation
 from .dfet_tables import Tables
 from .guess import along, line
 from .layout import Layout
+from .phase_mesh import PhaseMesh
 from .phase_writer import Ends, PhaseWriter, Rows, Written
+from .polynomials import gauss_legendre
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
 
 
 class DFETPhase(PhaseWriter):
-    """One phase on N equal elements.
+    """One phase on the N elements of its mesh.
 
     Slots: `X` (N, l + 1, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
     elements, which are unknowns of their own.
     """
 
-    def __init__(self, elements: int, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
-        self.n, self.tables, self.phase, self.ends = elements, tables, phase, ends
+    def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+        self.mesh, self.tables, self.phase, self.ends = mesh, tables, phase, ends
+        self.n = elements = mesh.elements
+        self.places, self.widths = mesh.places, np.diff(mesh.places)
         self._layout = layout
         prefix = f"{phase.name}."
         self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
@@ -46,10 +50,10 @@ class DFETPhase(PhaseWriter):
         s = pick(extended, self.ends.statics)
         left, right = pick(extended, self.B[:-1]), pick(extended, self.B[1:])
         U = pick(extended, self.U)
-        h = (s[1] - s[0]) / n
-        starts = s[0] + h * ca.DM(np.arange(n)).T
+        mean = (s[1] - s[0]) / n
+        starts = s[0] + mean * ca.DM(self.places[:-1]).T
         weak, integrals, paths, peaks, ends = self._element.map(n)(
-            pick(extended, self.X), U, left, right, starts, ca.repmat(h, 1, n), ca.repmat(s, 1, n)
+            pick(extended, self.X), U, left, right, starts, mean * ca.DM(self.widths).T, ca.repmat(s, 1, n)
         )
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
@@ -62,8 +66,7 @@ class DFETPhase(PhaseWriter):
     def guess(self, extended: np.ndarray) -> None:
         """See `PhaseWriter.guess`."""
         t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
-        edges = np.linspace(0.0, 1.0, self.n + 1)[1:]
-        inside = (np.arange(self.n)[:, None] + 0.5 * (1.0 + self.tables.state_nodes)) / self.n
+        edges, inside = np.array(self.mesh.edges[1:]), self.mesh.inside(self.tables.state_nodes)
         for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
             start = extended[:, self.ends.initial[i]]
             end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
@@ -75,7 +78,7 @@ class DFETPhase(PhaseWriter):
 
     def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
         """See `PhaseWriter.guess_controls`."""
-        share = (np.arange(self.n)[:, None] + 0.5 * (1.0 + self.tables.control_nodes)) / self.n
+        share = self.mesh.inside(self.tables.control_nodes)
         found: dict[int, float] = {}
         for i, control in enumerate(self.phase.controls):
             if control.name in self.phase.guesses:
@@ -111,23 +114,33 @@ class DFETPhase(PhaseWriter):
     def _outer_sensitivity(self, S: np.ndarray) -> np.ndarray:
         """Derivatives (N, nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element."""
         t0, tf = S[self.ends.statics[:2]]
-        edges = np.arange(self.n)[:, None] / self.n
-        start, length = t0 + (tf - t0) * edges, np.broadcast_to((tf - t0) / self.n, (self.n, len(t0)))
+        start, length = t0 + (tf - t0) * (self.places[:-1, None] / self.n), (tf - t0) * (self.widths[:, None] / self.n)
         statics = np.broadcast_to(S[self.ends.statics], (self.n, len(self.ends.statics), len(t0)))
         return np.concatenate([S[self.U.reshape(self.n, -1)], start[:, None], length[:, None], statics], axis=1)
 
     def _pieces(self, extended: np.ndarray) -> Pieces:
         """What propagation needs to know."""
         s = extended[:, self.ends.statics]
-        h = (s[:, 1:2] - s[:, :1]) * np.full(self.n, 1.0 / self.n)
-        starts = s[:, :1] + h * np.arange(self.n)
-        return Pieces(extended[:, self.ends.initial], extended[:, self.U], starts, h, s)
+        mean = (s[:, 1:2] - s[:, :1]) / self.n
+        return Pieces(extended[:, self.ends.initial], extended[:, self.U], s[:, :1] + mean * self.places[:-1], mean * self.widths, s)
+
+    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
+        """See `PhaseWriter.interpolate`."""
+        phase, tables, length = self.phase, self.tables, flown.tf - flown.t0
+        # Between the ends of this mesh's elements, where a control may jump: Gauss-Legendre nodes never meet them.
+        nodes_of_states, nodes_of_controls = gauss_legendre(tables.order + 1)[0], gauss_legendre(tables.control_order + 1)[0]
+        states = flown.state(flown.t0 + length * self.mesh.inside(nodes_of_states))
+        controls = unwrapped(flown.control(flown.t0 + length * self.mesh.inside(nodes_of_controls)), phase.controls)
+        at_edges = flown.state(flown.t0 + length * np.array(self.mesh.edges[1:-1]))
+        self._layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
+        self._layout.write(extended, self.U, wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)[None])
+        self._layout.write(extended, self.B[1:-1], at_edges[None])
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, tables = self.phase, self.tables
         s = extended[self.ends.statics]
-        edges = s[0] + (s[1] - s[0]) * np.arange(self.n + 1) / self.n
+        edges = s[0] + (s[1] - s[0]) * self.places / self.n
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)

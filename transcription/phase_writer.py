@@ -111,5 +111,9 @@ class PhaseWriter(ABC):
         """
 
     @abstractmethod
+    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
+        """Fill in states and controls of one extended vector (1, ...) from a trajectory of the phase; bounds are seen to afterwards."""
+
+    @abstractmethod
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """The phase's trajectory from one extended vector."""

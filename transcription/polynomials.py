@@ -107,3 +107,9 @@ def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
 def _barycentric_weights(basis: str, degree: int) -> np.ndarray:
     points = nodes(basis, degree)
     return 1.0 / np.prod(points[:, None] - points + np.eye(degree + 1), axis=1)
+
+
+def legendre_coefficients(values: np.ndarray) -> np.ndarray:
+    """Coefficients of Legendre polynomials from values at the Gauss-Legendre nodes, both along the second axis: (N, k, ...)."""
+    k = values.shape[1]
+    return np.einsum("ij,nj...->ni...", np.linalg.inv(legendre.legvander(gauss_legendre(k)[0], k - 1)), values)

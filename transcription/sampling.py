@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Limit, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
 
 from .polynomials import lobatto_nodes
 from .trajectory import PhaseTrajectory, Trajectory
@@ -41,17 +41,23 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
     found: dict[str, float] = {}
     parameters = np.array(list(trajectory.parameters.values()))
     for phase in problem.phases:
-        flown = trajectory[phase.name]
-        states, controls, paths = _dense(phase.path, flown, parameters)
-        bounded = tuple(v for v in phase.controls if v.period is None)
-        columns = [i for i, v in enumerate(phase.controls) if v.period is None]
-        groups: list[tuple[np.ndarray, Sequence[Variable | Limit]]]
-        groups = [(states, phase.states), (controls[:, columns], bounded), (paths, phase.paths)]
-        for values, limits in groups:
-            for limit, amount in zip(limits, excess(values, limits), strict=True):
-                if amount > NEGLIGIBLE:
-                    found[f"{phase.name}.{limit.name}"] = float(amount)
+        for name, amounts in excess_by_element(phase, trajectory[phase.name], parameters).items():
+            if amounts.max() > NEGLIGIBLE:
+                found[f"{phase.name}.{name}"] = float(amounts.max())
     return found
+
+
+def excess_by_element(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
+    """How far each state, control and path constraint leaves its limits on each element, by name, in its scale: arrays (N,).
+
+    Controls that are periodic never do, and are left out.
+    """
+    states, controls, paths = _dense(phase.path, flown, parameters)
+    bounded = [i for i, v in enumerate(phase.controls) if v.period is None]
+    limits: tuple[Variable | Limit, ...] = (*phase.states, *(phase.controls[i] for i in bounded), *phase.paths)
+    values = np.hstack([states, controls[:, bounded], paths]).reshape(-1, len(DENSE), len(limits))
+    amounts = np.array([excess(element, limits) for element in values])
+    return {limit.name: amounts[:, i] for i, limit in enumerate(limits)}
 
 
 def _dense(path: object, flown: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -165,7 +165,7 @@ def _fly(
     tolerances = atol * np.concatenate([span, np.ones(len(y) - nx)])
     elements = []
     for j in range(len(edges) - 1):
-        dense = _element(phase, planned, j, y, s, rtol, tolerances, method)
+        dense = fly_element(phase, planned, j, y, s, rtol, tolerances, method)
         y = dense[-1]
         elements.append(dense[:, :nx])
     times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in range(len(elements))])
@@ -190,10 +190,31 @@ def _fly(
     return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
 
 
-def _element(
+def fly_element(
     phase: CompiledPhase, planned: PhaseTrajectory, j: int, y: np.ndarray, s: np.ndarray, rtol: float, atol: np.ndarray, method: str
 ) -> np.ndarray:
-    """States and integrals (len(DENSE), ny) on element j from `y` at its beginning; NaN if the integration breaks down."""
+    """Fly element j of a phase.
+
+    Parameters
+    ----------
+    phase : CompiledPhase
+    planned : PhaseTrajectory
+        Whose controls are flown.
+    j : int
+    y : array (ny,)
+        States and integrals at the beginning of the element.
+    s : array
+        t0, tf and the parameters.
+    rtol : float
+    atol : array (ny,)
+    method : str
+        Of `scipy.integrate.solve_ivp`.
+
+    Returns
+    -------
+    array (len(DENSE), ny)
+        States and integrals at the local coordinates `DENSE`; NaN if the integration breaks down.
+    """
     t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
     times = t0 + 0.5 * (1.0 + DENSE) * (t1 - t0)
     times[-1] = t1

@@ -123,7 +123,6 @@ def empty(**changes) -> Front:
             "goals": compiled().goals,
             "variables": least.variables,
             "problem": compiled(),
-            "transcription": least.transcription,
             "solver": least.solver,
             "message": "no feasible point: 'climb.load' is violated most",
             "closest": least[0],

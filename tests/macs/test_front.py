@@ -14,6 +14,7 @@ from macs.front import Front
 from macs.point import Point
 from macs.source import Source
 from macs.tables import duration, numbers
+from problems.compiled import Variable
 
 
 def test_a_front_is_sorted_by_its_first_objective_in_the_users_value():
@@ -162,6 +163,22 @@ def test_merging_only_empty_fronts_keeps_the_closest():
     assert Front.merge([black_box(0), black_box(0)]).closest is None
 
 
+def test_points_of_different_meshes_merge_and_keep_their_own():
+    more = [Variable(f"climb.u[{i}]", -1.0, 1.0, "km/s²", 2.0) for i in range(6)]
+    fine = flights(
+        2, 3, decision=np.arange(12.0).reshape(2, 6), variables=more, transcription={"method": "DFET", "settings": {"elements": 5}}
+    )
+    coarse = flights(3, F=[[5.0, 5.0], [6.0, 4.0], [7.0, 3.0]])
+    merged = Front.merge([coarse, fine])
+    assert len(merged.variables) == 6 and merged.decision.shape == (len(merged), 6)
+    lengths = {len(point.decision): point.transcription["settings"]["elements"] for point in merged}
+    assert lengths == {4: 3, 6: 5}
+    for point in merged:
+        assert [v.name for v in point.variables] == [f"climb.u[{i}]" for i in range(len(point.decision))]
+        assert np.isfinite(point.decision).all()
+    assert "2 meshes" in merged.table() and "elements" in merged.table()
+
+
 def test_fronts_of_different_things_do_not_merge():
     other = state_problem(speed=4.0).compile()
     with pytest.raises(ValueError, match="'two legs' and 'two legs': the same name, but other bounds"):
@@ -170,8 +187,8 @@ def test_fronts_of_different_things_do_not_merge():
         Front.merge([flights(), black_box()])
     with pytest.raises(ValueError, match=r"minimize f0 \[kg\].*minimize f2"):
         Front.merge([black_box(m=2), black_box(m=3)])
-    with pytest.raises(ValueError, match=r"different decision vectors.*'elements': 3.*Radau"):
-        Front.merge([flights(), flights(transcription={"method": "Radau", "settings": {}})])
+    with pytest.raises(ValueError, match=r"different variables do not merge: span, chord, twist and span, chord"):
+        Front.merge([black_box(), black_box(decision=np.zeros((6, 2)), variables=black_box().variables[:2])])
     with pytest.raises(ValueError, match="no front"):
         Front.merge([])
 

@@ -198,7 +198,7 @@ def test_more_objectives_than_points_and_no_budget_are_refused():
         {"momentum": 1},
         {"max_contractions": -1},
         {"coordinates": 0},
-        {"mesh": "adaptive"},
+        {"mesh_tolerance": 0},
         {"mesh": "fine"},
         {"refine": 1},
         {"directions": 0},

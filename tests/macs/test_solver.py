@@ -115,11 +115,20 @@ def test_a_guess_is_among_the_first() -> None:
 
 
 def test_a_start_of_another_problem_is_refused() -> None:
-    other = MACS().solve(load("orbit_rise"), DFET(4, 1), evaluations=30, seed=1)
+    other = MACS().solve(load("goddard"), DFET(4, 1), evaluations=30, seed=1)
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=other)
     with pytest.raises(ValueError, match="other variables"):
-        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=[other[0]])
+        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
+
+
+def test_a_start_of_another_mesh_is_interpolated() -> None:
+    coarse = MACS().solve(load("orbit_rise"), DFET(6, 2), evaluations=300, seed=1)
+    fine = MACS().solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse)
+    bare = MACS().solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2)
+    span = np.ptp(coarse.F, axis=0)
+    assert ((fine.F.min(axis=0) - coarse.F.min(axis=0)) / span < 0.05).all()
+    assert (fine.F[:, 1].min() - coarse.F[:, 1].min()) < (bare.F[:, 1].min() - coarse.F[:, 1].min())
 
 
 def test_a_clock_makes_a_run_not_reproducible() -> None:

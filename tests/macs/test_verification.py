@@ -22,7 +22,7 @@ def altered(front: Front, **changes) -> Front:
     columns = {
         "F": front.F, "decision": front.decision, "violation": front.violation, "status": front.status, "goals": front.goals,
         "variables": front.variables, "trajectories": [p.trajectory for p in front], "problem": front.problem,
-        "transcription": front.transcription, "stats": front.stats, "sort": False, **changes,
+        "transcription": front.transcriptions, "stats": front.stats, "sort": False, **changes,
     }  # fmt: skip
     return Front(**columns)
 
@@ -75,7 +75,7 @@ def test_what_cannot_be_verified_says_why(front):
     with pytest.raises(ValueError, match="does not say how"):
         verify(flights(transcription=None), tolerance=1.0)
     other = {"method": "DFET", "settings": {"elements": 3, "order": 4}}
-    with pytest.raises(ValueError, match="not those of its transcription"):
+    with pytest.raises(ValueError, match=r"decision vector of point 0 .* is not that of its transcription"):
         verify(altered(front, transcription=other), tolerance=1.0)
 
 

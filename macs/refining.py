@@ -1,0 +1,246 @@
+"""The mesh around the front: each point on a mesh of its own, fine enough that what it promises can be flown."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from transcription import from_dict
+from transcription.adaptation import COST, Verdict, judge, next_method
+from transcription.base import NLP
+from transcription.dfet import DFET
+from transcription.optimality import optimality
+from transcription.trajectory import Trajectory
+
+from .dominance import extremes
+from .evaluation import CONVERGED
+from .inputs import check_positive
+from .point import Point
+from .resolving import Resolved, Resolver
+from .results import trajectory_columns
+from .verification import missed, objective_scales
+
+if TYPE_CHECKING:
+    from .front import Front
+
+
+OPTIMAL = 1e-6
+"""A point whose optimality is at most this need not be solved anew on its own mesh."""
+LEAST_TOLERANCE = 1e-10
+"""Below, double precision and the integrator cannot tell."""
+
+
+def refine_mesh(front: Front, tolerance: float, limit: int) -> Front:
+    """See `Front.refine_mesh`."""
+    check_positive("tolerance", tolerance)
+    if tolerance < LEAST_TOLERANCE:
+        raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
+    if isinstance(limit, bool) or not isinstance(limit, int | np.integer) or limit < 1:
+        raise ValueError(f"limit must be a whole number of at least 1, not {limit!r}")
+    front.compiled()
+    return Refinement(front, float(tolerance), int(limit)).go() if len(front) else front
+
+
+@dataclass
+class _Refined:
+    """A point on its way.
+
+    Attributes
+    ----------
+    point : Point
+        Of the front that is refined.
+    end : int or None
+        The objective of which it is the best point of the front.
+    method, trajectory, verdict
+        What it stands at: on which mesh, and what an independent look at it gave.
+    solved : Resolved or None
+        On that mesh; None at first.
+    change : float
+        Of the objectives, from the mesh before, in ranges of the front.
+    active : bool
+        There is something left to do, and to try.
+    trouble : str
+        Why there is nothing left to try.
+    """
+
+    point: Point
+    end: int | None
+    method: DFET
+    trajectory: Trajectory
+    verdict: Verdict
+    solved: Resolved | None = None
+    change: float = np.inf
+    active: bool = True
+    trouble: str = ""
+
+    @property
+    def F(self) -> np.ndarray:
+        """Objectives (m,), all minimised."""
+        return self.point.F if self.solved is None else self.solved.F
+
+
+class Refinement:
+    """Refines the meshes of a front's points, all together, round after round.
+
+    Parameters
+    ----------
+    front : Front
+    tolerance : float
+        Of defects and of what leaves its limits between nodes. Objectives are to settle within `COST` times that, in ranges of the front.
+    rounds : int
+        At most so many meshes are tried for each point.
+    """
+
+    def __init__(self, front: Front, tolerance: float, rounds: int) -> None:
+        self.front, self.tolerance, self.rounds = front, tolerance, rounds
+        self.problem = front.compiled()
+        self.good = np.flatnonzero(front.status == CONVERGED)
+        ranges = np.ptp(front.F[self.good], axis=0) if len(self.good) else np.zeros(len(front.goals))
+        self.ranges = np.where(ranges > 0, ranges, objective_scales(front))
+        self.resolver = Resolver(self.ranges, front.F[self.good], 0.1 * tolerance)
+        self.points = {i: self._begin(i) for i in self.good.tolist()}
+
+    def go(self) -> Front:
+        """The refined front; after Ctrl-C, what there is of it."""
+        from .front import Front
+
+        started, interrupted = time.perf_counter(), False
+        try:
+            self._polish()
+            for _ in range(self.rounds):
+                self._round()
+        except KeyboardInterrupt:
+            interrupted = True
+        front, resolver = self.front, self.resolver
+        rows = [self._columns(i) for i in range(len(front))]
+        columns: dict[str, Any] = {key: [row[key] for row in rows] for key in rows[0]}
+        reached = sum(not self._complaints(point) for point in self.points.values())
+        stats = {
+            **front.stats,
+            "gradient_solves": front.stats["gradient_solves"] + resolver.gradient_solves,
+            "inner_iterations": front.stats["inner_iterations"] + resolver.inner_iterations,
+            "wall_time": front.stats["wall_time"] + time.perf_counter() - started,
+            "reproducible": front.stats["reproducible"] and not (resolver.clocked or interrupted),
+            "mesh_tolerance": self.tolerance,
+        }
+        return Front(
+            **columns,
+            goals=front.goals,
+            problem=self.problem,
+            solver=front.solver,
+            stats=stats | ({"stopped": "interrupted"} if interrupted else {}),
+            message=f"{reached} of {len(front)} points meet the mesh tolerance of {self.tolerance:.0e}.",
+        )
+
+    def _begin(self, i: int) -> _Refined:
+        point, F = self.front[i], self.front.F
+        method = None if point.transcription is None else from_dict(point.transcription)
+        if not isinstance(method, DFET) or point.trajectory is None:
+            raise ValueError(f"only meshes of DFET can be refined; point {i} is of {type(method).__name__}")
+        best: Any = np.flatnonzero(self.good[extremes(F[self.good])] == i) if len(self.good) > 1 else []
+        verdict = judge(self.problem, point.trajectory, self.tolerance)
+        return _Refined(point, int(best[0]) if len(best) else None, method, point.trajectory, verdict)
+
+    def _polish(self) -> None:
+        """Points that nobody has found to be optimal are solved on the meshes that they have: rough controls would ask for finer ones."""
+        rough: dict[DFET, list[int]] = {}
+        for i, point in self.points.items():
+            if point.point.optimality is None or point.point.optimality > OPTIMAL:
+                rough.setdefault(point.method, []).append(i)
+        for method, members in rough.items():
+            nlp = method.transcribe(self.problem)
+            for i in members:
+                solved = self.resolver.solve(nlp, self.points[i].point.F, self.points[i].end, self._starts(i, nlp))
+                if solved.status == CONVERGED and solved.by_gradients:
+                    self._take(self.points[i], method, solved)
+
+    def _round(self) -> None:
+        """Every point that needs it: solved anew on a finer mesh, and looked at. Those that share a mesh follow each other."""
+        finer: dict[DFET, list[int]] = {}
+        for i, point in self.points.items():
+            if point.active:
+                settled = self._missed(point) <= COST * self.tolerance
+                method = next_method(point.method, point.verdict, point.trajectory, self.tolerance, integrals=not settled)
+                point.active = method != point.method
+                point.trouble = "" if point.active else "no mesh is refined further"
+                if point.active:
+                    finer.setdefault(method, []).append(i)
+        for method, members in finer.items():
+            nlp = method.transcribe(self.problem)
+            for i in members:
+                self._solve(i, method, nlp)
+
+    def _solve(self, i: int, method: DFET, nlp: NLP) -> None:
+        point = self.points[i]
+        solved = self.resolver.solve(nlp, point.point.F, point.end, self._starts(i, nlp))
+        if solved.status != CONVERGED:
+            point.active, point.trouble = False, f"on the next finer mesh it is '{solved.status}'"
+            return
+        change = float((np.abs(solved.F - point.F) / self.ranges).max())
+        self._take(point, method, solved)
+        point.change = change
+        point.active = bool(self._complaints(point))
+
+    def _take(self, point: _Refined, method: DFET, solved: Resolved) -> None:
+        point.method, point.solved, point.trajectory = method, solved, solved.nlp.unpack(solved.z)
+        point.verdict = judge(self.problem, point.trajectory, self.tolerance)
+
+    def _starts(self, i: int, nlp: NLP) -> Iterator[np.ndarray]:
+        """Its own trajectory, then those of the points nearest to it, on its mesh."""
+        here = self.points[i].point.F
+        distance = {j: float(np.linalg.norm((other.point.F - here) / self.ranges)) for j, other in self.points.items()}
+        for j in sorted(distance, key=lambda j: distance[j])[:3]:
+            yield nlp.interpolate(self.points[j].trajectory)
+
+    def _missed(self, point: _Refined) -> float:
+        """How far flown objectives are from those of the mesh, in ranges of the front."""
+        objectives = dict(zip(self.front.names, (point.F * self.problem.signs).tolist(), strict=True))
+        return missed(point.verdict.flight, objectives, self.ranges)
+
+    def _complaints(self, point: _Refined) -> list[str]:
+        """What keeps a point from meeting the tolerance."""
+        found = point.verdict.complaints(self.tolerance, self.front.stats["tolerance"])
+        off, settled = self._missed(point), COST * self.tolerance
+        if not found and not off <= settled:
+            found.append(f"flown, its objectives differ by {off:.1e} of the front's range")
+        if np.isinf(point.change):
+            found.append("it was not solved on a finer mesh")
+        elif not point.change <= settled:
+            found.append(f"its objectives still change by {point.change:.1e} of the front's range from mesh to mesh")
+        return found
+
+    def _columns(self, i: int) -> dict[str, Any]:
+        """What a Front holds of point i."""
+        point = self.points.get(i)
+        if point is None:
+            return _untouched(self.front[i], "")
+        complaints = self._complaints(point)
+        if complaints:
+            complaints.append(point.verdict.worst_place(point.method, point.trajectory, self.tolerance))
+        note = "; ".join([*complaints, *([point.trouble] if point.trouble else [])])
+        if point.solved is None:
+            return _untouched(self.front[i], note)
+        solved = point.solved
+        row = {key: values[0] for key, values in trajectory_columns(solved.nlp, solved.z[None], self.front.stats["tolerance"]).items()}
+        certified = optimality(solved.nlp, solved.z, self.ranges) if solved.by_gradients else None
+        return row | {"optimality": certified, "notes": note}
+
+
+def _untouched(point: Point, note: str) -> dict[str, Any]:
+    return {
+        "F": point.F,
+        "decision": point.decision,
+        "violation": point.violation,
+        "status": point.status,
+        "variables": point.variables,
+        "violations": point.violations,
+        "trajectories": point.trajectory,
+        "excursions": point.excursions,
+        "transcription": point.transcription,
+        "optimality": point.optimality,
+        "notes": note or point.note,
+    }

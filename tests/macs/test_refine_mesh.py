@@ -1,0 +1,211 @@
+"""The mesh around the front: what every point promises can be flown."""
+
+from __future__ import annotations
+
+import csv
+
+import casadi as ca
+import numpy as np
+import pytest
+from fronts import distance_to_curve
+from synthetic_fronts import black_box, flights
+
+from macs import MACS, Front
+from macs.refining import Refinement
+from macs.results import trajectory_columns
+from macs.verification import verify
+from problems import Problem, load
+from problems.goddard import reference
+from transcription import DFET
+from transcription.inner import Ipopt
+from transcription.scalarized import scalarize
+
+
+def front_of(problem, nlp, Z) -> Front:
+    return Front(**trajectory_columns(nlp, np.array(Z), 1e-6), goals=nlp.problem.goals, problem=nlp.problem)
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Front:
+    """Goddard on the paper's mesh: both ends and three points between them, as good as that mesh knows."""
+    problem = load("goddard").compile()
+    nlp = DFET(4, 6).transcribe(problem)
+    middle = 0.5 * (nlp.lower + nlp.upper)[nlp.free][None]
+    z = Ipopt().solve(nlp, middle).z[0]
+    Z = [scalarize(nlp, z, reference=np.array([0.0, np.inf]), weights=np.array([1.0, 0.0])).z]
+    for tf in (112.0, 125.0, 170.0, 250.0):
+        Z.append(scalarize(nlp, Z[-1], reference=np.array([tf, 0.0]), weights=np.array([0.0, 1.0])).z)
+    return front_of(problem, nlp, Z)
+
+
+@pytest.fixture(scope="module")
+def fine(coarse) -> Front:
+    return coarse.refine_mesh(limit=4)
+
+
+def test_points_get_near_the_truth_and_can_be_flown(coarse, fine):
+    truth = reference(20001)
+    before, after = distance_to_curve(coarse.objectives, truth), distance_to_curve(fine.objectives, truth)
+    assert before[0] > 1e-4, "on the first mesh the shortest flight is shorter than can be flown"
+    assert after.max() < 2e-5 and after[1:].max() < 2e-8
+    assert fine.status.tolist() == ["converged"] * 5 and fine.violation.max() < 1e-8
+    for point in fine[1:]:
+        assert point.simulate(rtol=1e-12, atol=1e-13).max_defect < 1e-7
+        assert point.optimality < 1e-7 and point.note == ""
+
+
+def test_controls_stay_within_bounds_everywhere(coarse, fine):
+    def most(point) -> float:
+        phase = point.trajectory["ascent"]
+        return np.abs(phase.at(np.linspace(phase.t0, phase.tf, 5001))["u"]).max()
+
+    assert most(coarse[0]) > np.pi / 2 + 0.1
+    assert all(most(point) <= np.pi / 2 for point in fine)
+
+
+def test_what_does_not_get_there_says_why(fine):
+    assert fine.message == "4 of 5 points meet the mesh tolerance of 1e-07."
+    assert "objectives still change" in fine[0].note and "phase 'ascent' near" in fine[0].note
+    table = fine.table()
+    assert "Point 0: " in table and fine.message in table and "elements" in table and "meshes" in table.splitlines()[0]
+
+
+def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
+    span = np.ptp(coarse.F, axis=0)
+    assert np.abs((fine.F - coarse.F) / span)[1:].max() < 1e-5
+    assert fine.stats["gradient_solves"] >= 8 and fine.stats["mesh_tolerance"] == 1e-7
+    assert coarse.stats["gradient_solves"] == 0 and fine.stats["wall_time"] > 0
+    assert len(fine[0].decision) > len(fine[3].decision) and fine[0].transcription["settings"]["basis"] == "bernstein"
+
+
+def test_meshes_go_through_files_and_are_verified(tmp_path, fine):
+    fine.save(tmp_path / "fine.nc")
+    again = Front.load(tmp_path / "fine.nc")
+    assert again.transcriptions == fine.transcriptions
+    for one, two in zip(fine, again, strict=True):
+        assert np.array_equal(one.decision, two.decision) and one.variables == two.variables and one.note == two.note
+    assert all(check.ok for check in verify(again, tolerance=2e-4))
+    fine.to_csv(tmp_path / "fine.csv")
+    rows = list(csv.reader((tmp_path / "fine.csv").open()))
+    assert len(rows[0]) == 4 + len(fine.variables)
+    for row, point in zip(rows[1:], fine, strict=True):
+        assert [float(cell) for cell in row[4:] if cell] == sorted_by_column(fine, point)
+    dataset = fine.to_xarray()
+    times = dataset["decision"].sel(variable="ascent.tf").values
+    assert times == pytest.approx([point.trajectory["ascent"].tf for point in fine], rel=1e-14)
+
+
+def sorted_by_column(front: Front, point) -> list[float]:
+    columns = {v: i for i, v in enumerate(front.variables)}
+    order = np.argsort([columns[v] for v in point.variables])
+    return point.decision[order].tolist()
+
+
+def test_points_of_different_meshes_merge_and_start_a_search(coarse, fine):
+    merged = Front.merge([coarse[3:], fine[:3]])
+    assert len(merged) == 5 and len({id(one) for one in merged.transcriptions}) >= 2
+    again = MACS().solve(load("goddard"), DFET(4, 6), evaluations=20, seed=1, start=fine)
+    for row in fine.F[2:]:
+        assert (row + 1e-6 * np.ptp(fine.F, axis=0) >= again.F).all(axis=1).any()
+
+
+def test_part_of_a_front_keeps_its_places(coarse):
+    """The first of these is the best in flight time of those that are here, but not of all."""
+    part = coarse[1:4]
+    fine = part.refine_mesh(limit=3)
+    assert np.abs((fine.F - part.F) / np.ptp(part.F, axis=0)).max() < 1e-4
+    alone = coarse[2].alone().refine_mesh(limit=2)
+    assert np.abs(alone.F / coarse[2].F - 1.0).max() < 1e-6 and alone.message.startswith("1 of 1")
+
+
+def test_objectives_without_derivatives_are_solved_by_projection():
+    """The largest of a peak has no gradient solve: the feasible point nearest to the old one is taken."""
+    problem = Problem("highest")
+    phase = problem.phase("fly", t0=0, tf=2)
+    x, v = phase.state("x", bounds=(-3, 3), initial=0), phase.state("v", bounds=(-3, 3), initial=0, final=0)
+    u = phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=v, v=u - 0.3 * v * ca.fabs(v) ** 2)
+    problem.maximize("peak", phase.peak(x))
+    problem.minimize("effort", phase.integral(u**2))
+    front = MACS(archive=4).solve(problem, DFET(2, 3), evaluations=60, seed=1)
+    fine = front.refine_mesh(tolerance=1e-6, limit=6)
+    assert len(fine) == len(front) and fine.stats["gradient_solves"] == 0
+    assert fine.status.tolist() == ["converged"] * len(front) and all(point.optimality is None for point in fine)
+    defects = [(point.simulate().max_defect, other.simulate().max_defect) for point, other in zip(fine, front, strict=True)]
+    assert max(after for after, _ in defects) < 1e-6 < max(before for _, before in defects)
+
+
+def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
+    plain, calls = Refinement._solve, []
+
+    def interrupted(self, *arguments):
+        calls.append(1)
+        if len(calls) > 2:
+            raise KeyboardInterrupt
+        plain(self, *arguments)
+
+    monkeypatch.setattr(Refinement, "_solve", interrupted)
+    front = coarse.refine_mesh()
+    assert len(front) == 5 and front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
+    assert sum("not solved on a finer mesh" in point.note for point in front) == 3
+
+
+def test_points_that_did_not_converge_stay_as_they_are():
+    bad = front_with_a_bad_point()
+    assert bad.refine_mesh(limit=1)[1].status == "infeasible"
+
+
+def front_with_a_bad_point() -> Front:
+    nlp = DFET(2, 3).transcribe(load("orbit_rise"))
+    candidates = 0.5 * (nlp.lower + nlp.upper)[nlp.free] * np.array([[1.0], [1.2]])
+    columns = trajectory_columns(nlp, nlp.march(nlp.first_guess(candidates)), 1e-6)
+    columns["status"] = np.array(["converged", "infeasible"])
+    return Front(**columns, goals=nlp.problem.goals, problem=nlp.problem)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"tolerance": 0.0}, "tolerance must be a positive number"),
+        ({"tolerance": 1e-14}, "tolerance must be at least 1e-10"),
+        ({"limit": 0}, "limit must be a whole number"),
+        ({"limit": 2.5}, "limit must be a whole number"),
+    ],
+)
+def test_arguments_that_make_no_sense_are_refused(coarse, arguments, words):
+    with pytest.raises(ValueError, match=words):
+        coarse.refine_mesh(**arguments)
+
+
+def test_what_has_no_mesh_of_ours_is_refused():
+    with pytest.raises(ValueError, match="black box"):
+        black_box().refine_mesh()
+    with pytest.raises(ValueError, match="only meshes of DFET"):
+        flights(transcription=None).refine_mesh()
+
+
+def test_a_search_may_refine_its_meshes_in_the_end():
+    front = MACS(mesh="adaptive", mesh_tolerance=1e-5, archive=3).solve(load("orbit_rise"), DFET(5, 2), evaluations=200, seed=1)
+    assert front.stats["gradient_solves"] >= len(front) > 0 and front.stats["evaluations"] == 200
+    assert front.solver["settings"]["mesh"] == "adaptive" and "mesh tolerance" in front.message
+    assert max(point.simulate(rtol=1e-11).max_defect for point in front if not point.note) < 1e-5
+    assert sum(not point.note for point in front) >= len(front) - 1
+    stopped = MACS(mesh="adaptive").solve(load("orbit_rise"), DFET(5, 2), evaluations=200, seed=1, callback=lambda progress: True)
+    assert stopped.stats["gradient_solves"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_goddard_with_defaults(seed):
+    front = MACS(mesh="adaptive").solve(load("goddard"), DFET(4, 6), evaluations=10_000, seed=seed)
+    good = [
+        distance <= 1e-6 and point.simulate(rtol=1e-12, atol=1e-13).max_defect < 1e-7 and within_bounds(point)
+        for distance, point in zip(distance_to_curve(front.objectives, reference(20001)), front, strict=True)
+    ]
+    assert len(front) == 10 and sum(good) >= 9
+    assert all(point.note for point, fine in zip(front, good, strict=True) if not fine)
+
+
+def within_bounds(point) -> bool:
+    phase = point.trajectory["ascent"]
+    return bool(np.abs(phase.at(np.linspace(phase.t0, phase.tf, 20001))["u"]).max() <= np.pi / 2)

@@ -1,0 +1,99 @@
+"""The mesh of one phase: where its elements end, and the degree of its states on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SHORTEST = 1e-9
+"""Shortest element, relative to its phase: below, its length is mostly rounding."""
+
+
+@dataclass(frozen=True)
+class PhaseMesh:
+    """Elements of any lengths, of one order.
+
+    Parameters
+    ----------
+    edges : sequence of N + 1 floats
+        Ends of the elements, relative to the phase: increasing from 0 to 1.
+    order : int
+        Degree of the states on each element.
+
+    Raises
+    ------
+    ValueError
+        If the edges are not such, or the order is no whole number of at least 0.
+    """
+
+    edges: tuple[float, ...]
+    order: int
+
+    def __post_init__(self) -> None:
+        try:
+            edges = np.array(self.edges, dtype=float)
+        except (TypeError, ValueError):
+            edges = np.empty((0, 0))
+        if edges.ndim != 1 or len(edges) < 2 or (edges[0], edges[-1]) != (0.0, 1.0) or not (np.diff(edges) >= SHORTEST).all():
+            raise ValueError(f"edges of a mesh must increase from 0 to 1, by at least {SHORTEST:g} each, not {self.edges!r}")
+        if isinstance(self.order, bool) or not isinstance(self.order, int | np.integer) or self.order < 0:
+            raise ValueError(f"order of a mesh must be a whole number of at least 0, not {self.order!r}")
+        object.__setattr__(self, "edges", tuple(edges.tolist()))
+        object.__setattr__(self, "order", int(self.order))
+
+    @classmethod
+    def uniform(cls, elements: int, order: int) -> PhaseMesh:
+        """Equal elements."""
+        return cls(tuple(np.linspace(0.0, 1.0, elements + 1).tolist()), order)
+
+    @classmethod
+    def of(cls, given: Any) -> PhaseMesh:
+        """From what a user writes, (edges, order), or a file: {"edges": ..., "order": ...}. Raises ValueError for anything else."""
+        if isinstance(given, PhaseMesh):
+            return given
+        try:
+            return cls(**given) if isinstance(given, dict) else cls(*given)
+        except TypeError:
+            raise ValueError(f"the mesh of a phase is written (edges, order), not {given!r}") from None
+
+    @property
+    def elements(self) -> int:
+        """N."""
+        return len(self.edges) - 1
+
+    @property
+    def places(self) -> np.ndarray:
+        """The edges (N + 1,) in mean lengths of an element, from 0 to N.
+
+        Those of equal elements are whole numbers, exactly, however the edges were rounded: so that their equations are the same bits.
+        """
+        places = self.elements * np.array(self.edges)
+        whole = np.rint(places)
+        return np.where(np.abs(places - whole) < 1e-15 * self.elements, whole, places)
+
+    def inside(self, nodes: np.ndarray) -> np.ndarray:
+        """Local coordinates (k,) in [-1, 1], relative to the phase: shape (N, k)."""
+        places = self.places
+        return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        return {"edges": list(self.edges), "order": self.order}
+
+
+def as_meshes(given: Any) -> tuple[tuple[str, PhaseMesh], ...]:
+    """Meshes by name of the phase, sorted, from a mapping or from pairs. Raises ValueError that names the phase."""
+    try:
+        pairs: Sequence[tuple[str, Any]] = sorted((given.items() if hasattr(given, "items") else given), key=lambda pair: str(pair[0]))
+        meshes = []
+        for name, mesh in pairs:
+            try:
+                meshes.append((str(name), PhaseMesh.of(mesh)))
+            except ValueError as error:
+                raise ValueError(f"phase '{name}': {error}") from None
+    except (TypeError, IndexError):
+        raise ValueError(f"mesh must be a mapping of phases' names to (edges, order), not {given!r}") from None
+    return tuple(meshes)
