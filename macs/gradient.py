@@ -16,6 +16,7 @@ from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription.base import Transcription
+from transcription.derivatives import objective_scales
 from transcription.optimality import optimality
 from transcription.scalarized import Solved
 
@@ -31,7 +32,11 @@ from .targets import METHODS, check_points, targets
 SAME = 1e-7
 """Points whose objectives all differ by less than this fraction of their ranges are one point; dominance is told to the same digits."""
 ROUNDS = 3
-"""How often points of a sweep are solved anew because another one turned out to be better for their purpose."""
+"""How often points of a sweep, or its ends, are solved anew because another one turned out to be better for their purpose."""
+NO_RANGE, NOTHING = 1e-8, 1e-10
+"""An objective that differs between the ends by less than these fractions of its size there, or of its scale, is in no conflict."""
+BETTER = 1e-6
+"""By what fraction of its range an objective is clearly better than at its end."""
 
 
 def optimize(
@@ -109,7 +114,7 @@ def payoff(
     """
     job = _Job("payoff", problem, transcription, start, starts, seed, tolerance)
     ends = job.ends()
-    return job.front(ends, _ranges(ends), sort=False)
+    return job.front(ends, job.ranges(ends), sort=False)
 
 
 def sweep(
@@ -151,13 +156,14 @@ def sweep(
         raise ValueError(f"unknown method {method!r}; there are {', '.join(METHODS)}")
     job = _Job("sweep", problem, transcription, start, starts, seed, tolerance, points=int(points), method=method)
     check_points(points, len(job.nlp.problem.goals))
-    ends = job.ends()
-    good = [end for end in ends if end.status == CONVERGED]
-    if len(good) < len(ends):
-        return job.sifted(ends, _ranges(good) if good else None)
-    table = np.array([end.F for end in ends])
-    found = job.along(targets(table, points, method))
-    return job.sifted([*ends, *found], _ranges(ends))
+    for _ in range(ROUNDS):
+        ends = job.ends()
+        if any(end.status != CONVERGED for end in ends):
+            return job.sifted(ends)
+        found = job.along(targets(np.array([end.F for end in ends]), job.ranges(ends), points, method))
+        if not job.surpassed(ends, found):
+            break
+    return job.sifted([*ends, *found], job.ranges(ends))
 
 
 class _Job:
@@ -215,16 +221,31 @@ class _Job:
                 break
         return found
 
-    def sifted(self, found: Sequence[Solved], ranges: np.ndarray | None) -> Front:
+    def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
+        """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other, and so has none."""
+        F = np.array([end.F for end in ends])
+        ranges, sizes = np.ptp(F, axis=0), np.abs(F).max(axis=0)
+        return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * objective_scales(self.nlp)), ranges, 0.0)
+
+    def surpassed(self, ends: Sequence[Solved], found: Sequence[Solved]) -> bool:
+        """Whether a sweep found an objective to be better than at its end, which then is a local optimum only."""
+        F = np.array([solved.F for solved in found if solved.status == CONVERGED]).reshape(-1, len(ends))
+        best = np.array([end.F[i] for i, end in enumerate(ends)])
+        return bool((best - F > BETTER * self._unit(self.ranges(ends))).any())
+
+    def _unit(self, ranges: np.ndarray | None) -> np.ndarray:
+        scales = objective_scales(self.nlp)
+        return scales if ranges is None else np.where(ranges > 0, ranges, scales)
+
+    def sifted(self, found: Sequence[Solved], ranges: np.ndarray | None = None) -> Front:
         """The front of what converged, without points that are dominated or come twice."""
         good = [solved for solved in found if solved.status == CONVERGED]
         if not good:
             nearest = self.front([min(found, key=lambda solved: solved.violation)], None)[0]
             return self.front([], None, message=f"no solve converged; {nearest_misses(nearest)}", closest=nearest)
         F = np.array([solved.F for solved in good])
-        unit = np.where(ranges > 0, ranges, 1.0) if ranges is not None else np.ones(F.shape[1])
         # To as many digits as the solves have; with all of them, of two equal points the one or the other might dominate.
-        kept = nondominated(np.round((F - F.min(axis=0)) / unit / SAME))
+        kept = nondominated(np.round((F - F.min(axis=0)) / self._unit(ranges) / SAME))
         left = {"did not converge": len(found) - len(good), "dominated or alike": int(np.count_nonzero(~kept))}
         message = ", ".join(f"{count} {word}" for word, count in left.items() if count)
         chosen = [solved for solved, keep in zip(good, kept, strict=True) if keep]
@@ -246,9 +267,3 @@ class _Job:
         }
         status = [solved.status for solved in found]
         return vectors_front(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more)
-
-
-def _ranges(ends: Sequence[Solved]) -> np.ndarray:
-    """Ranges (m,) of the objectives between the ends; 0, which stands for their own scale, where they are no numbers."""
-    ranges = np.ptp([end.F for end in ends], axis=0)
-    return np.where(np.isfinite(ranges), ranges, 0.0)

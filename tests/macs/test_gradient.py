@@ -277,14 +277,14 @@ def test_peaks_used_otherwise_are_refused_before_any_work(tool) -> None:
 
 def test_targets_are_even_and_no_more_than_asked() -> None:
     ends = np.array([[0.0, 10.0], [2.0, 0.0]])
-    down = targets(ends, 5, "pascoletti-serafini")
+    down = targets(ends, np.ptp(ends, axis=0), 5, "pascoletti-serafini")
     assert np.array([reference for reference, _ in down]) == pytest.approx(np.array([[0.5, 7.5], [1, 5], [1.5, 2.5]])[::-1])
-    limited = targets(ends, 4, "epsilon")
+    limited = targets(ends, np.ptp(ends, axis=0), 4, "epsilon")
     assert sorted(reference[1] for reference, _ in limited) == pytest.approx([10 / 3, 20 / 3])
     for m in (3, 4):
         for points in (m, 10, 40):
             for method in ("epsilon", "pascoletti-serafini"):
-                assert len(targets(1 - np.eye(m), points, method)) + m <= points
+                assert len(targets(1 - np.eye(m), np.ones(m), points, method)) + m <= points
 
 
 def test_importing_stays_light() -> None:
