@@ -85,6 +85,8 @@ class Newton(InnerSolver):
             if iteration >= PLAIN and accelerated.any():
                 step[accelerated] = self._capped(memory.improve(going[accelerated], x[accelerated], step[accelerated]))
             X[going] = np.clip(x + step, -walls, 1.0 + walls)
+        feasible = best <= d  # within the tolerance: what is left of it at bounds of states goes into the dynamics
+        Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         return result(nlp, Z, start, np.full(k, INFEASIBLE), iterations, tolerance)
 
     def _capped(self, step: np.ndarray) -> np.ndarray:
