@@ -20,8 +20,7 @@ OTHER = "start: the points are of other variables; a start belongs to one proble
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
     """Raise ValueError for arguments of `solve` and `minimize` that make no sense."""
-    if isinstance(evaluations, bool) or not isinstance(evaluations, int | np.integer) or evaluations < 1:
-        raise ValueError(f"evaluations must be a whole number of at least 1, not {evaluations!r}")
+    check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
     check_positive("tolerance", tolerance)
@@ -37,6 +36,12 @@ def check_positive(name: str, value: Any) -> None:
     """Raise ValueError that names what is no positive number."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
         raise ValueError(f"{name} must be a positive number, not {value!r}")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Raise ValueError unless `value` is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
 def check_problem(problem: Any, transcription: Any) -> None:

@@ -18,7 +18,7 @@ from transcription.trajectory import Trajectory
 
 from .dominance import extremes
 from .evaluation import CONVERGED
-from .inputs import check_positive
+from .inputs import check_count, check_positive
 from .point import Point
 from .resolving import Resolved, Resolver
 from .results import trajectory_columns
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 OPTIMAL = 1e-6
 """A point whose optimality is at most this need not be solved anew on its own mesh."""
-PATIENCE = 3
+PATIENCE = 5
 """A point that gets no better on so many meshes is left alone."""
 LEAST_TOLERANCE = 1e-10
 """Below, double precision and the integrator cannot tell."""
@@ -41,8 +41,7 @@ def refine_mesh(front: Front, tolerance: float, limit: int) -> Front:
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
         raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
-    if isinstance(limit, bool) or not isinstance(limit, int | np.integer) or limit < 1:
-        raise ValueError(f"limit must be a whole number of at least 1, not {limit!r}")
+    check_count("limit", limit, 1)
     front.compiled()
     return Refinement(front, float(tolerance), int(limit)).go() if len(front) else front
 

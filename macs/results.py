@@ -14,21 +14,38 @@ from transcription.sampling import excursions
 from .archive import Archive
 from .evaluation import CONVERGED, FAILED, INFEASIBLE
 from .front import Front
+from .point import Point
 
 
-def trajectory_front(nlp: NLP, archive: Archive, closest: Archive, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Front:
-    """A front of trajectories; violations are taken anew from the NLP, not from whoever found the points."""
-
-    def of(points: Archive, **more: Any) -> Front:
-        columns = trajectory_columns(nlp, points.Z, stats["tolerance"])
-        return Front(**columns, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats, **more)
-
+def trajectory_front(
+    nlp: NLP,
+    archive: Archive,
+    closest: Archive,
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+    optimality: Sequence[float | None] | None = None,
+) -> Front:
+    """A front of the trajectories in an archive; `optimality` has an entry for each, if they were certified."""
     if len(archive):
-        return of(archive)
-    nearest = of(closest)[0]
+        return vectors_front(nlp, archive.Z, solver, stats, optimality=optimality)
+    nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
+    return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+
+
+def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Front:
+    """A front of vectors (k, n) of an NLP; `more` is for `Front`.
+
+    Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
+    """
+    # An empty front, too, says what its vectors are of.
+    given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
+    return Front(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
+
+
+def nearest_misses(nearest: Point) -> str:
+    """What keeps the least infeasible point from being feasible."""
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
-    why = f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
-    return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
+    return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:

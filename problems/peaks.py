@@ -6,7 +6,7 @@ be minimised or bounded above.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from .compiled import CompiledProblem
 from .sanity import samples
 
+HINT = "; a minimum over time is -peak(-expr)"
 NEGLIGIBLE = 1e-9
 """Slopes of the wrong sign up to this, relative to the largest slope, are rounding."""
 
@@ -26,29 +27,25 @@ def refuse_peaks(problem: CompiledProblem) -> None:
     if not any(phase.peaks.size1_out(0) for phase in problem.phases):
         return
     points = samples(problem)
-    for i, row, phase in _wrong(problem, problem.objectives, points, np.full(len(problem.goals), True), np.full(len(problem.goals), False)):
+    for row, phase in _wrong(problem, problem.objectives, points, np.full(len(problem.goals), True), np.full(len(problem.goals), False)):
         goal = problem.goals[row]
         raise ValueError(
             f"objective '{goal.name}' of problem '{problem.name}' improves when a peak of phase '{phase}' rises: gradient tools can only "
-            f"minimise a peak or bound it above{_hint(i)}"
+            f"minimise a peak or bound it above{HINT}"
         )
     above, below = (np.isfinite([getattr(limit, side) for limit in problem.limits]) for side in ("upper", "lower"))
-    for i, row, phase in _wrong(problem, problem.constraints, points, above, below):
+    for row, phase in _wrong(problem, problem.constraints, points, above, below):
         limit = problem.limits[row]
         raise ValueError(
             f"constraint '{limit.name}' of problem '{problem.name}' can be met by a rise of a peak of phase '{phase}': gradient tools can "
-            f"only minimise a peak or bound it above{_hint(i)}"
+            f"only minimise a peak or bound it above{HINT}"
         )
-
-
-def _hint(_: int) -> str:
-    return "; a minimum over time is -peak(-expr)"
 
 
 def _wrong(
     problem: CompiledProblem, function: ca.Function, points: list[np.ndarray], above: np.ndarray, below: np.ndarray
-) -> Iterable[tuple[int, int, str]]:
-    """Phase number, row and phase name wherever a row that is held down by `above` falls, or one held up by `below` rises, with a peak."""
+) -> Iterator[tuple[int, str]]:
+    """Row and phase name wherever a row that is held down by `above` falls, or one held up by `below` rises, with a peak."""
     if not len(above):
         return
     inputs = [ca.MX.sym(f"v{k}", function.size1_in(k)) for k in range(function.n_in())]
@@ -64,4 +61,4 @@ def _wrong(
         rounding = NEGLIGIBLE * np.abs(found).max(axis=2, initial=0.0)
         falls, rises = found.min(axis=2) < -rounding, found.max(axis=2) > rounding
         for _, row in np.argwhere((falls & above) | (rises & below)):
-            yield i, int(row), phase.name
+            yield int(row), phase.name

@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from .base import NLP
-from .scalarized import gradients, objective_scales
+from .derivatives import gradients, objective_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
@@ -32,7 +32,8 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     with respect to the other variables, the states, vanish: lambda is the adjoint that the dynamics give, and what is left is the gradient
     in the controls, times and parameters (Fritz John's conditions in the objectives; Karush, Kuhn and Tucker's in the constraints). At a
     local Pareto optimum that is regular it is 0. Elsewhere it says how fast all objectives can fall together, in their scales per span of
-    the free variables. It says nothing of violations.
+    the free variables. It says nothing of violations; and a point that is optimal in the weak sense only, one objective being at its
+    least value while another could still fall, has 0 as well.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     z : array (n,)
         Feasible.
     F_scales : array (m,), optional
-        What counts as one in each objective, the front's range for instance; by default what the objectives change by if all variables
-        move by their spans, to first order. Entries that are not positive are replaced by that.
+        What counts as one in each objective, the front's range for instance; by default, and for entries
+        that are not positive, `objective_scales`.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
     if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
         return float("inf")
-    natural = objective_scales(nlp, z)
+    natural = objective_scales(nlp)
     scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
     unit = _units(nlp)
     dF = dF * unit / scales[:, None]

@@ -19,19 +19,43 @@ import numpy as np
 from problems.peaks import refuse_peaks
 
 from .base import NLP, expanded
+from .derivatives import objective_scales
 from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, back_in_bounds, origin, quiet, scaled_bounds
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
-PEAK_LIMIT = 100.0
+PEAK_LIMIT = 3.0
 """How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
+AT_END, RESTARTS = 1e-2, 3
+"""How near, in widths of its box, a variable is to an end that stops it; how often a solve may begin anew for that."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
-ADAPTIVE = (("mu_strategy", "adaptive"),)
-"""Few iterations from good points and poor ones; measured against all of IPOPT's other strategies."""
-NEAR = (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4))
-"""Stays closer to where it starts."""
-SLOW = (("mu_init", 1e-1),)
+
+@dataclass(frozen=True)
+class _Manner:
+    """How IPOPT goes about it: its options, how far free variables may move in spans, whether alpha may not exceed the start's."""
+
+    options: tuple[tuple[str, object], ...]
+    radius: float = np.inf
+    held: bool = False
+
+
+ADAPTIVE = _Manner((
+    ("mu_strategy", "adaptive"),
+    ("fast_step_computation", "yes"),
+    ("mumps_scaling", 0),
+    ("mumps_permuting_scaling", 0),
+    ("mumps_pivot_order", 0),
+))  # fmt: skip
+"""Few iterations from good points and poor ones, and cheap ones: what is scaled already needs neither scaling nor refinement."""
+NEAR = _Manner(
+    (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4)),
+    radius=0.1,
+    held=True,
+)
+"""Stays in the basin of a feasible start."""
+SLOW = _Manner((("mu_init", 0.1),))
+"""IPOPT as it comes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +84,15 @@ class Solved:
     status: str
     iterations: int
     clocked: bool = False
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What a program is built for."""
+
+    tolerance: float
+    max_iterations: int
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,32 +159,18 @@ def scalarize(
         If shapes do not match, a weight is negative or none that matters is positive, the start is no number, or a peak is used otherwise
         than minimised or bounded above.
     """
+    start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     task = _task(nlp, start, reference, weights, ceiling)
-    settings = (tolerance, max_iterations, seconds)
-    first = _attempt(nlp, task, start, settings, ADAPTIVE)
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    ahead = 0.0 if feasible else np.inf
-    if first.clocked or (first.status == CONVERGED and task.value(first.F) <= ahead + tolerance):
+    first = _unstuck(nlp, task, start, settings, ADAPTIVE)
+    worse = feasible and task.value(first.F) > tolerance
+    if first.clocked or (first.status == CONVERGED and not worse):
         return first
-    second = _attempt(nlp, task, start, settings, NEAR if feasible else SLOW)
+    second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
     best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
-
-
-def objective_scales(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """What each objective would change by, to first order at z (n,), if all variables moved by their scales; 1 where that is nothing."""
-    slopes = np.array(gradients(nlp)(z)[0]) * nlp.scale
-    sizes = np.abs(slopes).sum(axis=1)
-    return np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
-
-
-@lru_cache(maxsize=8)
-def gradients(nlp: NLP) -> ca.Function:
-    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
-    z = ca.MX.sym("z", len(nlp.variables))
-    F, g = nlp.functions(z)
-    return expanded(ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"]))
 
 
 def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> _Task:
@@ -172,32 +191,45 @@ def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarra
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
-    scale = objective_scales(nlp, start)
+    scale = objective_scales(nlp)
     slope = np.where(moving, weights, 0.0) / scale
     return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
 
 
-def _attempt(
-    nlp: NLP, task: _Task, start: np.ndarray, settings: tuple[float, int, float], strategy: tuple[tuple[str, object], ...]
-) -> Solved:
-    """One run of IPOPT."""
-    tolerance, max_iterations, seconds = settings
-    solver = _program(nlp, min(1e-8, 0.1 * tolerance), max_iterations, seconds, strategy)
-    lower, upper = scaled_bounds(nlp)
-    y = np.clip((start - origin(nlp)) / nlp.scale, lower, upper)
-    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
+def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> Solved:
+    """A run of IPOPT, and more from where it stopped, as long as that is an end of a box that the problem does not have."""
+    iterations = 0
+    for _ in range(RESTARTS + 1):
+        solved, stuck = _attempt(nlp, task, start, settings, manner)
+        iterations += solved.iterations
+        if not stuck or solved.clocked:
+            break
+        start = solved.z
+    if stuck and solved.status == CONVERGED:
+        solved = replace(solved, status=FAILED)
+    return replace(solved, iterations=iterations)
+
+
+def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> tuple[Solved, bool]:
+    """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
+    tolerance = settings.tolerance
+    solver = _program(nlp, settings, manner.options)
+    y = np.clip((start - origin(nlp)) / nlp.scale, *scaled_bounds(nlp))
+    lower, upper, made_up = _box(nlp, y, manner.radius)
     none = np.full(2 * len(task.used), -np.inf)
     answer = solver(
         x0=np.append(y, 0.0),
         p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
         lbx=np.append(lower, -np.inf),
-        ubx=np.append(upper, np.inf),
+        ubx=np.append(upper, 0.0 if manner.held else np.inf),
         lbg=np.concatenate([nlp.g_lower / nlp.g_scale, none]),
         ubg=np.concatenate([nlp.g_upper / nlp.g_scale, np.where(task.used, 0.0, np.inf), task.top]),
     )
     stats = solver.stats()
     words, iterations = stats["return_status"], int(stats["iter_count"])
-    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + np.array(answer["x"]).ravel()[:-1] * nlp.scale)[None])[0]
+    y = np.array(answer["x"]).ravel()[:-1]
+    stuck = bool((made_up & (np.stack([y - lower, upper - y]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
+    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
     F, violation = nlp.evaluate(z[None])
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
         z, said = start, FAILED
@@ -206,7 +238,17 @@ def _attempt(
         said = CONVERGED if words in SOLVED else SAID.get(words, FAILED)
     else:
         said = INFEASIBLE if words in SOLVED else SAID.get(words, FAILED)
-    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words)
+    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words), stuck
+
+
+def _box(nlp: NLP, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bounds of the scaled variables around y, (n,) each, and which of them the problem does not have, (2, n)."""
+    lower, upper = scaled_bounds(nlp)
+    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
+    reach = np.full(len(y), np.inf)
+    reach[nlp.free] = radius * (nlp.span / nlp.scale)[nlp.free]
+    low, high = np.maximum(lower, y - reach), np.minimum(upper, y + reach)
+    return low, high, np.stack([low > lower, high < upper]) | (nlp.period > 0)
 
 
 def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
@@ -217,7 +259,7 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=32)
-def _program(nlp: NLP, feasibility: float, max_iterations: int, seconds: float, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
+def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
     """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)
     n, m = len(nlp.variables), len(nlp.problem.goals)
@@ -227,10 +269,10 @@ def _program(nlp: NLP, feasibility: float, max_iterations: int, seconds: float, 
     above = (F - shift) * inverse
     rows = ca.vertcat(g / nlp.g_scale, above - x[n] * slope, above)
     parts = expanded(ca.Function("program", [x, p], [x[n], rows], ["x", "p"], ["f", "g"]))
-    options = quiet(seconds, max_iterations) | {
+    options = quiet(settings.seconds, settings.max_iterations) | {
         "ipopt.tol": ACCURACY,
         "ipopt.acceptable_tol": 100 * ACCURACY,
-        "ipopt.constr_viol_tol": feasibility,
+        "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
         "ipopt.nlp_scaling_method": "none",
         "ipopt.bound_relax_factor": 0.0,
     }

@@ -1,0 +1,224 @@
+"""One gradient solve: known answers for every form of scalarisation, and what it does where there is none."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells, vector, with_peak
+
+from problems import load
+from problems.goddard import reference
+from transcription import DFET, NLP
+from transcription.inner import inner_solver
+from transcription.scalarized import Solved, scalarize
+
+INF = np.inf
+RANGES = np.array([141.0, 0.9])
+
+
+@cache
+def goddard() -> NLP:
+    return DFET(4, 6).transcribe(load("goddard"))
+
+
+@cache
+def orbit() -> NLP:
+    return DFET(30, 1).transcribe(load("orbit_rise_full"))
+
+
+def feasible(nlp: NLP, seed: int) -> np.ndarray:
+    """A feasible vector (n,) from random controls."""
+    rng = np.random.default_rng(seed)
+    candidates = nlp.lower[nlp.free] + rng.random((1, len(nlp.free))) * nlp.span[nlp.free]
+    found = inner_solver("auto").solve(nlp, candidates)
+    assert found.status[0] == "converged"
+    return found.z[0]
+
+
+def middle(nlp: NLP) -> np.ndarray:
+    return nlp.march(nlp.first_guess(0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])[None]))[0]
+
+
+def close(solved: Solved, F: object, miss: float) -> bool:
+    return bool(np.allclose(solved.F, F, rtol=0, atol=miss))
+
+
+def solve(nlp: NLP, reference: list[float], weights: list[float], start: np.ndarray | None = None, **more: object) -> Solved:
+    first = middle(nlp) if start is None else start
+    return scalarize(nlp, first, reference=np.array(reference), weights=np.array(weights), **more)  # type: ignore[arg-type]
+
+
+def test_pascoletti_serafini_goes_to_the_front_along_the_weights() -> None:
+    # Along the diagonal from (0, 0): p^2 = (p - 1)^2.
+    solved = solve(nlp_of(two_wells()), [0, 0], [1, 1])
+    assert solved.status == "converged" and solved.violation <= 1e-6
+    assert close(solved, [0.25, 0.25], 1e-8)
+    steep = solve(nlp_of(two_wells()), [0, 0], [1, 4])
+    assert close(steep, [1 / 9, 4 / 9], 1e-8)
+
+
+def test_a_weight_of_zero_is_a_hard_limit() -> None:
+    solved = solve(nlp_of(two_wells()), [0, 0.36], [1, 0])
+    assert solved.status == "converged" and close(solved, [0.16, 0.36], 1e-8)
+
+
+def test_an_infinite_reference_leaves_an_objective_out() -> None:
+    solved = solve(nlp_of(two_wells()), [INF, 0], [1, 1])
+    assert solved.status == "converged" and close(solved, [1, 0], 1e-7)
+
+
+def test_a_ceiling_holds_beside_the_scalarisation() -> None:
+    solved = solve(nlp_of(two_wells()), [0, 0], [1, 1], ceiling=np.array([INF, 0.04]))
+    assert solved.status == "converged" and close(solved, [0.64, 0.04], 1e-7)
+
+
+def test_the_answer_does_not_depend_on_where_alpha_is_zero_or_what_it_measures() -> None:
+    nlp = nlp_of(slide())
+    answers = [solve(nlp, [0, a], [w, w]).F for a, w in ((0, 1), (0, 1e-6), (0, 1e6))]
+    far = solve(nlp, [-1e6, -1e6], [1, 1]).F
+    for F in (*answers, far):
+        assert np.allclose(answers[0], F, rtol=0, atol=1e-7)
+
+
+def test_a_constant_control_is_found_from_anywhere() -> None:
+    nlp = nlp_of(slide())
+    # Effort 2 c^2 against miss (2 c - 1)^2, equal where c = 1/(2 + sqrt 2).
+    c = 1 / (2 + np.sqrt(2))
+    for seed in range(3):
+        solved = solve(nlp, [0, 0], [1, 1], nlp.first_guess(np.random.default_rng(seed).uniform(-2, 2, (1, len(nlp.free))))[0])
+        assert solved.status == "converged" and close(solved, [2 * c**2, (2 * c - 1) ** 2], 1e-8)
+
+
+def test_three_objectives() -> None:
+    solved = solve(nlp_of(corners()), [0, 0, 0], [1, 1, 1])
+    assert solved.status == "converged" and close(solved, np.full(3, 2 / 3), 1e-8)
+
+
+def test_goddard_meets_the_linear_tangent_law() -> None:
+    truth = reference(401)
+    for tf in (115.0, 180.0, 250.0):
+        solved = solve(goddard(), [tf, 0], [0, 1], feasible(goddard(), 0))
+        assert solved.status == "converged" and solved.violation <= 1e-6
+        miss = 1e-6 if tf > 115 else 2e-6
+        assert -solved.F[1] == pytest.approx(np.interp(solved.F[0], *truth.T), abs=10 * miss)
+
+
+def test_a_start_near_the_answer_takes_few_iterations() -> None:
+    nlp = goddard()
+    far = solve(nlp, [150, -1], [1, 0.01], feasible(nlp, 1))
+    near = solve(nlp, [154, -1], [1, 0.01], far.z)
+    assert far.status == near.status == "converged"
+    assert near.iterations <= 12 and near.iterations < far.iterations
+
+
+def test_the_same_solve_gives_the_same_bits() -> None:
+    nlp, start = goddard(), feasible(goddard(), 2)
+    one, two = (solve(nlp, [150, -1], [1, 0.01], start) for _ in range(2))
+    assert np.array_equal(one.z, two.z) and one.iterations == two.iterations and not one.clocked
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), orbits=st.booleans())
+def test_a_guarded_solve_makes_no_objective_worse(seed: int, orbits: bool) -> None:
+    nlp, ranges = (orbit(), np.array([60.0, 0.34])) if orbits else (goddard(), RANGES)
+    start = feasible(nlp, seed)
+    (F,), _ = nlp.evaluate(start[None])
+    solved = scalarize(nlp, start, reference=F, weights=ranges)
+    assert solved.status == "converged" and solved.violation <= 1e-6
+    assert np.all((solved.F - F) / ranges <= 1e-7)
+    # Once more, from the front, with the front as ceiling: nothing is lost, whatever IPOPT does inside.
+    again = scalarize(nlp, solved.z, reference=solved.F, weights=ranges, ceiling=solved.F)
+    assert again.status == "converged" and np.all((again.F - solved.F) / ranges <= 1e-7)
+
+
+@pytest.mark.parametrize("course", [2.8, -2.8, 0.3, 3.1415])
+def test_a_periodic_control_passes_the_end_of_its_box(course: float) -> None:
+    nlp = nlp_of(compass())
+    solved = solve(nlp, [0, INF], [1, 1], vector(nlp, u=course))
+    assert solved.status == "converged" and solved.F[0] == pytest.approx(-2, abs=1e-8)
+    assert np.all((solved.z >= nlp.lower) & (solved.z <= nlp.upper))
+    # South-west, seen from the north: the way leads over the end of the box.
+    south = solve(nlp, [0, 0], [1, 1], vector(nlp, u=2.5))
+    assert close(south, [-np.sqrt(2), -np.sqrt(2)], 1e-8)
+
+
+def test_a_peak_is_minimised_in_epigraph_form() -> None:
+    nlp = nlp_of(shuttle())
+    solved = solve(nlp, [2, 0], [0, 1])
+    # Bang-bang, with the switch at an end of an element: thrust 4/tf^2.
+    assert solved.status == "converged" and close(solved, [2, 1], 1e-6)
+    ignored = solve(nlp, [0, INF], [1, 1])
+    assert ignored.status == "converged" and ignored.F[0] == pytest.approx(1)
+    assert ignored.F[1] >= 16 - 1e-5 and np.array_equal(nlp.tighten(ignored.z[None])[0], ignored.z)
+
+
+def test_a_peak_that_is_bounded_above() -> None:
+    problem = shuttle()
+    problem.constraint("thrust", problem.phases["trip"].peak(problem.phases["trip"]["u"] ** 2), upper=4.0)
+    solved = solve(nlp_of(problem), [0, INF], [1, 1])
+    assert solved.status == "converged" and solved.F[0] == pytest.approx(np.sqrt(2), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("use", "name"),
+    [
+        ("maximised", "objective 'speed'"),
+        ("minimum minimised", "objective 'least speed'"),
+        ("bounded below", "constraint 'fast enough'"),
+        ("equal", "constraint 'just so'"),
+    ],
+)
+def test_other_uses_of_peaks_are_refused(use: str, name: str) -> None:
+    nlp = nlp_of(with_peak(use))
+    with pytest.raises(ValueError, match=f"{name} of problem 'shuttle' .* of phase 'trip'"):
+        solve(nlp, [0] * len(nlp.problem.goals), [1] * len(nlp.problem.goals))
+
+
+@pytest.mark.parametrize("use", ["minimum maximised", "minimum bounded below", "convex and rising"])
+def test_uses_of_peaks_that_are_fine(use: str) -> None:
+    nlp = nlp_of(with_peak(use))
+    m = len(nlp.problem.goals)
+    assert solve(nlp, [0, *[INF] * (m - 1)], [1] * m).status == "converged"
+
+
+def test_what_cannot_be_reached_is_infeasible() -> None:
+    problem = slide()
+    problem.constraint("too far", problem.phases["run"].final(problem.phases["run"]["x"]), lower=4.5)
+    solved = solve(nlp_of(problem), [0, 0], [1, 1])
+    assert solved.status in ("infeasible", "failed") and solved.violation > 1e-3
+    contradictory = solve(nlp_of(two_wells()), [0.01, 0], [0, 1], ceiling=np.array([INF, 0.01]))
+    assert contradictory.status != "converged"
+
+
+def test_a_time_limit_is_a_status() -> None:
+    solved = solve(goddard(), [0, 0], [1, 1], feasible(goddard(), 3), seconds=1e-6)
+    assert solved.clocked and solved.status in ("timeout", "converged")
+    assert np.isfinite(solved.z).all()
+
+
+def test_too_few_iterations_are_a_failure_even_where_feasible() -> None:
+    solved = solve(goddard(), [0, INF], [1, 1], feasible(goddard(), 3), max_iterations=2)
+    assert solved.status != "converged"
+
+
+@pytest.mark.parametrize(
+    ("reference", "weights", "more"),
+    [
+        ([0, 0], [1, -1], {}),
+        ([0, 0], [0, 0], {}),
+        ([INF, 0], [1, 0], {}),
+        ([0, 0, 0], [1, 1], {}),
+        ([0, np.nan], [1, 1], {}),
+        ([0, -INF], [1, 1], {}),
+        ([0, 0], [1, INF], {}),
+        ([0, 0], [1, 1], {"start": np.zeros(2)}),
+        ([0, 0], [1, 1], {"ceiling": np.zeros(3)}),
+    ],
+)
+def test_calls_that_make_no_sense(reference: list[float], weights: list[float], more: dict) -> None:
+    with pytest.raises(ValueError, match="scalarize"):
+        solve(nlp_of(two_wells()), reference, weights, **more)
