@@ -15,6 +15,7 @@ from problems.compiled import CompiledProblem, Objective, Variable
 
 from .decisions import Decisions
 from .point import Point
+from .rows import by_first, column, frozen, number, shared
 from .source import Source
 from .stats import STATS, versions
 
@@ -109,20 +110,20 @@ class Front:
 
         rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
         n = len(rows)
-        order = _order(rows * self._signs) if sort else np.arange(n)
-        self.F = _frozen(rows[order])
-        self.violation = _frozen(np.asarray(_column(violation, n, "violation"), dtype=float)[order])
-        self.status = _frozen(np.asarray(_column(status, n, "status"), dtype=str)[order])
+        order = by_first(rows * self._signs) if sort else np.arange(n)
+        self.F = frozen(rows[order])
+        self.violation = frozen(np.asarray(column(violation, n, "violation"), dtype=float)[order])
+        self.status = frozen(np.asarray(column(status, n, "status"), dtype=str)[order])
         common = not len(variables) or isinstance(variables[0], Variable)
-        own = variables if common else [_column(variables, n, "variables")[i] for i in order]
-        self._decisions = Decisions.of([_column(decision, n, "decision")[i] for i in order], own)
+        own = variables if common else [column(variables, n, "variables")[i] for i in order]
+        self._decisions = Decisions.of([column(decision, n, "decision")[i] for i in order], own)
         given = [transcription] * n if transcription is None or isinstance(transcription, Mapping) else transcription
-        self.transcriptions = _shared([_column(given, n, "transcription")[i] for i in order])
-        self._violations = [_column(violations, n, "violations")[i] for i in order]
-        self._trajectories = [_column(trajectories, n, "trajectories")[i] for i in order]
-        self._excursions = [_column(excursions, n, "excursions")[i] for i in order]
-        self._optimality = [_number(_column(optimality, n, "optimality")[i]) for i in order]
-        self._notes = [_column(notes, n, "notes")[i] or "" for i in order]
+        self.transcriptions = shared([column(given, n, "transcription")[i] for i in order])
+        self._violations = [column(violations, n, "violations")[i] for i in order]
+        self._trajectories = [column(trajectories, n, "trajectories")[i] for i in order]
+        self._excursions = [column(excursions, n, "excursions")[i] for i in order]
+        self._optimality = [number(column(optimality, n, "optimality")[i]) for i in order]
+        self._notes = [column(notes, n, "notes")[i] or "" for i in order]
 
     # What it holds
 
@@ -213,7 +214,7 @@ class Front:
         front.__dict__.update(self.__dict__)
         index = np.asarray(rows, dtype=int)
         for name in ("F", "violation", "status"):
-            setattr(front, name, _frozen(getattr(self, name)[index]))
+            setattr(front, name, frozen(getattr(self, name)[index]))
         front._decisions = self._decisions.take(index)
         front.transcriptions = tuple(self.transcriptions[i] for i in index)
         for name in ("_violations", "_trajectories", "_excursions", "_optimality", "_notes"):
@@ -235,8 +236,8 @@ class Front:
         Parameters
         ----------
         tolerance : float
-            Largest defect, and largest amount by which states and path constraints may leave their limits between nodes, in scales; ten
-            times this, in ranges of the front, is by how much objectives may still change from mesh to mesh, or when flown.
+            Largest defect. Ten times this, in ranges of the front, is by how much objectives may still change from mesh to mesh, or when
+            flown. Controls may not leave their bounds at all, states and path constraints by the front's own tolerance.
         limit : int
             How many meshes are tried for each point.
 
@@ -334,40 +335,3 @@ class Front:
         from .merging import merge
 
         return merge(fronts)
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array = np.array(array)
-    array.setflags(write=False)
-    return array
-
-
-def _order(objectives: np.ndarray) -> np.ndarray:
-    """By the first objective, ties by the next ones; NaN last."""
-    return np.lexsort(objectives.T[::-1])
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None or np.isnan(value) else float(value)
-
-
-def _column(values: Any, n: int, name: str) -> Any:
-    """`values` if there are n of them; n times None for None."""
-    if values is None:
-        return [None] * n
-    if len(values) != n:
-        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
-    return values
-
-
-def _shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """Equal ones as one object."""
-    distinct: list[dict[str, Any]] = []
-    found: list[dict[str, Any] | None] = []
-    for given in dicts:
-        known = next((one for one in distinct if one == given), None)
-        if known is None and given is not None:
-            known = dict(given)
-            distinct.append(known)
-        found.append(known)
-    return tuple(found)

@@ -32,16 +32,16 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
         raise ValueError("checkpoint: not available yet")
 
 
-def check_count(name: str, value: Any, least: int) -> None:
-    """Raise ValueError unless `value` is a whole number of at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
-
-
 def check_positive(name: str, value: Any) -> None:
     """Raise ValueError that names what is no positive number."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
         raise ValueError(f"{name} must be a positive number, not {value!r}")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Raise ValueError unless `value` is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
 def check_problem(problem: Any, transcription: Any) -> None:

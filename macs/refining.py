@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from transcription.trajectory import Trajectory
 
 from .dominance import extremes
 from .evaluation import CONVERGED
-from .inputs import check_positive
+from .inputs import check_count, check_positive
 from .point import Point
 from .resolving import Resolved, Resolver
 from .results import trajectory_columns
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 OPTIMAL = 1e-6
 """A point whose optimality is at most this need not be solved anew on its own mesh."""
+PATIENCE = 5
+"""A point that gets no better on so many meshes is left alone."""
 LEAST_TOLERANCE = 1e-10
 """Below, double precision and the integrator cannot tell."""
 
@@ -39,8 +41,7 @@ def refine_mesh(front: Front, tolerance: float, limit: int) -> Front:
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
         raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
-    if isinstance(limit, bool) or not isinstance(limit, int | np.integer) or limit < 1:
-        raise ValueError(f"limit must be a whole number of at least 1, not {limit!r}")
+    check_count("limit", limit, 1)
     front.compiled()
     return Refinement(front, float(tolerance), int(limit)).go() if len(front) else front
 
@@ -61,6 +62,8 @@ class _Refined:
         On that mesh; None at first.
     change : float
         Of the objectives, from the mesh before, in ranges of the front.
+    history : list of float
+        How far it was from good enough on each mesh: 1 is enough.
     active : bool
         There is something left to do, and to try.
     trouble : str
@@ -74,6 +77,7 @@ class _Refined:
     verdict: Verdict
     solved: Resolved | None = None
     change: float = np.inf
+    history: list[float] = field(default_factory=list)
     active: bool = True
     trouble: str = ""
 
@@ -142,8 +146,11 @@ class Refinement:
         if not isinstance(method, DFET) or point.trajectory is None:
             raise ValueError(f"only meshes of DFET can be refined; point {i} is of {type(method).__name__}")
         best: Any = np.flatnonzero(self.good[extremes(F[self.good])] == i) if len(self.good) > 1 else []
-        verdict = judge(self.problem, point.trajectory, self.tolerance)
+        verdict = self._judge(point.trajectory)
         return _Refined(point, int(best[0]) if len(best) else None, method, point.trajectory, verdict)
+
+    def _judge(self, trajectory: Trajectory) -> Verdict:
+        return judge(self.problem, trajectory, self.tolerance, self.front.stats["tolerance"])
 
     def _polish(self) -> None:
         """Points that nobody has found to be optimal are solved on the meshes that they have: rough controls would ask for finer ones."""
@@ -164,7 +171,7 @@ class Refinement:
         for i, point in self.points.items():
             if point.active:
                 settled = self._missed(point) <= COST * self.tolerance
-                method = next_method(point.method, point.verdict, point.trajectory, self.tolerance, integrals=not settled)
+                method = next_method(point.method, point.verdict, point.trajectory, integrals=not settled)
                 point.active = method != point.method
                 point.trouble = "" if point.active else "no mesh is refined further"
                 if point.active:
@@ -184,10 +191,14 @@ class Refinement:
         self._take(point, method, solved)
         point.change = change
         point.active = bool(self._complaints(point))
+        point.history.append(max(point.verdict.error, change / (COST * self.tolerance)))
+        earlier, latest = point.history[:-PATIENCE], point.history[-PATIENCE:]
+        if point.active and earlier and min(latest) > 0.8 * min(earlier):
+            point.active, point.trouble = False, "finer meshes do not help"
 
     def _take(self, point: _Refined, method: DFET, solved: Resolved) -> None:
         point.method, point.solved, point.trajectory = method, solved, solved.nlp.unpack(solved.z)
-        point.verdict = judge(self.problem, point.trajectory, self.tolerance)
+        point.verdict = self._judge(point.trajectory)
 
     def _starts(self, i: int, nlp: NLP) -> Iterator[np.ndarray]:
         """Its own trajectory, then those of the points nearest to it, on its mesh."""
@@ -203,7 +214,7 @@ class Refinement:
 
     def _complaints(self, point: _Refined) -> list[str]:
         """What keeps a point from meeting the tolerance."""
-        found = point.verdict.complaints(self.tolerance, self.front.stats["tolerance"])
+        found = point.verdict.complaints()
         off, settled = self._missed(point), COST * self.tolerance
         if not found and not off <= settled:
             found.append(f"flown, its objectives differ by {off:.1e} of the front's range")
@@ -220,7 +231,7 @@ class Refinement:
             return _untouched(self.front[i], "")
         complaints = self._complaints(point)
         if complaints:
-            complaints.append(point.verdict.worst_place(point.method, point.trajectory, self.tolerance))
+            complaints.append(point.verdict.worst_place(point.method, point.trajectory))
         note = "; ".join([*complaints, *([point.trouble] if point.trouble else [])])
         if point.solved is None:
             return _untouched(self.front[i], note)

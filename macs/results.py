@@ -37,8 +37,9 @@ def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Map
 
     Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
     """
-    columns = trajectory_columns(nlp, Z, stats["tolerance"])
-    return Front(**(columns | {"goals": nlp.problem.goals, "problem": nlp.problem, "solver": solver, "stats": stats} | more))
+    # An empty front, too, says what its vectors are of.
+    given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
+    return Front(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
 
 
 def nearest_misses(nearest: Point) -> str:

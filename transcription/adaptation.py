@@ -15,8 +15,8 @@ from .phase_mesh import PhaseMesh
 from .simulate import Simulation, simulate
 from .trajectory import Trajectory
 
-MOST_ELEMENTS = 100
-"""Of each phase."""
+MOST_ELEMENTS = 40
+"""Of each phase; or twice as many as the method began with, if that is more."""
 SAFETY = 0.5
 """Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
 COST = 10.0
@@ -34,10 +34,14 @@ class Verdict:
         The whole of it flown.
     errors : list of PhaseErrors
         Element by element.
+    tolerance, feasible : float
+        Of defects; of constraints, flown and between nodes, in their scales.
     """
 
     flight: Simulation
     errors: list[PhaseErrors]
+    tolerance: float
+    feasible: float
 
     @property
     def excess(self) -> float:
@@ -49,22 +53,26 @@ class Verdict:
         """The same for controls."""
         return max((float(phase.leaving.max()) for phase in self.errors), default=0.0)
 
-    def complaints(self, tolerance: float, feasible: float) -> list[str]:
-        """What is not good enough, in words: defects and states beyond `tolerance`, controls out of bounds at all, flown constraints that
-        are violated by more than `feasible`. Empty if nothing is."""
+    @property
+    def error(self) -> float:
+        """The largest of defect, excess and flown violation, in units of what they may be."""
+        return max(self.flight.max_defect / self.tolerance, max(self.excess, self.flight.violation) / self.feasible)
+
+    def complaints(self) -> list[str]:
+        """What is not good enough, in words; controls may not leave their bounds at all. Empty if nothing is."""
         found = []
-        if not self.flight.max_defect <= tolerance:
+        if not self.flight.max_defect <= self.tolerance:
             found.append(f"flown, it ends {self.flight.max_defect:.1e} away")
         if self.leaving > 0.0:
             found.append(f"a control leaves its bounds by {self.leaving:.1e} between nodes")
-        if not self.excess <= tolerance:
+        if not self.excess <= self.feasible:
             found.append(f"a state or path constraint leaves its limits by {self.excess:.1e} between nodes")
-        if not found and not self.flight.violation <= feasible:
+        if not found and not self.flight.violation <= self.feasible:
             worst = max(self.flight.violations, key=lambda key: self.flight.violations[key])
             found.append(f"flown, it violates '{worst}' by {self.flight.violation:.1e}")
         return found
 
-    def scores(self, method: DFET, trajectory: Trajectory, tolerance: float, *, integrals: bool = False) -> list[np.ndarray]:
+    def scores(self, method: DFET, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
         """For each phase the error of each element (N,), in units of what it may be; that of integrals too, if wanted."""
         total = sum(float(phase.defect.sum()) for phase in self.errors)
         # What an error at one element becomes at the end of the flight, at least.
@@ -74,18 +82,18 @@ class Verdict:
         for name, phase in zip(trajectory, self.errors, strict=True):
             lengths = np.diff(method.mesh_of(name).edges)
             parts = [
-                growth * phase.defect * count / (SAFETY * tolerance),
-                phase.excess / tolerance,
-                lengths * phase.tail**2 * count / (COST * tolerance),
+                growth * phase.defect * count / (SAFETY * self.tolerance),
+                phase.excess / self.feasible,
+                lengths * phase.tail**2 * count / (COST * self.tolerance),
             ]
             if integrals:
-                parts.append(phase.integral * count / tolerance)
+                parts.append(phase.integral * count / self.tolerance)
             found.append(np.max(parts, axis=0))
         return found
 
-    def worst_place(self, method: DFET, trajectory: Trajectory, tolerance: float) -> str:
+    def worst_place(self, method: DFET, trajectory: Trajectory) -> str:
         """Where the largest error is, in words."""
-        scores = self.scores(method, trajectory, tolerance)
+        scores = self.scores(method, trajectory)
         names = list(trajectory)
         i = int(np.argmax([score.max() for score in scores]))
         j = int(np.argmax(scores[i]))
@@ -96,25 +104,27 @@ class Verdict:
         return f"the mesh is coarsest for phase '{names[i]}' near {time:.6g} {phase.time_unit}{why}"
 
 
-def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float) -> Verdict:
-    """Look at a trajectory with an integrator a thousand times more exact than `tolerance`."""
+def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float, feasible: float) -> Verdict:
+    """Look at a trajectory with an integrator a thousand times more exact than `tolerance`; see `Verdict`."""
     rtol = float(np.clip(1e-3 * tolerance, 1e-13, 1e-9))
     return Verdict(
         flight=simulate(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
         errors=phase_errors(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
+        tolerance=tolerance,
+        feasible=feasible,
     )
 
 
-def next_method(method: DFET, verdict: Verdict, trajectory: Trajectory, tolerance: float, *, integrals: bool = False) -> DFET:
+def next_method(method: DFET, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = False) -> DFET:
     """The method on finer meshes, with controls that their coefficients bound where one leaves its bounds between nodes.
 
     `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
     """
-    meshes = {}
-    scores = verdict.scores(method, trajectory, tolerance, integrals=integrals)
+    meshes, most = {}, max(MOST_ELEMENTS, 2 * method.elements)
+    scores = verdict.scores(method, trajectory, integrals=integrals)
     for name, phase, score in zip(trajectory, verdict.errors, scores, strict=True):
         old = method.mesh_of(name)
-        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=MOST_ELEMENTS)
+        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=most)
         meshes[name] = PhaseMesh(tuple(edges.tolist()), order)
     if all(mesh == method.mesh_of(name) for name, mesh in meshes.items()) and not (verdict.leaving and method.basis != "bernstein"):
         return method

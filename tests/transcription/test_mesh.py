@@ -142,10 +142,10 @@ def test_trajectories_become_as_exact_as_wanted(method):
     z = flown(nlp, k=1)[0]
     for _ in range(8):
         flight = nlp.unpack(z)
-        verdict = judge(nlp.problem, flight, 1e-6)
+        verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
         if not verdict.flight.max_defect > 1e-6:
             break
-        finer = next_method(method, verdict, flight, 1e-6)
+        finer = next_method(method, verdict, flight)
         assert finer != method
         method, nlp = finer, finer.transcribe(nlp.problem)
         z = nlp.march(nlp.interpolate(flight)[None])[0]
@@ -159,9 +159,9 @@ def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
         if ".u[" in nlp.variables[i].name:
             z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0
     flight = nlp.unpack(nlp.march(z[None])[0])
-    verdict = judge(nlp.problem, flight, 1e-6)
-    assert verdict.leaving > 0.01 and "a control leaves its bounds" in " ".join(verdict.complaints(1e-6, 1e-6))
-    finer = next_method(DFET(1, 2), verdict, flight, 1e-6)
+    verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
+    assert verdict.leaving > 0.01 and "a control leaves its bounds" in " ".join(verdict.complaints())
+    finer = next_method(DFET(1, 2), verdict, flight)
     assert finer.basis == "bernstein"
     again = finer.transcribe(nlp.problem)
-    assert judge(nlp.problem, again.unpack(again.interpolate(flight)), 1e-6).leaving == 0.0
+    assert judge(nlp.problem, again.unpack(again.interpolate(flight)), 1e-6, 1e-6).leaving == 0.0
