@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from problems.peaks import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
+from transcription.scalarized import scalarize
 
 from .evaluation import Counts, Evaluation, Evaluator
 
@@ -29,6 +31,11 @@ class Bilevel(Evaluator):
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
         self.counts = Counts()
+        try:
+            refuse_peaks(nlp.problem)
+            self.has_gradients = True
+        except ValueError:  # a peak that is maximised, say: the search goes on without derivatives
+            self.has_gradients = False
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """See `NLP.first_guess`."""
@@ -38,3 +45,17 @@ class Bilevel(Evaluator):
         found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
         evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked)
         return evaluation, int(np.sum(found.iterations))
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        found = []
+        for start, reference, weight in zip(starts, references, weights, strict=True):
+            self.before_batch()
+            found.append(scalarize(self.nlp, start, reference=reference, weights=weight, tolerance=self.tolerance))
+        evaluation = Evaluation(
+            Z=np.array([solved.z for solved in found]),
+            F=np.array([solved.F for solved in found]),
+            violation=np.array([solved.violation for solved in found]),
+            status=np.array([solved.status for solved in found]),
+            clocked=any(solved.clocked for solved in found),
+        )
+        return evaluation, sum(solved.iterations for solved in found)

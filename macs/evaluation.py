@@ -69,6 +69,8 @@ class Evaluator(ABC):
         Length of the period of a free variable that wraps around at its bounds, which are one period wide; 0 where it does not.
     tolerance : float
         A point whose violation is at most this is feasible.
+    has_gradients : bool
+        Whether `refine` works.
     counts : Counts
     before_batch : callable
         Called without arguments before each batch; it may end the search by raising an exception.
@@ -79,6 +81,7 @@ class Evaluator(ABC):
     upper: np.ndarray
     period: np.ndarray
     tolerance: float
+    has_gradients: bool = False
     counts: Counts
     before_batch: Callable[[], None] = staticmethod(lambda: None)
 
@@ -99,3 +102,28 @@ class Evaluator(ABC):
         self.counts.clocked += evaluation.clocked
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation
+
+    def refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+        """Gradient solves, each to the least alpha with F - reference <= alpha weights; they are counted beside evaluations.
+
+        Parameters
+        ----------
+        starts : array (k, D)
+            Full vectors to begin with.
+        references, weights : arrays (k, m)
+            Weight 0: a hard limit at the reference. Reference +inf: the objective does not matter.
+
+        Returns
+        -------
+        Evaluation
+            "converged" where a local optimum was found that is feasible.
+        """
+        found, iterations = self._refine(starts, references, weights)
+        self.counts.gradient_solves += len(starts)
+        self.counts.inner_iterations += iterations
+        self.counts.clocked += found.clocked
+        return found
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        """Solve, if there are gradients; also returns the iterations spent."""
+        raise NotImplementedError(f"{type(self).__name__} has no gradients")

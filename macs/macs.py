@@ -34,7 +34,9 @@ class MACS(Solver):
     archive : int, default 10
         Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
     refine : bool, default True
-        Accepted, and without effect yet.
+        Use derivatives, where the problem has them (a black box has none): one guarded gradient solve for every `refine_every` evaluations,
+        and at the end of the search a polish of the archive, of about six solves for each of its points. They are counted in
+        `stats["gradient_solves"]`, and points then carry their `optimality`. False: the derivative-free method.
     mesh : {"fixed", "adaptive"}, default "fixed"
         "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
         `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
@@ -77,6 +79,8 @@ class MACS(Solver):
         Shorten inertia's steps until they stay in the box, as in the paper; otherwise they are clipped to it, variable by variable.
     social_moves : bool, default True
         Agents go where a social action was a success. False as in the paper: social actions only offer points to the archive.
+    refine_every : int, default 200
+        How many evaluations there are, at least 1, for each gradient solve of an agent.
     keep_velocity : bool, default True
         Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
         later code).
@@ -110,12 +114,14 @@ class MACS(Solver):
     shorten: bool = False
     social_moves: bool = True
     keep_velocity: bool = True
+    refine_every: int = 200
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
         self._check_count("archive", self.archive, 1)
         self._check_count("max_contractions", self.max_contractions, 0)
         self._check_count("memory", self.memory, 1)
+        self._check_count("refine_every", self.refine_every, 1)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
@@ -195,6 +201,15 @@ class MACS(Solver):
     def advance(self, state: SearchState, evaluator: Evaluator, budget: int) -> None:
         """One iteration, of some tens of evaluations; changes `state`. With the budget spent it does nothing."""
         search.advance(self, state, evaluator, budget)
+
+    def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
+        """Polish the archive by gradients, where there are any."""
+        search.conclude(self, state, evaluator)
+
+    @property
+    def certifies(self) -> bool:
+        """See `Solver.certifies`."""
+        return self.refine
 
     def check_objectives(self, m: int) -> None:
         """Refuse an archive that could not keep the best points of all m objectives."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from problems.compiled import Objective, Variable
 from transcription.base import NLP
+from transcription.optimality import optimality
 from transcription.sampling import excursions
 
 from .archive import Archive
@@ -23,11 +24,15 @@ def trajectory_front(
     closest: Archive,
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
-    optimality: Sequence[float | None] | None = None,
+    *,
+    certified: bool,
 ) -> Front:
-    """A front of the trajectories in an archive; `optimality` has an entry for each, if they were certified."""
+    """A front of the trajectories in an archive, `certified` with their optimality; objectives count in the front's ranges there."""
     if len(archive):
-        return vectors_front(nlp, archive.Z, solver, stats, optimality=optimality)
+        ranges = np.ptp(archive.F, axis=0)
+        return vectors_front(
+            nlp, archive.Z, solver, stats, optimality=[optimality(nlp, z, ranges) for z in archive.Z] if certified else None
+        )
     nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
     return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
 

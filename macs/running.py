@@ -79,10 +79,11 @@ class Run:
                 monitor.after_iteration(self._standing(monitor))
                 idle = idle + 1 if counts.evaluations == spent else 0
                 if idle == IDLE_ITERATIONS:
-                    return "idle"
+                    break
+            self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
-        return "budget"
+        return "budget" if counts.evaluations >= self.budget else "idle"
 
     def _stats(self, monitor: Monitor, stopped: str) -> dict[str, Any]:
         counts = self.evaluator.counts

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import archive as archives
-from . import directions, individual, social
+from . import directions, individual, refinement, social
 from .agent import NO_DIRECTION, Agents
 from .archive import Archive
 from .attempts import Attempts
@@ -36,8 +36,8 @@ class SearchState:
         The pool that the agents' directions are drawn from.
     experience : array (k, d)
         The displacements of the last improvements of any agent, in units of span, oldest first.
-    iteration, evaluations : int
-        Iterations done; evaluations spent by the evaluator so far.
+    iteration, evaluations, refinements : int
+        Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
     rng : numpy.random.Generator
         Its `bit_generator.state` is data, and all there is to keep of it.
     """
@@ -52,6 +52,7 @@ class SearchState:
     iteration: int
     evaluations: int
     rng: np.random.Generator
+    refinements: int = 0
 
 
 def box_of(evaluator: Evaluator) -> Box:
@@ -103,8 +104,17 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
     attempts = Attempts(settings, state, evaluator, box, budget)
     social_actions(state, settings, box, attempts, evaluator)
     remember(state, attempts.seen, settings, evaluator)
+    if settings.refine and evaluator.has_gradients:
+        for _ in range(refinement.allowed(state.evaluations, settings.refine_every, state.refinements)):
+            remember(state, refinement.individual_action(state, box, evaluator, settings.F), settings, evaluator)
     assign(state, settings, box, evaluator)
     state.iteration += 1
+
+
+def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
+    """The last thing a search does (see `MACS.conclude`)."""
+    if settings.refine and evaluator.has_gradients:
+        refinement.polish(state, evaluator, settings.archive)
 
 
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:

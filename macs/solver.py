@@ -42,6 +42,14 @@ class Solver(ABC):
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
         """One iteration, within the budget of evaluations."""
 
+    def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
+        """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
+
+    @property
+    def certifies(self) -> bool:
+        """Whether points of its fronts are to carry their `optimality`."""
+        return False
+
     def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
         """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
 
@@ -112,11 +120,13 @@ class Solver(ABC):
         self.check_objectives(len(nlp.problem.goals))
         about = self._about()
         level = {"inner": inner if isinstance(inner, str) else repr(inner)}
+        evaluator = Bilevel(nlp, solver, float(tolerance))
+        certified = self.certifies and evaluator.has_gradients
         run = Run(
             self,
-            Bilevel(nlp, solver, float(tolerance)),
+            evaluator,
             goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level),
+            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level, certified=certified),
             budget=evaluations,
             seed=seed,
             start=beginning(start, nlp),

@@ -1,0 +1,206 @@
+"""Refinement by gradients: an individual action of agents during the search, and a polish of the archive at its end.
+
+Every solve goes from a feasible point down to the front (Pascoletti and Serafini 1984): F - reference <= alpha weights, least alpha. With
+the point's own objectives as reference it is guarded: no objective gets worse, whichever basin the solve began in. What it finds is taken
+only if it is feasible and keeps that promise.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import archive as archives
+from . import social
+from .agent import NO_DIRECTION
+from .archive import Archive
+from .box import Box
+from .directions import normalised
+from .dominance import extremes, nondominated
+from .evaluation import CONVERGED, Evaluation, Evaluator
+
+if TYPE_CHECKING:
+    from .search import SearchState
+
+FLAT = 0.05
+"""Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
+SAME = 1e-7
+"""Objectives that differ by less than this part of their ranges are equal: what a point within the tolerance may promise too much."""
+BETTER = 1e-6
+"""By what part of the ranges a point has to be better to be worth another round."""
+ROUNDS = 4
+"""How often, at most, neighbours help and points slide along the front."""
+GAIN = 0.995
+"""A slide is tried if it is to lower the energy of a point to this part."""
+
+
+def allowed(evaluations: int, every: int, solves: int) -> int:
+    """How many gradient solves a search may make now: one for every so many evaluations, less those that it has made."""
+    return max(evaluations // every - solves, 0)
+
+
+def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: float) -> list[Evaluation]:
+    """One guarded solve for the agent whose turn it is, towards its own direction.
+
+    It begins, in turn, where the agent is, where its nearest neighbour in the archive is, and where a social action would have led it: the
+    last two so that it may leave the basin that it is in.
+
+    Returns
+    -------
+    list of Evaluation
+        What there is to tell the archive.
+    """
+    agents, m = state.agents, state.directions.shape[1]
+    turn, i = divmod(state.refinements, len(agents))
+    state.refinements += 1
+    if not len(state.archive) or agents.violation[i] > evaluator.tolerance:
+        return []
+    start = agents.Z[i].copy()
+    others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1))
+    if turn % 3 == 1 and others.size:
+        start = state.archive.Z[others[_nearest(state, agents.F[i], state.archive.F[others])[0]]]
+    elif turn % 3 == 2:
+        pool = box.to_unit(state.archive.Z[:, evaluator.free])
+        X = box.to_unit(start[evaluator.free])[None]
+        start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
+    direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
+    weights = np.where(direction > 0, _ranges(state) / np.maximum(direction, FLAT), 0.0)
+    found = evaluator.refine(start[None], agents.F[i][None], weights[None])
+    if _kept(found, agents.F[i][None], _ranges(state))[0]:
+        agents.place(np.array([i]), found.Z, found.F, found.violation)
+    return [found]
+
+
+def polish(state: SearchState, evaluator: Evaluator, limit: int) -> None:
+    """Bring every point of the archive down to the front, and spread them along it as evenly as their number allows.
+
+    First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
+    better ones; then points slide along the front to where they repel each other least, or fill what places are left.
+    """
+    if not len(state.archive):
+        return
+    _descend(state, evaluator)
+    for _ in range(ROUNDS):
+        if not _learn_from_neighbours(state, evaluator):
+            break
+    pool = state.archive
+    for _ in range(ROUNDS):
+        references, starts = _slides(state, limit)
+        if not len(references):
+            break
+        weights = np.tile(_ranges(state), (len(references), 1))
+        found = evaluator.refine(starts, references, weights)
+        good = found.status == CONVERGED
+        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), _ranges(state))
+        if len(pool) <= limit:
+            state.archive = pool
+            continue
+        before = state.archive.F
+        state.archive = pool.take(archives.spread(pool.F, limit))
+        if np.array_equal(before, state.archive.F):
+            break
+
+
+def _descend(state: SearchState, evaluator: Evaluator) -> None:
+    """Guarded solves of all points; ends of the front are solved for their own objective first, then for the others."""
+    archive, ranges = state.archive, _ranges(state)
+    found = evaluator.refine(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
+    kept = _kept(found, archive.F, ranges)
+    archive = Archive(
+        np.where(kept[:, None], found.Z, archive.Z),
+        np.where(kept[:, None], found.F, archive.F),
+        np.where(kept, found.violation, archive.violation),
+    )
+    ends = _ends(archive, ranges, evaluator)
+    state.archive = _front(_joined(ends, archive), ranges)
+
+
+def _ends(archive: Archive, ranges: np.ndarray, evaluator: Evaluator) -> Archive:
+    """The best of each objective, and of these the best in the others."""
+    m = archive.F.shape[1]
+    best = archive.take(extremes(archive.F))
+    one = np.eye(m, dtype=bool)
+    single = evaluator.refine(best.Z, np.where(one, best.F, np.inf), np.where(one, ranges, 0.0))
+    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + SAME * ranges)
+    Z, F = np.where(kept[:, None], single.Z, best.Z), np.where(kept[:, None], single.F, best.F)
+    if m == 1:
+        return Archive(Z, F, np.where(kept, single.violation, best.violation))
+    # From the least value of its own objective, which becomes a limit, all others together.
+    both = evaluator.refine(Z, F, np.where(one, 0.0, ranges))
+    good = _kept(both, F, ranges)
+    return Archive(
+        np.where(good[:, None], both.Z, Z),
+        np.where(good[:, None], both.F, F),
+        np.where(good, both.violation, np.where(kept, single.violation, best.violation)),
+    )
+
+
+def _learn_from_neighbours(state: SearchState, evaluator: Evaluator) -> bool:
+    """Guarded solves of every point from its neighbours' controls; whether any was clearly better."""
+    archive, ranges = state.archive, _ranges(state)
+    if len(archive) < 2:
+        return False
+    pairs = [(i, j) for i in range(len(archive)) for j in _nearest(state, archive.F[i], archive.F)[1 : archive.F.shape[1] + 1]]
+    own, other = (np.array(index) for index in zip(*pairs, strict=True))
+    found = evaluator.refine(archive.Z[other], archive.F[own], np.tile(ranges, (len(own), 1)))
+    gain = ((archive.F[own] - found.F) / ranges).min(axis=1)
+    better = (found.status == CONVERGED) & (gain > BETTER)
+    if not better.any():
+        return False
+    state.archive = _front(_joined(Archive(found.Z[better], found.F[better], found.violation[better]), archive), ranges)
+    return True
+
+
+def _slides(state: SearchState, limit: int) -> tuple[np.ndarray, np.ndarray]:
+    """References (k, m) on the lines to neighbours, where points would repel each other less, and vectors (k, D) to start from."""
+    archive, ranges = state.archive, _ranges(state)
+    F, count = archive.F / ranges, len(archive)
+    if count < 2:
+        return np.empty((0, F.shape[1])), archive.Z[:0]
+    neighbours = [_nearest(state, point, archive.F)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
+    if count < limit:
+        pairs = sorted({(min(i, j), max(i, j)) for i in range(count) for j in neighbours[i]})
+        apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
+        chosen = [pairs[k] for k in np.argsort(-apart, kind="stable")[: limit - count]]
+        return np.array([0.5 * (archive.F[i] + archive.F[j]) for i, j in chosen]), archive.Z[[i for i, _ in chosen]]
+    references, starts = [], []
+    share = np.linspace(0.0, 0.6, 25)[:, None]
+    for i in np.setdiff1d(np.arange(count), extremes(archive.F)):
+        others = np.delete(F, i, axis=0)
+        lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])
+        energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12)).sum(axis=1)
+        best = int(np.argmin(energy))
+        if energy[best] < GAIN * energy[0]:
+            references.append(lines[best] * ranges)
+            starts.append(archive.Z[i])
+    return np.array(references).reshape(-1, F.shape[1]), np.array(starts).reshape(-1, archive.Z.shape[1])
+
+
+def _kept(found: Evaluation, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Which results (k,) are feasible optima that are nowhere worse than F (k, m)."""
+    with np.errstate(invalid="ignore"):
+        return (found.status == CONVERGED) & (F + SAME * ranges >= found.F).all(axis=1)
+
+
+def _front(points: Archive, ranges: np.ndarray) -> Archive:
+    """Points that no other dominates, to as many digits as they have; of equal ones the first."""
+    return points.take(np.flatnonzero(nondominated(np.round((points.F - points.F.min(axis=0)) / ranges / SAME))))
+
+
+def _joined(one: Archive, two: Archive) -> Archive:
+    return Archive(np.vstack([one.Z, two.Z]), np.vstack([one.F, two.F]), np.concatenate([one.violation, two.violation]))
+
+
+def _ranges(state: SearchState) -> np.ndarray:
+    """What counts as much in each objective (m,): the range of the archive; where that is nothing, the objective's size."""
+    F = state.archive.F
+    span = np.ptp(F, axis=0)
+    return np.where(span > 0.0, span, np.maximum(np.abs(F).max(axis=0), 1.0))
+
+
+def _nearest(state: SearchState, point: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """Rows of F (n, m), the nearest to a point first."""
+    ranges = _ranges(state)
+    zero = np.zeros(len(ranges))
+    return np.argsort(np.linalg.norm(normalised(F - point, zero, ranges), axis=1), kind="stable")
