@@ -35,8 +35,9 @@ class MACS(Solver):
         Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
     refine : bool, default True
         Use derivatives, where the problem has them (a black box has none): one guarded gradient solve for every `refine_every` evaluations,
-        and at the end of the search a polish of the archive, of about six solves for each of its points. They are counted in
-        `stats["gradient_solves"]`, and points then carry their `optimality`. False: the derivative-free method.
+        and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for every
+        `polish_every` evaluations goes. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`. False:
+        the derivative-free method.
     mesh : {"fixed", "adaptive"}, default "fixed"
         "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
         `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
@@ -81,6 +82,8 @@ class MACS(Solver):
         Agents go where a social action was a success. False as in the paper: social actions only offer points to the archive.
     refine_every : int, default 200
         How many evaluations there are, at least 1, for each gradient solve of an agent.
+    polish_every : int, default 20
+        How many evaluations there are, at least 1, for each gradient solve in all.
     keep_velocity : bool, default True
         Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
         later code).
@@ -115,6 +118,7 @@ class MACS(Solver):
     social_moves: bool = True
     keep_velocity: bool = True
     refine_every: int = 200
+    polish_every: int = 20
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
@@ -122,6 +126,7 @@ class MACS(Solver):
         self._check_count("max_contractions", self.max_contractions, 0)
         self._check_count("memory", self.memory, 1)
         self._check_count("refine_every", self.refine_every, 1)
+        self._check_count("polish_every", self.polish_every, 1)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):

@@ -18,7 +18,7 @@ from .archive import Archive
 from .box import Box
 from .directions import normalised
 from .dominance import extremes, nondominated
-from .evaluation import CONVERGED, Evaluation, Evaluator
+from .evaluation import CONVERGED, FAILED, Evaluation, Evaluator
 
 if TYPE_CHECKING:
     from .search import SearchState
@@ -29,8 +29,10 @@ SAME = 1e-7
 """Objectives that differ by less than this part of their ranges are equal: what a point within the tolerance may promise too much."""
 BETTER = 1e-6
 """By what part of the ranges a point has to be better to be worth another round."""
-ROUNDS = 4
+ROUNDS = 6
 """How often, at most, neighbours help and points slide along the front."""
+WIDE = 1.5
+"""A gap this many times as wide as the median one gets a point of its own; crowded ones give way."""
 GAIN = 0.995
 """A slide is tried if it is to lower the energy of a point to this part."""
 
@@ -72,7 +74,31 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     return [found]
 
 
-def polish(state: SearchState, evaluator: Evaluator, limit: int) -> None:
+class Solves:
+    """Gradient solves as long as there are any left.
+
+    Parameters
+    ----------
+    evaluator : Evaluator
+    left : int
+    """
+
+    def __init__(self, evaluator: Evaluator, left: int) -> None:
+        self._evaluator, self.left = evaluator, left
+
+    def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+        """See `Evaluator.refine`; rows for which nothing is left have failed."""
+        count = max(min(len(starts), self.left), 0)
+        self.left -= count
+        Z, F = np.array(starts), np.full(references.shape, np.nan)
+        violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
+        if count:
+            found = self._evaluator.refine(starts[:count], references[:count], weights[:count])
+            Z[:count], F[:count], violation[:count], status[:count] = found.Z, found.F, found.violation, found.status
+        return Evaluation(Z, F, violation, status)
+
+
+def polish(state: SearchState, solves: Solves, limit: int) -> None:
     """Bring every point of the archive down to the front, and spread them along it as evenly as their number allows.
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
@@ -80,17 +106,17 @@ def polish(state: SearchState, evaluator: Evaluator, limit: int) -> None:
     """
     if not len(state.archive):
         return
-    _descend(state, evaluator)
+    _descend(state, solves)
     for _ in range(ROUNDS):
-        if not _learn_from_neighbours(state, evaluator):
+        if not _learn_from_neighbours(state, solves):
             break
     pool = state.archive
     for _ in range(ROUNDS):
         references, starts = _slides(state, limit)
-        if not len(references):
+        if not (len(references) and solves.left):
             break
         weights = np.tile(_ranges(state), (len(references), 1))
-        found = evaluator.refine(starts, references, weights)
+        found = solves(starts, references, weights)
         good = found.status == CONVERGED
         pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), _ranges(state))
         if len(pool) <= limit:
@@ -102,32 +128,32 @@ def polish(state: SearchState, evaluator: Evaluator, limit: int) -> None:
             break
 
 
-def _descend(state: SearchState, evaluator: Evaluator) -> None:
+def _descend(state: SearchState, solves: Solves) -> None:
     """Guarded solves of all points; ends of the front are solved for their own objective first, then for the others."""
     archive, ranges = state.archive, _ranges(state)
-    found = evaluator.refine(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
+    found = solves(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
     kept = _kept(found, archive.F, ranges)
     archive = Archive(
         np.where(kept[:, None], found.Z, archive.Z),
         np.where(kept[:, None], found.F, archive.F),
         np.where(kept, found.violation, archive.violation),
     )
-    ends = _ends(archive, ranges, evaluator)
+    ends = _ends(archive, ranges, solves)
     state.archive = _front(_joined(ends, archive), ranges)
 
 
-def _ends(archive: Archive, ranges: np.ndarray, evaluator: Evaluator) -> Archive:
+def _ends(archive: Archive, ranges: np.ndarray, solves: Solves) -> Archive:
     """The best of each objective, and of these the best in the others."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
     one = np.eye(m, dtype=bool)
-    single = evaluator.refine(best.Z, np.where(one, best.F, np.inf), np.where(one, ranges, 0.0))
+    single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, ranges, 0.0))
     kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + SAME * ranges)
     Z, F = np.where(kept[:, None], single.Z, best.Z), np.where(kept[:, None], single.F, best.F)
     if m == 1:
         return Archive(Z, F, np.where(kept, single.violation, best.violation))
     # From the least value of its own objective, which becomes a limit, all others together.
-    both = evaluator.refine(Z, F, np.where(one, 0.0, ranges))
+    both = solves(Z, F, np.where(one, 0.0, ranges))
     good = _kept(both, F, ranges)
     return Archive(
         np.where(good[:, None], both.Z, Z),
@@ -136,14 +162,14 @@ def _ends(archive: Archive, ranges: np.ndarray, evaluator: Evaluator) -> Archive
     )
 
 
-def _learn_from_neighbours(state: SearchState, evaluator: Evaluator) -> bool:
+def _learn_from_neighbours(state: SearchState, solves: Solves) -> bool:
     """Guarded solves of every point from its neighbours' controls; whether any was clearly better."""
     archive, ranges = state.archive, _ranges(state)
-    if len(archive) < 2:
+    if len(archive) < 2 or not solves.left:
         return False
     pairs = [(i, j) for i in range(len(archive)) for j in _nearest(state, archive.F[i], archive.F)[1 : archive.F.shape[1] + 1]]
     own, other = (np.array(index) for index in zip(*pairs, strict=True))
-    found = evaluator.refine(archive.Z[other], archive.F[own], np.tile(ranges, (len(own), 1)))
+    found = solves(archive.Z[other], archive.F[own], np.tile(ranges, (len(own), 1)))
     gain = ((archive.F[own] - found.F) / ranges).min(axis=1)
     better = (found.status == CONVERGED) & (gain > BETTER)
     if not better.any():
@@ -153,18 +179,19 @@ def _learn_from_neighbours(state: SearchState, evaluator: Evaluator) -> bool:
 
 
 def _slides(state: SearchState, limit: int) -> tuple[np.ndarray, np.ndarray]:
-    """References (k, m) on the lines to neighbours, where points would repel each other less, and vectors (k, D) to start from."""
+    """References (k, m) on the lines between neighbours, and vectors (k, D) to start from: in the middle of wide gaps, and where points
+    would repel each other less."""
     archive, ranges = state.archive, _ranges(state)
     F, count = archive.F / ranges, len(archive)
     if count < 2:
         return np.empty((0, F.shape[1])), archive.Z[:0]
     neighbours = [_nearest(state, point, archive.F)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
-    if count < limit:
-        pairs = sorted({(min(i, j), max(i, j)) for i in range(count) for j in neighbours[i]})
-        apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
-        chosen = [pairs[k] for k in np.argsort(-apart, kind="stable")[: limit - count]]
-        return np.array([0.5 * (archive.F[i] + archive.F[j]) for i, j in chosen]), archive.Z[[i for i, _ in chosen]]
-    references, starts = [], []
+    pairs = sorted({(min(i, j), max(i, j)) for i in range(count) for j in neighbours[i]})
+    apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
+    wide = np.count_nonzero(apart > WIDE * np.median(apart))
+    gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, limit - count)]]
+    references = [0.5 * (F[i] + F[j]) for i, j in gaps]
+    starts = [archive.Z[i] for i, _ in gaps]
     share = np.linspace(0.0, 0.6, 25)[:, None]
     for i in np.setdiff1d(np.arange(count), extremes(archive.F)):
         others = np.delete(F, i, axis=0)
@@ -172,9 +199,9 @@ def _slides(state: SearchState, limit: int) -> tuple[np.ndarray, np.ndarray]:
         energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12)).sum(axis=1)
         best = int(np.argmin(energy))
         if energy[best] < GAIN * energy[0]:
-            references.append(lines[best] * ranges)
+            references.append(lines[best])
             starts.append(archive.Z[i])
-    return np.array(references).reshape(-1, F.shape[1]), np.array(starts).reshape(-1, archive.Z.shape[1])
+    return np.array(references).reshape(-1, F.shape[1]) * ranges, np.array(starts).reshape(-1, archive.Z.shape[1])
 
 
 def _kept(found: Evaluation, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:

@@ -114,7 +114,8 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
 def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
     """The last thing a search does (see `MACS.conclude`)."""
     if settings.refine and evaluator.has_gradients:
-        refinement.polish(state, evaluator, settings.archive)
+        left = state.evaluations // settings.polish_every - evaluator.counts.gradient_solves
+        refinement.polish(state, refinement.Solves(evaluator, left), settings.archive)
 
 
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:

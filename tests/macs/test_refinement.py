@@ -1,0 +1,149 @@
+"""Refinement by gradients: guarded, counted, certified; on an evaluator with a known front, and on trajectories."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fronts import distance_to_curve, inverted_distance
+
+from macs import MACS
+from macs.archive import Archive
+from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
+from macs.refinement import Solves, allowed, polish
+from macs.search import SearchState, begin
+from problems import Problem, goddard, load, orbit_rise
+from transcription import DFET
+from transcription.inner import Newton
+from transcription.optimality import optimality
+
+
+class Circle(Evaluator):
+    """f = (1 - x cos(y), 1 - x sin(y)): the front is the quarter of a circle at x = 1, and a solve along the weights is exact."""
+
+    has_gradients = True
+
+    def __init__(self) -> None:
+        self.free, self.lower, self.upper = np.arange(2), np.zeros(2), np.array([1.0, np.pi / 2])
+        self.period, self.tolerance, self.counts = np.zeros(2), 1e-6, Counts()
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        return candidates.copy()
+
+    @staticmethod
+    def objectives(Z: np.ndarray) -> np.ndarray:
+        return 1.0 - Z[:, :1] * np.column_stack([np.cos(Z[:, 1]), np.sin(Z[:, 1])])
+
+    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        return Evaluation(Z.copy(), self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), 0
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        angles = np.linspace(0.0, np.pi / 2, 20_001)
+        curve = 1.0 - np.column_stack([np.cos(angles), np.sin(angles)])
+        rows = []
+        for reference, weight in zip(references, weights, strict=True):
+            moving = (weight > 0) & (reference < np.inf)
+            alpha = ((curve[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
+            hard = ~moving & (reference < np.inf)
+            alpha[(curve[:, hard] > reference[hard] + 1e-12).any(axis=1)] = np.inf
+            rows.append([1.0, angles[np.argmin(alpha)]])
+        Z = np.array(rows)
+        return Evaluation(Z, self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), len(Z)
+
+
+def state_of(evaluator: Circle, Z: np.ndarray) -> SearchState:
+    state = begin(MACS(agents=3), evaluator, 3, np.random.default_rng(0))
+    state.archive = Archive(Z, evaluator.objectives(Z), np.zeros(len(Z)))
+    return state
+
+
+def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None:
+    evaluator = Circle()
+    rng = np.random.default_rng(1)
+    Z = np.column_stack([rng.uniform(0.8, 0.9, 10), np.sort(rng.uniform(0.2, 1.3, 10))])
+    state = state_of(evaluator, Z)
+    polish(state, Solves(evaluator, 10_000), 10)
+    archive = state.archive
+    assert len(archive) == 10 and archive.Z[:, 0] == pytest.approx(1.0)
+    angles = np.sort(archive.Z[:, 1])
+    assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
+    assert np.diff(angles).max() < 1.5 * np.diff(angles).min()
+
+
+def test_a_polish_fills_empty_places() -> None:
+    evaluator = Circle()
+    state = state_of(evaluator, np.array([[0.9, 0.3], [0.9, 1.2]]))
+    polish(state, Solves(evaluator, 10_000), 6)
+    assert len(state.archive) == 6
+
+
+def test_no_more_solves_than_allowed() -> None:
+    evaluator = Circle()
+    state = state_of(evaluator, np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)]))
+    solves = Solves(evaluator, 3)
+    polish(state, solves, 5)
+    assert evaluator.counts.gradient_solves == 3 and solves.left == 0
+    assert len(state.archive) >= 3
+    assert allowed(1000, 200, 2) == 3 and allowed(100, 200, 0) == 0 and allowed(1000, 200, 9) == 0
+
+
+def test_what_is_worse_or_failed_is_not_taken() -> None:
+    class Useless(Circle):
+        def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+            found, count = super()._refine(starts, references, weights)
+            status = np.where(np.arange(count) % 2, CONVERGED, "failed")
+            return Evaluation(found.Z, found.F + 2.0, found.violation, status), count
+
+    evaluator = Useless()
+    Z = np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)])
+    state = state_of(evaluator, Z)
+    polish(state, Solves(evaluator, 1000), 5)
+    assert np.array_equal(np.sort(state.archive.Z[:, 1]), Z[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("name", "mesh", "reference", "evaluations", "worst"),
+    [
+        ("goddard", DFET(4, 6), goddard.reference, 1000, 3e-4),
+        ("orbit_rise", DFET(30, 1), orbit_rise.reference, 1500, 1e-4),
+    ],
+)
+def test_every_point_is_a_certified_optimum_of_the_mesh(name, mesh, reference, evaluations, worst) -> None:
+    front = MACS().solve(load(name), mesh, evaluations=evaluations, seed=3)
+    assert len(front) == 10 and max(point.optimality for point in front) < 1e-6
+    assert distance_to_curve(front.objectives, reference()).max() < worst
+    assert inverted_distance(front.objectives, reference()) < 0.044
+    assert front.stats["evaluations"] <= evaluations and 0 < front.stats["gradient_solves"] <= evaluations // 20
+    again = MACS().solve(load(name), mesh, evaluations=evaluations, seed=3)
+    assert np.array_equal(front.decision, again.decision)
+
+
+def test_a_point_moved_off_the_front_is_far_from_optimal() -> None:
+    front = MACS().solve(load("goddard"), DFET(4, 6), evaluations=600, seed=1)
+    nlp = DFET(4, 6).transcribe(load("goddard"))
+    rng = np.random.default_rng(0)
+    for point in list(front)[2:8]:
+        moved = point.decision.copy()
+        moved[nlp.free] += 0.05 * nlp.span[nlp.free] * rng.uniform(-1, 1, len(nlp.free))
+        candidate = np.clip(moved, nlp.lower, nlp.upper)[nlp.free]
+        found = Newton().solve(nlp, candidate[None], point.decision[None])
+        assert found.status[0] == CONVERGED
+        assert optimality(nlp, found.z[0], np.ptp(front.F, axis=0)) > 1e-3
+
+
+def test_without_refinement_nothing_is_certified_and_no_gradient_used() -> None:
+    front = MACS(refine=False).solve(load("goddard"), DFET(4, 6), evaluations=200, seed=1)
+    assert front.stats["gradient_solves"] == 0 and all(point.optimality is None for point in front)
+    box = MACS().minimize(lambda X: np.column_stack([X[:, 0], 1 - X[:, 0]]), [(0, 1), (0, 1)], evaluations=100, seed=1)
+    assert box.stats["gradient_solves"] == 0
+
+
+def test_a_peak_that_is_maximised_leaves_the_search_without_derivatives() -> None:
+    problem = Problem("highest")
+    phase = problem.phase("fly", t0=0, tf=2)
+    x, v = phase.state("x", bounds=(-3, 3), initial=0), phase.state("v", bounds=(-3, 3), initial=0)
+    u = phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=v, v=u)
+    problem.maximize("peak", phase.peak(x))
+    problem.minimize("effort", phase.integral(u**2))
+    front = MACS(archive=4).solve(problem, DFET(2, 2), evaluations=100, seed=1)
+    assert len(front) == 4 and front.stats["gradient_solves"] == 0 and front[0].optimality is None
