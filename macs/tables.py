@@ -68,6 +68,9 @@ def front_table(front: Front, defects: Sequence[float] | None = None, columns: M
     add("violation", "", [f"{value:.1e}" for value in front.violation])
     for header, values in more.items():
         add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
+    certified = [point.optimality for point in front]
+    if any(value is not None for value in certified):
+        add("optimality", "", ["-" if value is None else f"{value:.1e}" for value in certified])
     add("status", "", front.status.tolist(), True)
     if len({id(one) for one in front.transcriptions}) > 1:
         add("elements", "", [_elements(point) for point in front])
@@ -84,11 +87,16 @@ def headline(front: Front) -> str:
         f"{count} point{'' if count == 1 else 's'}" if count else "no feasible point",
         _transcribed(front),
         front.solver.get("name", ""),
-        f"{front.stats['evaluations']:,} evaluations".replace(",", " "),
+        _counted(front.stats["evaluations"], "evaluation"),
+        _counted(front.stats["gradient_solves"], "gradient solve") if front.stats["gradient_solves"] else "",
         "" if seed is None else f"seed {seed}" if not isinstance(seed, list) else f"{len(seed)} seeds",
         duration(front.stats["wall_time"]),
     ]
     return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}".replace(",", " ")
 
 
 def _transcribed(front: Front) -> str:
