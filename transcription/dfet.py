@@ -106,6 +106,9 @@ class DFET(Transcription):
             if name not in names:
                 raise ValueError(f"DFET: a mesh is given for phase '{name}'; the phases of '{compiled.name}' are {', '.join(names)}")
 
+        for phase in compiled.phases:
+            _need_derivatives(phase)
+
         @cache
         def tables(order: int) -> Tables:
             return Tables(order, order if self.control_order is None else self.control_order, self.basis)
@@ -115,3 +118,13 @@ class DFET(Transcription):
             return DFETPhase(mesh, tables(mesh.order), phase, layout, ends)
 
         return Assembly(compiled, writer).nlp(self)
+
+
+def _need_derivatives(phase: CompiledPhase) -> None:
+    """Raise ValueError if the dynamics have no derivatives: implicit equations cannot be solved without."""
+    try:
+        phase.dynamics.jacobian()
+    except RuntimeError:
+        raise ValueError(
+            f"DFET: phase '{phase.name}': the dynamics have no derivatives; give their Callback a Jacobian, or its option 'enable_fd': True"
+        ) from None

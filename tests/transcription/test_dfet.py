@@ -290,3 +290,22 @@ def test_tables_are_looked_up(kind):
     F, violation = nlp.evaluate(Z)
     assert F[0, 1] == pytest.approx(exact, rel=2e-3 if kind == "linear" else 1e-5)
     assert violation[0] < 1e-12
+
+
+def test_dynamics_without_derivatives_are_refused():
+    class Drag(ca.Callback):
+        def __init__(self):
+            ca.Callback.__init__(self)
+            self.construct("drag", {})
+
+        def eval(self, arguments):
+            return [0.1 * arguments[0] ** 2]
+
+    drag = Drag()
+    problem = Problem("braking")
+    phase = problem.phase("slide", t0=0, tf=(1, 2))
+    v = phase.state("v", bounds=(0, 10), initial=5)
+    phase.dynamics(v=-drag(v))
+    problem.minimize("speed", phase.final(v))
+    with pytest.raises(ValueError, match=r"phase 'slide'.*no derivatives.*enable_fd"):
+        DFET(2, 2).transcribe(problem)
