@@ -6,7 +6,7 @@ import pytest
 from cases import candidates, decay, flown, integrator, oscillator, oscillator_rates, slot
 from gauss import integrate
 
-from problems import load
+from problems import Problem, load
 from transcription import DFET, Transcription, from_dict, parse
 
 
