@@ -59,10 +59,8 @@ def test_with_gradients_the_front_is_as_exact_as_its_mesh(case, mesh, truth, eva
     for seed in (1, 2, 3):
         front = MACS().solve(load(case), mesh, evaluations=evaluations, seed=seed)
         distance, inverted = indicators(front, truth.reference())
-        worst = max(point.optimality for point in front)
-        print(
-            f"{case}, seed {seed}: GD {distance:.2e}, IGD {inverted:.4f}, optimality {worst:.0e}, {front.stats['gradient_solves']} solves"
-        )
+        worst, solves = max(point.optimality for point in front), front.stats["gradient_solves"]
+        print(f"{case}, seed {seed}: GD {distance:.2e}, IGD {inverted:.4f}, optimality {worst:.0e}, {solves} solves")
         assert len(front) == 10 and worst < 1e-6
         assert distance <= 5e-5
         assert inverted <= limit
