@@ -224,7 +224,7 @@ class Front:
 
     # What it becomes
 
-    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8) -> Front:
+    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, progress: bool = False) -> Front:
         """The front with each point solved anew on a mesh of its own, refined until what the point promises can be flown.
 
         Errors are estimated by integration element by element, by looking at states, controls and path constraints between the nodes, and
@@ -240,6 +240,8 @@ class Front:
             flown. Controls may not leave their bounds at all, states and path constraints by the front's own tolerance.
         limit : int
             How many meshes are tried for each point.
+        progress : bool
+            Tell on the terminal how it stands.
 
         Returns
         -------
@@ -254,7 +256,7 @@ class Front:
         """
         from .refining import refine_mesh
 
-        return refine_mesh(self, tolerance, limit)
+        return refine_mesh(self, tolerance, limit, progress)
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.

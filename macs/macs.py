@@ -226,11 +226,11 @@ class MACS(Solver):
         if self.mesh == "adaptive" and not isinstance(transcription, DFET):
             raise ValueError(f"MACS: mesh='adaptive' needs DFET, not {type(transcription).__name__}")
 
-    def finish(self, front: Front) -> Front:
+    def finish(self, front: Front, progress: bool) -> Front:
         """On an adaptive mesh, the refined front."""
         if self.mesh == "fixed" or not len(front):
             return front
-        refined = front.refine_mesh(tolerance=self.mesh_tolerance)
+        refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress)
         # A point that did not get there may promise too much: it is not believed to dominate any.
         believed = refined.F[[i for i, point in enumerate(refined) if not point.note]]
         return refined[np.flatnonzero(~np.any(dominates(believed, refined.F[:, None]), axis=1))]

@@ -77,6 +77,41 @@ class Display(AbstractContextManager["Display"]):
         return Group(line, Text(", ".join(found(self._last)), overflow="ellipsis", no_wrap=True))
 
 
+class Told(AbstractContextManager["Told"]):
+    """Says in one line what is being done, as long as it is entered; nothing unless it is `wanted`.
+
+    Parameters
+    ----------
+    wanted : bool
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, wanted: bool, stream: TextIO | None = None) -> None:
+        self._wanted, self._stream = wanted, stream or sys.stderr
+        self._live: Any = None
+
+    def __call__(self, words: str) -> None:
+        """What is being done now."""
+        if self._live is not None:
+            self._live.update(words)
+        elif self._wanted:
+            print(words, file=self._stream, flush=True)
+
+    def __enter__(self) -> Told:
+        if self._wanted and self._stream.isatty():
+            from rich.console import Console
+            from rich.status import Status
+
+            self._live = Status("", console=Console(file=self._stream))
+            self._live.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+
 def count(progress: Progress) -> str:
     """Evaluations and budget: 1 200 / 10 000."""
     return f"{progress.evaluations:,} / {progress.budget:,}".replace(",", " ")

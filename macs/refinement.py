@@ -110,22 +110,23 @@ def polish(state: SearchState, solves: Solves, limit: int) -> None:
     for _ in range(ROUNDS):
         if not _learn_from_neighbours(state, solves):
             break
-    pool = state.archive
+    pool, ranges = state.archive, _ranges(state)
+    state.archive = _thinned(pool, limit)
     for _ in range(ROUNDS):
         references, starts = _slides(state, limit)
         if not (len(references) and solves.left):
             break
-        weights = np.tile(_ranges(state), (len(references), 1))
-        found = solves(starts, references, weights)
+        found = solves(starts, references, np.tile(ranges, (len(references), 1)))
         good = found.status == CONVERGED
-        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), _ranges(state))
-        if len(pool) <= limit:
-            state.archive = pool
-            continue
-        before = state.archive.F
-        state.archive = pool.take(archives.spread(pool.F, limit))
-        if np.array_equal(before, state.archive.F):
+        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), ranges)
+        before, state.archive = state.archive, _thinned(pool, limit)
+        if np.array_equal(before.F, state.archive.F):
             break
+
+
+def _thinned(pool: Archive, limit: int) -> Archive:
+    """No more points than the limit, evenly spread."""
+    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit))
 
 
 def _descend(state: SearchState, solves: Solves) -> None:

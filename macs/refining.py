@@ -20,6 +20,7 @@ from .dominance import extremes
 from .evaluation import CONVERGED
 from .inputs import check_count, check_positive
 from .point import Point
+from .progress import Told
 from .resolving import Resolved, Resolver
 from .results import trajectory_columns
 from .verification import missed, objective_scales
@@ -36,14 +37,14 @@ LEAST_TOLERANCE = 1e-10
 """Below, double precision and the integrator cannot tell."""
 
 
-def refine_mesh(front: Front, tolerance: float, limit: int) -> Front:
+def refine_mesh(front: Front, tolerance: float, limit: int, progress: bool) -> Front:
     """See `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
         raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
     check_count("limit", limit, 1)
     front.compiled()
-    return Refinement(front, float(tolerance), int(limit)).go() if len(front) else front
+    return Refinement(front, float(tolerance), int(limit)).go(progress) if len(front) else front
 
 
 @dataclass
@@ -108,15 +109,20 @@ class Refinement:
         self.resolver = Resolver(self.ranges, front.F[self.good], 0.1 * tolerance)
         self.points = {i: self._begin(i) for i in self.good.tolist()}
 
-    def go(self) -> Front:
+    def go(self, progress: bool = False) -> Front:
         """The refined front; after Ctrl-C, what there is of it."""
         from .front import Front
 
         started, interrupted = time.perf_counter(), False
         try:
-            self._polish()
-            for _ in range(self.rounds):
-                self._round()
+            with Told(progress) as told:
+                self._polish()
+                for k in range(self.rounds):
+                    active = sum(point.active for point in self.points.values())
+                    told(f"meshes of the front: round {k + 1} of at most {self.rounds}, {active} of {len(self.front)} points")
+                    if not active:
+                        break
+                    self._round()
         except KeyboardInterrupt:
             interrupted = True
         front, resolver = self.front, self.resolver

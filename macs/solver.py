@@ -56,8 +56,8 @@ class Solver(ABC):
     def check_transcription(self, transcription: Transcription) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription. Called before any work."""
 
-    def finish(self, front: Front) -> Front:
-        """What is left to do with the front of a search that ended by itself. Nothing, for most solvers."""
+    def finish(self, front: Front, progress: bool) -> Front:
+        """What is left to do with the front of a search that ended by itself, told on the terminal or not. Nothing, for most solvers."""
         return front
 
     def solve(
@@ -132,7 +132,7 @@ class Solver(ABC):
             start=beginning(start, nlp),
         )
         front = run.go(time_limit, progress, callback)
-        return self.finish(front) if front.stats["stopped"] in ENDED else front
+        return self.finish(front, progress) if front.stats["stopped"] in ENDED else front
 
     def minimize(
         self,

@@ -82,7 +82,9 @@ def test_no_more_solves_than_allowed() -> None:
     solves = Solves(evaluator, 3)
     polish(state, solves, 5)
     assert evaluator.counts.gradient_solves == 3 and solves.left == 0
-    assert len(state.archive) >= 3
+    assert 3 <= len(state.archive) <= 5
+    for seed in (1, 2):
+        assert len(MACS(archive=4).solve(load("goddard"), DFET(2, 3), evaluations=150, seed=seed)) <= 4
     assert allowed(1000, 200, 2) == 3 and allowed(100, 200, 0) == 0 and allowed(1000, 200, 9) == 0
 
 
