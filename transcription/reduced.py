@@ -73,6 +73,7 @@ class Reduced:
         self.scale = np.concatenate([[v.scale for v, _ in imposed], [v.scale for v in dependent], g_scale])
         self.equation = self.lower == self.upper
         self.inside = self._rows_inside()
+        self._among_ends = np.cumsum(~self.inside) - 1
 
     def fly(self, Z: np.ndarray) -> Flown:
         """Propagate vectors (k, n), of which only the free entries matter."""
@@ -83,11 +84,10 @@ class Reduced:
         return Flown(flown, values)
 
     def derivatives(self, flown: Flown, rows: np.ndarray) -> np.ndarray:
-        """Total derivatives by the free variables of the rows that a mask chooses, (k, count, d)."""
-        interior = bool((rows & self.inside).any())
+        """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
+        interior = bool(self.inside[rows].any())
         (values,) = (self._everywhere if interior else self._at_ends)(flown.Z)
-        chosen = np.flatnonzero(rows if interior else rows[~self.inside])
-        return values.reshape(len(values), -1, len(self._layout.free))[:, chosen]
+        return values.reshape(len(values), -1, len(self._layout.free))[:, rows if interior else self._among_ends[rows]]
 
     @cached_property
     def _quick(self) -> Batched:
