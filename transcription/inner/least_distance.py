@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-ITERATIONS = 8
+ITERATIONS = 7
 REGULAR = 1e-12
 """Part of the largest diagonal entry that is added to it: rows may say the same thing twice."""
 STUCK = 1e-6
@@ -42,14 +42,15 @@ def least_distance(
     array (k,) of bool
         Whether the constraints are met. Where they contradict each other, the point is none in particular.
     array (k, r)
-        Multipliers, which are to be trusted no more than these.
+        Multipliers; zeros where none were found.
     """
     x, met, multipliers = _newton(center, A, lower, upper, box, multipliers)
     for i in np.flatnonzero(~met):
         exact = _exact(center[i], A[i], lower[i], upper[i], (box[0][i], box[1][i]))
+        multipliers[i] = 0.0
         if exact is not None:
-            x[i] = exact
-            values = A[i] @ exact
+            x[i], multipliers[i] = exact
+            values = A[i] @ x[i]
             met[i] = np.maximum(lower[i] - values, values - upper[i]).max() <= MET
     return x, met, multipliers
 
@@ -92,23 +93,24 @@ def _gram(
     return gram, diagonal
 
 
-def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box) -> np.ndarray | None:
-    """The nearest point (d,) of one box; None where there is none."""
-    every = np.eye(len(center))
+def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
+    """The nearest point (d,) of one box, and the multipliers (r,); None where there is none."""
+    every, r = np.eye(len(center)), len(A)
     sides = np.vstack([A, -A, every, -every])
     limits = np.concatenate([lower, -upper, box[0], -box[1]])
     bounded = np.isfinite(limits)
     G, h = sides[bounded], limits[bounded] - sides[bounded] @ center
     target = np.zeros(len(center) + 1)
     target[-1] = 1.0
+    u = np.zeros(len(sides))
     try:
-        u = nnls(np.vstack([G.T, h]), target)[0]
+        u[bounded] = nnls(np.vstack([G.T, h]), target)[0]
     except RuntimeError:  # its iterations ran out
         return None
-    residual = np.append(G.T @ u, h @ u) - target
-    if abs(residual[-1]) < MET:
+    left = 1.0 - h @ u[bounded]
+    if abs(left) < MET:
         return None
-    return np.clip(center - residual[:-1] / residual[-1], *box)
+    return np.clip(center + sides.T @ u / left, *box), (u[r : 2 * r] - u[:r]) / left
 
 
 def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:

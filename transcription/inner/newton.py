@@ -84,11 +84,18 @@ class Newton(InnerSolver):
         """One step of those that go on, from where they were flown."""
         near = outside[:, going.equations].max(axis=1, initial=0.0) <= NEAR
         going.watched |= (outside > 0.1 * tolerance) & near[:, None]
-        step = self._capped(going.towards(flown, np.where(going.settled[:, None], 0.0, pull)))
+        step = going.towards(flown, np.where(going.settled[:, None], 0.0, pull))
         length = _norm(step)
+        if (far := length > self.cap).any():
+            step[far] *= self.cap / length[far, None]
+            going.multipliers[far] = 0.0
+            length = np.minimum(length, self.cap)
         shrinks = np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
-        going.settled |= near & (length * shrinks <= np.where(distance > FAR, COARSE * distance, STILL))
+        settles = near & ~going.settled & (length * shrinks <= np.where(distance > FAR, COARSE * distance, STILL))
+        if settles.any():
+            going.settled |= settles
+            going.multipliers[settles] = 0.0
         if iteration >= PLAIN:
             accelerated = near & ~going.settled
             if accelerated.any():
