@@ -87,7 +87,8 @@ class Reduced:
         """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
         interior = bool(self.inside[rows].any())
         (values,) = (self._everywhere if interior else self._at_ends)(flown.Z)
-        return values.reshape(len(values), -1, len(self._layout.free))[:, rows if interior else self._among_ends[rows]]
+        shape = len(values), len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
+        return values.reshape(shape)[:, rows if interior else self._among_ends[rows]]
 
     @cached_property
     def _quick(self) -> Batched:
@@ -119,7 +120,7 @@ class Reduced:
             residuals.append(residual)
         z = extended[: start.numel()]
         z = self._layout.replaced(z, self._peaks, self._largest(z))
-        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist()], z[self._dependent.tolist()], self._rest(z))
+        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], self._rest(z))
         return ca.Function("flight", [start], [ca.densify(value) for value in (z, values, ca.vertcat(*residuals))])
 
     def _total(self, *, interior: bool) -> ca.Function:
