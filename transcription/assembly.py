@@ -58,8 +58,8 @@ class Assembly:
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
-        peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
-        self._largest = Batched(peaks)
+        largest_peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
+        self._largest = Batched(largest_peaks)
         return NLP(
             problem=self.problem,
             transcription=transcription,
@@ -72,8 +72,7 @@ class Assembly:
             g_labels=tuple(rows.labels),
             guess=self.guess(),
             first_guess=self.first_guess,
-            march=self.march,
-            reduced=self._reduced(z, rows, peaks),
+            reduced=self._reduced(z, rows, largest_peaks),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
@@ -107,23 +106,12 @@ class Assembly:
             writer.guess(extended)
         return self.tighten(extended[:, : Z.shape[1]])
 
-    def march(self, Z: np.ndarray) -> np.ndarray:
-        """See `NLP.march`."""
-        return self._marched(Z)[0]
-
-    def _marched(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Propagated vectors, and the final states of all phases, also where they are imposed and so no variables."""
-        extended = self.layout.extended(Z)
-        finals = [writer.march(extended) for writer in self._writers.values()]
-        return self.tighten(extended[:, : Z.shape[1]]), np.hstack(finals)
-
     def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function) -> Reduced:
         """What propagation leaves to satisfy."""
         left = [i for i, marched in enumerate(rows.marched) if not marched]
         function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
-        slots = np.concatenate(self._peaks)
-        return Reduced(self.layout, list(self._writers.values()), self._marched, (slots, peaks), (function, lower, upper, scale))
+        return Reduced(self.layout, list(self._writers.values()), (np.concatenate(self._peaks), peaks), (function, lower, upper, scale))
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.tighten`."""

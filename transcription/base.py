@@ -68,9 +68,6 @@ class NLP:
         What the user guessed of the free variables; NaN where nothing.
     first_guess : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value.
-    march : callable
-        Vectors (k, n) -> vectors (k, n): the states that the dynamics give to the free variables, by propagation; not numbers, or short of
-        the equations, where that fails. Only the free entries matter.
     reduced : Reduced
         What propagation leaves to satisfy, as functions of the free variables alone.
     tighten : callable
@@ -93,7 +90,6 @@ class NLP:
     g_labels: tuple[str, ...]
     guess: np.ndarray
     first_guess: Callable[[np.ndarray], np.ndarray]
-    march: Callable[[np.ndarray], np.ndarray]
     reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
@@ -123,6 +119,11 @@ class NLP:
     def period(self) -> np.ndarray:
         """Periods (n,); 0 where a variable has none."""
         return np.array([v.period or 0.0 for v in self.variables])
+
+    def march(self, Z: np.ndarray) -> np.ndarray:
+        """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
+        equations, where that fails."""
+        return self.reduced.fly(Z).Z
 
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""

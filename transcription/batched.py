@@ -42,8 +42,7 @@ class Batched:
         self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._may_compile = compiled and os.environ.get("MACS_COMPILE", "1") != "0"
-        self._length = _length(function)
-        self._work = 0
+        self._work, self._each = 0, _work(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -58,7 +57,7 @@ class Batched:
         k = len(inputs[0])
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
-        self._work += k * self._length
+        self._work += k * self._each
         if self._may_compile and self._work > PAYS:
             self._compile(arrays, outputs)
         return outputs
@@ -88,9 +87,9 @@ class Batched:
     def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
         """Replace the Function by its compiled form, if there is one and it agrees to the last bit."""
         self._may_compile = False
-        if self._length > LONG:
-            return
         interpreted, blocks = self._function, self._blocks
+        if _length(interpreted) > LONG:
+            return
         library = _library(interpreted)
         if library is None:
             return
@@ -121,11 +120,20 @@ def _library(function: ca.Function) -> ca.Function | None:
             return None
 
 
-def _length(function: ca.Function) -> int:
-    """Instructions of a Function, those of the Functions that it calls included; none of what is not made of instructions."""
+def _work(function: ca.Function) -> int:
+    """Instructions that one call goes through, as often as it does; none of what is not made of instructions."""
     if function.is_a("SXFunction"):
         return function.n_instructions()
+    if function.is_a("Map"):
+        information = function.info()
+        return information["n"] * _work(information["f"])
     if not function.is_a("MXFunction"):
         return 0
     calls = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CALL)
-    return function.n_instructions() + sum(_length(function.instruction_MX(i).which_function()) for i in calls)
+    return function.n_instructions() + sum(_work(function.instruction_MX(i).which_function()) for i in calls)
+
+
+def _length(function: ca.Function) -> int:
+    """Instructions to be compiled: those of each Function that has a part in it, once."""
+    parts = [function, *function.find_functions()]
+    return sum(part.n_instructions() for part in parts if part.is_a("SXFunction") or part.is_a("MXFunction"))

@@ -11,7 +11,7 @@ from problems.compiled import CompiledPhase
 
 from .base import expanded
 from .dfet_element import element_function
-from .dfet_propagation import Pieces, Propagation
+from .dfet_propagation import Propagation
 from .dfet_tables import Tables
 from .guess import along, line
 from .layout import Layout
@@ -42,19 +42,13 @@ class DFETPhase(PhaseWriter):
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
         self._element = expanded(element_function(tables, phase))
         self._propagation = Propagation(elements, tables, phase)
-        self._outer: np.ndarray | None = None
+        self.compilable = self._propagation.quick
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
         n, tables, phase, pick = self.n, self.tables, self.phase, self._layout.pick
-        s = pick(extended, self.ends.statics)
-        left, right = pick(extended, self.B[:-1]), pick(extended, self.B[1:])
-        U = pick(extended, self.U)
-        mean = (s[1] - s[0]) / n
-        starts = s[0] + mean * ca.DM(self.places[:-1]).T
-        weak, integrals, paths, peaks, ends = self._element.map(n)(
-            pick(extended, self.X), U, left, right, starts, mean * ca.DM(self.widths).T, ca.repmat(s, 1, n)
-        )
+        left, right, (U, *times) = pick(extended, self.B[:-1]), pick(extended, self.B[1:]), self._inputs(extended)
+        weak, integrals, paths, peaks, ends = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
         rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), marched=True)
@@ -86,43 +80,42 @@ class DFETPhase(PhaseWriter):
                 found.update(zip(self.U[:, :, i].ravel().tolist(), np.clip(values, control.lower, control.upper).ravel(), strict=True))
         return found
 
-    def march(self, extended: np.ndarray) -> np.ndarray:
+    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.march`."""
-        right, X = self._propagation.fly(self._pieces(extended))
-        self._layout.write(extended, self.X, X)
-        self._layout.write(extended, self.B[1:], right)
-        return right[:, -1]
+        initial = self._layout.pick(extended, self.ends.initial)
+        right, X, residual = self._propagation.fly(robust)(initial, *self._inputs(extended))
+        extended = self._layout.replaced(extended, np.concatenate([self.X.ravel(), self.B[1:].ravel()]), ca.veccat(X, right))
+        return extended, right[:, -1], residual.T
 
-    def sensitivity(self, extended: np.ndarray, S: np.ndarray, interior: bool) -> np.ndarray:
+    def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
-        k, nx, d = len(extended), len(self.phase.states), S.shape[2]
-        X = extended[:, self.X]
-        D = self._propagation.derivatives(self._pieces(extended), extended[:, self.B[:-1]], X, interior=interior)
-        if self._outer is None:  # times, parameters and controls are free variables or constants: their derivatives never change
-            self._outer = self._outer_sensitivity(S[0])
-        outer = D[..., nx:] @ self._outer
-        S_left, ends = S[:, self.ends.initial], []
-        for j in range(self.n):
-            S_out = D[:, j, :, :nx] @ S_left + outer[:, j]
-            S_left = S_out[:, :nx]
-            ends.append(S_left)
-            if interior:
-                self._layout.write(S, self.X[j], S_out[:, nx:].reshape(k, -1, nx, d))
-        self._layout.write(S, self.B[1:], np.stack(ends, axis=1))
-        return S_left
+        n, nx, pick = self.n, len(self.phase.states), self._layout.pick
+        left, X = pick(extended, self.B[:-1]), pick(extended, self.X)
+        blocks = ca.horzsplit(self._propagation.derivatives(interior)(X, left, *self._inputs(extended)), self._propagation.inputs)
+        edges, inside = [S[(self.ends.initial % S.shape[0]).tolist(), :]], []
+        for j, D in enumerate(blocks):
+            out = D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer(j)
+            edges.append(out[:nx, :])
+            inside.append(out[nx:, :])
+        slots, values = [self.B[1:].ravel()], edges[1:]
+        if interior:
+            slots, values = [*slots, self.X.ravel()], [*values, *inside]
+        return self._layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
 
-    def _outer_sensitivity(self, S: np.ndarray) -> np.ndarray:
-        """Derivatives (N, nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element."""
-        t0, tf = S[self.ends.statics[:2]]
-        start, length = t0 + (tf - t0) * (self.places[:-1, None] / self.n), (tf - t0) * (self.widths[:, None] / self.n)
-        statics = np.broadcast_to(S[self.ends.statics], (self.n, len(self.ends.statics), len(t0)))
-        return np.concatenate([S[self.U.reshape(self.n, -1)], start[:, None], length[:, None], statics], axis=1)
+    def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
+        """What else goes into the elements, side by side: controls, starts, lengths, and s."""
+        s = self._layout.pick(extended, self.ends.statics)
+        mean = (s[1] - s[0]) / self.n
+        starts, lengths = s[0] + mean * ca.DM(self.places[:-1]).T, mean * ca.DM(self.widths).T
+        return self._layout.pick(extended, self.U), starts, lengths, ca.repmat(s, 1, self.n)
 
-    def _pieces(self, extended: np.ndarray) -> Pieces:
-        """What propagation needs to know."""
-        s = extended[:, self.ends.statics]
-        mean = (s[:, 1:2] - s[:, :1]) / self.n
-        return Pieces(extended[:, self.ends.initial], extended[:, self.U], s[:, :1] + mean * self.places[:-1], mean * self.widths, s)
+    def _outer(self, j: int) -> ca.DM:
+        """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of element j, which never change: these
+        are free variables or constants."""
+        seeds = self._layout.seeds()
+        controls, statics = (seeds[(slots.ravel() % seeds.shape[0]).tolist(), :] for slots in (self.U[j], self.ends.statics))
+        mean = (statics[1, :] - statics[0, :]) / self.n
+        return ca.vertcat(controls, statics[0, :] + mean * self.places[j], mean * self.widths[j], statics)
 
     def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
         """See `PhaseWriter.interpolate`."""

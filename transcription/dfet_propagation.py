@@ -16,7 +16,6 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from .base import expanded
-from .batched import Batched
 from .dfet_element import unwrapped_law, wrapped_controls
 from .dfet_tables import Tables
 from .elimination import eliminate
@@ -25,92 +24,51 @@ ITERATIONS = 30
 TOLERANCE = 1e-14
 WRITTEN_OUT = 5
 """Newton steps that are written out, after an explicit guess."""
-SOLVED = 1e-12
-"""Largest scaled residual at which these are enough."""
 SMALL, SHORT = 48, 30_000
 """Most unknowns, and most instructions, of an element whose Newton steps are written out."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """What goes into the elements of k flights of a phase: `initial` (k, nx), controls `U` (k, N, q + 1, nu), `starts` and lengths `h`
-    (k, N), and `s` (k, 2 + parameters)."""
-
-    initial: np.ndarray
-    U: np.ndarray
-    starts: np.ndarray
-    h: np.ndarray
-    s: np.ndarray
-
-    def take(self, rows: np.ndarray) -> Pieces:
-        """Those of some flights."""
-        return Pieces(self.initial[rows], self.U[rows], self.starts[rows], self.h[rows], self.s[rows])
-
-    @property
-    def rows(self) -> tuple[np.ndarray, ...]:
-        """U, starts, h and s, with one row for each element of each flight."""
-        k, n = self.starts.shape
-        return self.U.reshape(k * n, -1), self.starts.reshape(-1, 1), self.h.reshape(-1, 1), np.repeat(self.s, n, axis=0)
-
-
 class Propagation:
-    """Flies the elements of a phase; see the module.
+    """The elements of a phase as Functions; see the module.
 
     Parameters
     ----------
     elements : int
     tables : Tables
     phase : CompiledPhase
+
+    Attributes
+    ----------
+    quick : bool
+        Whether Newton steps are written out.
+    inputs : int
+        nx + (q + 1) nu + 2 + len(s): how many numbers an element is a function of.
     """
 
     def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:
         self.n, self.tables, self.phase = elements, tables, phase
-        equations = _equations(tables, phase, ca.MX)
-        self._robust = Batched(_iterated(equations, tables, phase).mapaccum("robust", elements), compiled=False)
-        self._quick: Batched | None = None
+        self._equations = _equations(tables, phase, ca.MX)
+        self._step: ca.Function | None = None
         if len(phase.states) * len(tables.tau) <= SMALL and expanded(phase.dynamics).is_a("SXFunction"):
             written = _equations(tables, phase, ca.SX)
             step = _written_out(written, tables, phase)
             if step.n_instructions() <= SHORT:
-                equations, self._quick = written, Batched(step.mapaccum("quick", elements))
-        self._equations = equations
-        self._gradients: dict[bool, Batched] = {}
-        self._nodes = tables.state(tables.tau)
+                self._equations, self._step = written, step
+        self.quick = self._step is not None
+        self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
-    def fly(self, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
-        """States at the right ends (k, N, nx) and coefficients of the states (k, N, l + 1, nx)."""
-        k, n, nx = len(pieces.initial), self.n, len(self.phase.states)
-        if self._quick is None:
-            right, X = self._robust(pieces.initial, *pieces.rows)
-        else:
-            right, X, residual = self._quick(pieces.initial, *pieces.rows)
-            unsolved = np.flatnonzero(~(residual.max(axis=1) <= SOLVED))
-            if len(unsolved):
-                rest = pieces.take(unsolved)
-                right[unsolved], X[unsolved] = self._robust(rest.initial, *rest.rows)
-        return right.reshape(k, n, nx), X.reshape(k, n, -1, nx)
+    def fly(self, robust: bool) -> ca.Function:
+        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N (l + 1)), residuals (1, N));
+        inputs of elements stand side by side."""
+        step = self._step
+        if robust or step is None:
+            step = _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
+        return step.mapaccum("flight", self.n)
 
-    def derivatives(self, pieces: Pieces, left: np.ndarray, X: np.ndarray, *, interior: bool) -> np.ndarray:
-        """How the right ends follow the left ends and everything else, at flown states.
-
-        Parameters
-        ----------
-        pieces : Pieces
-        left, X : arrays (k, N, nx), (k, N, l + 1, nx)
-        interior : bool
-            Also of the coefficients of the states.
-
-        Returns
-        -------
-        array (k, N, nx [+ (l + 1) nx], nx + (q + 1) nu + 2 + len(s))
-            By the left end, the controls' coefficients (nu fastest), the start, the length, and s.
-        """
-        k, n, nx = left.shape
-        if interior not in self._gradients:
-            self._gradients[interior] = _gradient(self._equations, self.tables, self.phase, interior)
-        Y = (self._nodes @ X).reshape(k * n, -1)
-        (values,) = self._gradients[interior](Y, left.reshape(k * n, nx), *pieces.rows)
-        return values.reshape(k, n, -1, nx * (1 + X.shape[2] * interior)).swapaxes(2, 3)
+    def derivatives(self, interior: bool) -> ca.Function:
+        """(X, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls' coefficients
+        (nu fastest), the start, the length, and s; with `interior` also, below, of the coefficients of the states (l + 1, nx fastest)."""
+        return _gradient(self._equations, self.tables, self.phase, interior).map(self.n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +113,7 @@ def _written_out(element: _Equations, tables: Tables, phase: CompiledPhase) -> c
 
 
 def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(left, U, start, h, s) -> (right, X) by CasADi's Newton method, which does not give up early."""
+    """(left, U, start, h, s) -> (right, X, 0) by CasADi's Newton method, which does not give up early."""
     _, left, U, *others = element.symbols
     nx, nq = len(phase.states), len(tables.tau)
     scales = ca.repmat(ca.DM([v.scale for v in phase.states]), nq, 1)
@@ -168,23 +126,27 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
     options = {"error_on_fail": False, "max_iter": ITERATIONS, "abstol": TOLERANCE, "abstolStep": TOLERANCE}
     newton = ca.rootfinder("newton", "fast_newton", equations, options)
     root = newton(ca.repmat(left, nq, 1) / scales, ca.vertcat(left, ca.vec(U), *others)) * scales
-    return ca.Function("step", [left, U, *others], [ca.densify(value) for value in whole(root, left, U, *others)[1:]])
+    right, X = whole(root, left, U, *others)[1:]
+    return ca.Function("step", [left, U, *others], [ca.densify(right), ca.densify(X), ca.MX(0)])
 
 
-def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> Batched:
-    """(y, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s)."""
+def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> ca.Function:
+    """(X, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the equations."""
     y, *inputs = element.symbols
-    along = ca.vertcat(*(ca.vec(symbol) for symbol in inputs))
+    along = ca.veccat(*inputs)
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
     by_states, by_inputs = ca.jacobian(element.residual, y), ca.jacobian(element.residual, along)
     direct, through = ca.jacobian(results, along), ca.jacobian(results, y)
+    symbolic = isinstance(y, ca.SX)
 
     def solve(matrix: Any, right: Any) -> Any:
-        return eliminate(matrix, right) if isinstance(matrix, ca.SX) else ca.solve(matrix, right, "qr")
+        return eliminate(matrix, right) if symbolic else ca.solve(matrix, right, "qr")
 
     if results.numel() < along.numel():
         total = direct - solve(by_states.T, through.T).T @ by_inputs
     else:
         total = direct - through @ solve(by_states, by_inputs)
-    symbolic = isinstance(total, ca.SX)
-    return Batched(ca.Function("gradient", [y, *inputs], [ca.densify(total)], {"cse": symbolic}), compiled=symbolic)
+    gradient = ca.Function("by_states", [y, *inputs], [ca.densify(total)])
+    X = type(y).sym("X", len(phase.states), tables.order + 1)
+    Y = X @ ca.DM(tables.state(tables.tau)).T
+    return ca.Function("gradient", [X, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})

@@ -50,11 +50,25 @@ class Layout:
         """The extended vector of a symbol of the variables."""
         return ca.vertcat(z, ca.DM(self._constants[::-1])) if self._constants else z
 
+    def seeds(self) -> ca.DM:
+        """Derivatives (n + constants, d) of an extended vector by its free variables, before anything follows from them."""
+        total, d = len(self.variables) + len(self._constants), len(self.free)
+        return ca.DM(ca.Sparsity.triplet(total, d, self.free, list(range(d))), 1.0)
+
     def pick(self, extended: ca.MX, slots: np.ndarray) -> ca.MX:
         """The entries of an extended symbol at slots of shape (a, b, ...), as a matrix (last axis, product of the others)."""
         total = len(self.variables) + len(self._constants)
         shape = slots.shape[-1], int(np.prod(slots.shape[:-1]))
         return ca.reshape(extended[(slots.ravel() % total).tolist()], *shape) if slots.size else ca.MX(*shape)
+
+    @staticmethod
+    def replaced(extended: ca.MX, slots: np.ndarray, values: ca.MX) -> ca.MX:
+        """A symbol of extended rows in which those of the variables among `slots` are the rows of `values`; constants stay what they
+        are. It is one permutation: to split rows and join them again would cost far more."""
+        total, flat = extended.shape[0], slots.ravel()
+        places = np.arange(total)
+        places[flat[flat >= 0]] = total + np.flatnonzero(flat >= 0)
+        return ca.vertcat(extended, values)[places.tolist(), :]
 
     @staticmethod
     def write(extended: np.ndarray, slots: np.ndarray, values: np.ndarray) -> None:

@@ -72,7 +72,9 @@ class PhaseWriter(ABC):
     phase: CompiledPhase
     ends: Ends
     interior: np.ndarray
-    """Slots of the states that `sensitivity` fills in only on demand."""
+    """Slots of the states that `sensitivity` replaces only on demand."""
+    compilable: bool
+    """Whether what `march` does fast, and `sensitivity`, can be written in C."""
 
     @abstractmethod
     def write(self, extended: ca.MX, rows: Rows) -> Written:
@@ -87,26 +89,44 @@ class PhaseWriter(ABC):
         """The user's guess of the controls, where there is one, by slot."""
 
     @abstractmethod
-    def march(self, extended: np.ndarray) -> np.ndarray:
-        """Fill in the states of extended vectors (k, ...) by propagation from the initial ones; returns the final states (k, nx), also
-        where they are imposed and so no variables."""
-
-    @abstractmethod
-    def sensitivity(self, extended: np.ndarray, S: np.ndarray, interior: bool) -> np.ndarray:
-        """Derivatives of the states of extended vectors (k, ...), which are propagated, by the free variables.
+    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Propagation from the initial states.
 
         Parameters
         ----------
-        extended : array (k, e)
-        S : array (k, e, d)
-            Derivatives of extended vectors. The rows of times, parameters, controls and initial states are given; the rows of the other
-            states are to be filled in.
+        extended : MX (e, 1)
+            An extended symbol, of which the states are to be replaced.
+        robust : bool
+            To solve the equations of states by whatever it takes; otherwise fast, if need be with a residual.
+
+        Returns
+        -------
+        MX (e, 1)
+            With the states that the dynamics give.
+        MX (nx, 1)
+            The final states, also where they are imposed and so no variables.
+        MX (any, 1)
+            Scaled residuals of the equations of states, which have to be looked at where it is not `robust`.
+        """
+
+    @abstractmethod
+    def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
+        """Derivatives of the states of an extended symbol, which are propagated, by the free variables.
+
+        Parameters
+        ----------
+        extended : MX (e, 1)
+        S : MX (e, d)
+            Derivatives of the extended vector: the seeds of the layout, with the rows of initial states given. The rows of the other states
+            are to be replaced.
         interior : bool
             Also inside the elements; otherwise only at their ends.
 
         Returns
         -------
-        array (k, nx, d)
+        MX (e, d)
+            With the rows of the states.
+        MX (nx, d)
             Of the final states, also where they are imposed.
         """
 

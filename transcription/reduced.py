@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
-import scipy.sparse as sp
 
 from problems.compiled import Variable
 
-from .base import expanded
 from .batched import Batched
 from .layout import Layout
 from .phase_writer import PhaseWriter
 
-
-class SparseJacobian:
-    """Derivatives of the outputs of a Function of z, at many points."""
-
-    def __init__(self, function: ca.Function) -> None:
-        z = ca.MX.sym("z", function.size1_in(0))
-        jacobian = ca.jacobian(function(z), z)
-        self.shape = jacobian.shape
-        self.rows, self.columns = (np.array(index, dtype=int) for index in jacobian.sparsity().get_triplet())
-        values = ca.vertcat(*[jacobian.nz[:]]) if jacobian.nnz() else ca.MX(0, 1)
-        self._values = Batched(expanded(ca.Function("jacobian", [z], [values])))
-
-    def times(self, Z: np.ndarray, S: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Some rows of the derivatives at Z (k, n), times S (k, n, d); shape (k, len(rows), d)."""
-        (values,) = self._values(Z)
-        matrices = (sp.csr_matrix((v, (self.rows, self.columns)), shape=self.shape)[rows] for v in values)
-        return np.array([matrix @ s for matrix, s in zip(matrices, S, strict=True)]).reshape(len(Z), len(rows), S.shape[2])
+SOLVED = 1e-12
+"""Largest scaled residual of the equations of states at which fast propagation is good enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,65 +33,118 @@ class Reduced:
     The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
     propagation does not satisfy.
 
+    Parameters
+    ----------
+    layout : Layout
+    writers : sequence of PhaseWriter
+        In the order of time.
+    peaks : pair of array (p,) and Function
+        Slots of the peaks, and z -> (p,), what they have to be.
+    rest : tuple of Function and arrays (r,)
+        z -> (r,), those constraints; their lower and upper limits and scales.
+
     Attributes
     ----------
     lower, upper, scale : arrays (rows,)
     equation : array (rows,) of bool
+    inside : array (rows,) of bool
+        Whether a row needs the states inside the elements, whose derivatives cost most.
     """
 
     def __init__(
         self,
         layout: Layout,
         writers: Sequence[PhaseWriter],
-        march: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
         peaks: tuple[np.ndarray, ca.Function],
         rest: tuple[ca.Function, np.ndarray, np.ndarray, np.ndarray],
     ) -> None:
-        self._layout, self._writers, self._march = layout, writers, march
-        self.free = np.array(layout.free, dtype=int)
-        self._dependent = np.setdiff1d(np.arange(len(layout.variables)), self.free)
-        self._imposed = np.flatnonzero(np.concatenate([writer.ends.final for writer in writers]) < 0)
-        self._peaks, largest = peaks
-        self._largest = SparseJacobian(largest)
-        function, g_lower, g_upper, g_scale = rest
-        self._rest, self._rest_jacobian = Batched(function), SparseJacobian(function)
+        self._layout, self._writers = layout, writers
+        self._peaks, self._largest = peaks
+        self._rest, g_lower, g_upper, g_scale = rest
+        self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
         finals: list[tuple[Variable, tuple[float, float]]] = [
             pair for writer in writers for pair in zip(writer.phase.states, writer.phase.final, strict=True)
         ]
+        self._imposed = np.flatnonzero(np.concatenate([writer.ends.final for writer in writers]) < 0)
         imposed = [finals[i] for i in self._imposed]
         dependent = [layout.variables[i] for i in self._dependent]
         self.lower = np.concatenate([[low for _, (low, _) in imposed], [v.lower for v in dependent], g_lower])
         self.upper = np.concatenate([[high for _, (_, high) in imposed], [v.upper for v in dependent], g_upper])
         self.scale = np.concatenate([[v.scale for v, _ in imposed], [v.scale for v in dependent], g_scale])
         self.equation = self.lower == self.upper
-        self._inside = self._rows_inside(writers)
+        self.inside = self._rows_inside()
+        self._among_ends = np.cumsum(~self.inside) - 1
 
     def fly(self, Z: np.ndarray) -> Flown:
         """Propagate vectors (k, n), of which only the free entries matter."""
-        Z, finals = self._march(Z)
-        parts = [finals[:, self._imposed], Z[:, self._dependent]]
-        return Flown(Z, np.hstack([*parts, self._rest(Z)[0]] if self._rest_jacobian.shape[0] else parts))
+        flown, values, residual = self._quick(Z)
+        unsolved = ~(residual.max(axis=1) <= SOLVED)
+        if unsolved.any():
+            flown[unsolved], values[unsolved], _ = self._robust(Z[unsolved])
+        return Flown(flown, values)
 
     def derivatives(self, flown: Flown, rows: np.ndarray) -> np.ndarray:
-        """Total derivatives by the free variables of the rows that a mask chooses, (k, count, d)."""
-        extended = self._layout.extended(flown.Z)
-        S = np.zeros((*extended.shape, len(self.free)))
-        S[:, self.free, np.arange(len(self.free))] = 1.0
-        interior = bool((rows & self._inside).any())
-        finals = np.concatenate([writer.sensitivity(extended, S, interior) for writer in self._writers], axis=1)
-        n = flown.Z.shape[1]
-        if len(self._peaks):
-            S[:, self._peaks] = self._largest.times(flown.Z, S[:, :n], np.arange(len(self._peaks)))
-        imposed, dependent = np.split(rows, np.cumsum([len(self._imposed), len(self._dependent)]))[:2]
-        parts = [finals[:, self._imposed[imposed]], S[:, self._dependent[dependent]]]
-        chosen = np.flatnonzero(rows[len(imposed) + len(dependent) :])
-        if len(chosen):
-            parts.append(self._rest_jacobian.times(flown.Z, S[:, :n], chosen))
-        return np.concatenate(parts, axis=1)
+        """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
+        interior = bool(self.inside[rows].any())
+        (values,) = (self._everywhere if interior else self._at_ends)(flown.Z)
+        shape = len(values), len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
+        return values.reshape(shape)[:, rows if interior else self._among_ends[rows]]
 
-    def _rows_inside(self, writers: Sequence[PhaseWriter]) -> np.ndarray:
+    @cached_property
+    def _quick(self) -> Batched:
+        return Batched(self._flight(robust=False), compiled=self._compilable)
+
+    @cached_property
+    def _robust(self) -> Batched:
+        return Batched(self._flight(robust=True), compiled=False)
+
+    @cached_property
+    def _at_ends(self) -> Batched:
+        return Batched(self._total(interior=False), compiled=self._compilable)
+
+    @cached_property
+    def _everywhere(self) -> Batched:
+        return Batched(self._total(interior=True), compiled=self._compilable)
+
+    @property
+    def _compilable(self) -> bool:
+        return all(writer.compilable for writer in self._writers)
+
+    def _flight(self, *, robust: bool) -> ca.Function:
+        """z -> (propagated z, values, residuals of the equations of states)."""
+        start = ca.MX.sym("z", len(self._layout.variables))
+        extended, finals, residuals = self._layout.extended_symbol(start), [], []
+        for writer in self._writers:
+            extended, final, residual = writer.march(extended, robust=robust)
+            finals.append(final)
+            residuals.append(residual)
+        z = extended[: start.numel()]
+        z = self._layout.replaced(z, self._peaks, self._largest(z))
+        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], self._rest(z))
+        return ca.Function("flight", [start], [ca.densify(value) for value in (z, values, ca.vertcat(*residuals))])
+
+    def _total(self, *, interior: bool) -> ca.Function:
+        """Propagated z -> total derivatives of the values by the free variables, (d, rows); without `interior`, of the rows that need none
+        of it."""
+        n = len(self._layout.variables)
+        z = ca.MX.sym("z", n)
+        extended, S, finals = self._layout.extended_symbol(z), ca.MX(self._layout.seeds()), []
+        for writer in self._writers:
+            S, final = writer.sensitivity(extended, S, interior=interior)
+            finals.append(final)
+        S = S[:n, :]
+        if interior:
+            S = self._layout.replaced(S, self._peaks, ca.jacobian(self._largest(z), z) @ S)
+        rest = np.flatnonzero(interior | ~self.inside[len(self.inside) - self._rest.numel_out(0) :])
+        by_z = ca.jacobian(self._rest(z), z)[rest.tolist(), :]
+        dependent = self._dependent[interior | ~self.inside[len(self._imposed) :][: len(self._dependent)]]
+        A = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], S[dependent.tolist(), :], by_z @ S)
+        return ca.Function("total", [z], [ca.densify(A.T)])
+
+    def _rows_inside(self) -> np.ndarray:
         """Rows that need the states inside the elements."""
-        inside = np.concatenate([*(writer.interior for writer in writers), self._peaks])
-        rest = np.zeros(self._rest_jacobian.shape[0], dtype=bool)
-        rest[self._rest_jacobian.rows[np.isin(self._rest_jacobian.columns, inside)]] = True
+        inside = np.concatenate([*(writer.interior for writer in self._writers), self._peaks])
+        rest = np.zeros(self._rest.numel_out(0), dtype=bool)
+        rows, columns = self._rest.jac_sparsity(0, 0).get_triplet()
+        rest[np.array(rows, dtype=int)[np.isin(columns, inside)]] = True
         return np.concatenate([np.zeros(len(self._imposed), dtype=bool), np.isin(self._dependent, inside), rest])

@@ -23,20 +23,22 @@ class Anderson:
     def __init__(self, k: int, d: int, memory: int) -> None:
         self._dx, self._ds = np.zeros((k, memory, d)), np.zeros((k, memory, d))
         self._x, self._s = np.zeros((k, d)), np.zeros((k, d))
-        self._known = np.zeros(k, dtype=bool)
+        self._known = np.zeros((k, 1), dtype=bool)
+        self._slot = 0
 
-    def forget(self, rows: np.ndarray) -> None:
-        """Begin anew with some of the iterations."""
-        self._dx[rows], self._ds[rows], self._known[rows] = 0.0, 0.0, False
+    def keep(self, rows: np.ndarray) -> None:
+        """Go on with some of the iterations only."""
+        for name in ("_dx", "_ds", "_x", "_s", "_known"):
+            setattr(self, name, getattr(self, name)[rows])
 
-    def improve(self, rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Better steps (len(rows), d) of the iterations `rows` than s, at x."""
-        for history, last, new in ((self._dx, self._x, x), (self._ds, self._s, s)):
-            difference = np.where(self._known[rows, None], new - last[rows], 0.0)
-            history[rows] = np.concatenate([history[rows, 1:], difference[:, None]], axis=1)
-            last[rows] = new
-        self._known[rows] = True
-        dx, ds = self._dx[rows], self._ds[rows]
+    def improve(self, x: np.ndarray, s: np.ndarray, good: np.ndarray) -> np.ndarray:
+        """Better steps (k, d) than s, at x; iterations whose steps are not `good` (k,) begin anew."""
+        if not good.all():
+            self._dx[~good], self._ds[~good], self._known[~good] = 0.0, 0.0, False
+        dx, ds, slot = self._dx, self._ds, self._slot
+        dx[:, slot], ds[:, slot] = (x - self._x) * self._known, (s - self._s) * self._known
+        self._x, self._s, self._slot = x, s, (slot + 1) % dx.shape[1]
+        self._known[good] = True
         gram = ds @ ds.transpose(0, 2, 1)
         diagonal = np.einsum("kii->ki", gram)
         diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + 1e-300

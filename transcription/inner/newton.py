@@ -44,91 +44,152 @@ class Newton(InnerSolver):
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
-        reduced, free, (k, d) = nlp.reduced, nlp.free, candidates.shape
-        origin, span, period = nlp.lower[free], nlp.span[free], nlp.period[free]
-        walls = np.where(period > 0, np.inf, 0.0)
-        center = (start[:, free] - origin) / span
-        X, Z, best = center.copy(), start.copy(), np.full(k, np.inf)
-        watched = np.tile(reduced.equation, (k, 1))
-        memory = Anderson(k, d, MEMORY)
-        iterations, settled, last = np.zeros(k, dtype=int), np.zeros(k, dtype=bool), np.zeros(k)
-        going = np.arange(k)
-        for iteration in range(self.max_iterations):
-            trial = start[going]
-            trial[:, free] = _values(X[going], origin, span, period)
-            flown = reduced.fly(trial)
-            iterations[going] += 1
-            residual = _residual(reduced, flown)
-            worst = residual.max(axis=1, initial=0.0)
-            distance = np.linalg.norm(center[going] - X[going], axis=1)
-            with np.errstate(invalid="ignore"):
-                found = (worst <= 0.1 * tolerance) & (settled[going] | (distance == 0.0))
-                merit = np.where(worst <= 0.5 * tolerance, distance, 2.0 * d + worst)
-                self._keep(going, flown.Z, np.where(found, -1.0, merit), Z, best)
+        Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
+        going = _Going(nlp, start)
+        # Numbers that overflowed are told by what comes back, not by warnings.
+        with np.errstate(invalid="ignore", over="ignore"):
+            for iteration in range(self.max_iterations):
+                flown = nlp.reduced.fly(going.vectors())
+                iterations[going.index] += 1
+                outside = _outside(nlp.reduced, flown)
+                worst = np.maximum(outside.max(axis=1, initial=0.0), 0.0)
+                pull = going.center - going.x
+                distance = _norm(pull)
+                found = (worst <= 0.1 * tolerance) & (going.settled | (distance == 0.0))
+                # Keep what was found; else what is nearest to the candidate of what is feasible, else what is least infeasible.
+                merit = np.where(found, -1.0, np.where(worst <= 0.5 * tolerance, distance, 2.0 * len(nlp.free) + worst))
+                better = merit < best[going.index]
+                Z[going.index[better]], best[going.index[better]] = flown.Z[better], merit[better]
                 on = np.isfinite(worst) & ~found
-            if not on.all():
-                going, residual, distance = going[on], residual[on], distance[on]
-                flown = Flown(flown.Z[on], flown.values[on])
-            if not len(going):
-                break
-            x = X[going]
-            near = residual[:, reduced.equation].max(axis=1, initial=0.0) <= NEAR
-            watched[going] |= (residual > 0.1 * tolerance) & near[:, None]
-            pull = np.where(settled[going, None], 0.0, center[going] - x)
-            step = self._capped(_towards(reduced, flown, watched[going], pull, span, (-x - walls, 1.0 - x + walls)))
-            length = np.linalg.norm(step, axis=1)
-            shrinks = np.minimum(length / np.maximum(last[going], 1e-300), 1.0)
-            last[going] = length
-            settled[going] |= near & (length * shrinks <= np.where(distance > FAR, COARSE * distance, STILL))
-            memory.forget(going[~near])
-            accelerated = near & ~settled[going]
-            if iteration >= PLAIN and accelerated.any():
-                step[accelerated] = self._capped(memory.improve(going[accelerated], x[accelerated], step[accelerated]))
-            X[going] = np.clip(x + step, -walls, 1.0 + walls)
-        feasible = best <= d  # within the tolerance: what is left of it at bounds of states goes into the dynamics
+                if not on.all():
+                    going.keep(on)
+                    flown, outside, pull, distance = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on], distance[on]
+                if not len(going.index):
+                    break
+                self._advance(going, iteration, flown, outside, pull, distance, tolerance)
+        feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return result(nlp, Z, start, np.full(k, INFEASIBLE), iterations, tolerance)
+        return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
+
+    def _advance(
+        self,
+        going: _Going,
+        iteration: int,
+        flown: Flown,
+        outside: np.ndarray,
+        pull: np.ndarray,
+        distance: np.ndarray,
+        tolerance: float,
+    ) -> None:
+        """One step of those that go on, from where they were flown."""
+        near = outside[:, going.equations].max(axis=1, initial=0.0) <= NEAR
+        going.watched |= (outside > 0.1 * tolerance) & near[:, None]
+        step = going.towards(flown, np.where(going.settled[:, None], 0.0, pull))
+        length = _norm(step)
+        if (far := length > self.cap).any():
+            step[far] *= self.cap / length[far, None]
+            going.multipliers[far] = 0.0
+            length = np.minimum(length, self.cap)
+        shrinks = np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
+        going.last = length
+        settles = near & ~going.settled & (length * shrinks <= np.where(distance > FAR, COARSE * distance, STILL))
+        if settles.any():
+            going.settled |= settles
+            going.multipliers[settles] = 0.0
+        if iteration >= PLAIN:
+            accelerated = near & ~going.settled
+            if accelerated.any():
+                step = np.where(accelerated[:, None], self._capped(going.memory.improve(going.x, step, accelerated)), step)
+        going.x = np.clip(going.x + step, -going.walls, 1.0 + going.walls)
 
     def _capped(self, step: np.ndarray) -> np.ndarray:
-        length = np.linalg.norm(step, axis=1, keepdims=True)
-        return step * np.minimum(1.0, self.cap / np.maximum(length, 1e-300))
-
-    @staticmethod
-    def _keep(going: np.ndarray, flown: np.ndarray, merit: np.ndarray, Z: np.ndarray, best: np.ndarray) -> None:
-        """Keep what was found; else what is nearest to the candidate of what is feasible, else what is least infeasible."""
-        better = merit < best[going]
-        Z[going[better]], best[going[better]] = flown[better], merit[better]
+        return step * np.minimum(1.0, self.cap / np.maximum(_norm(step), 1e-300))[:, None]
 
 
-def _towards(
-    reduced: Reduced, flown: Flown, watched: np.ndarray, pull: np.ndarray, span: np.ndarray, box: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched (k, rows)."""
-    rows = np.asarray(watched.any(axis=0))
-    if not rows.any():
-        return np.clip(pull, *box)
-    scale = reduced.scale[rows]
-    A = reduced.derivatives(flown, rows) * span / scale[:, None]
-    values, on = flown.values[:, rows], watched[:, rows]
-    lower = np.where(on, (reduced.lower[rows] - values) / scale, -np.inf)
-    upper = np.where(on, (reduced.upper[rows] - values) / scale, np.inf)
-    step, met = least_distance(pull, A, lower, upper, box)
-    if not met.all():
-        # Far from feasibility they may contradict each other: then inequalities wait until the equations are satisfied.
-        again, equations = ~met, reduced.equation[rows]
-        lower[:, ~equations], upper[:, ~equations] = -np.inf, np.inf
-        step[again] = least_distance(pull[again], A[again], lower[again], upper[again], (box[0][again], box[1][again]))[0]
-    return step
+class _Going:
+    """The candidates of a batch that are not done, in the unit cube.
+
+    Attributes
+    ----------
+    index : array (k,) of int
+        Which of the batch they are.
+    x, center : arrays (k, d)
+        Where they are, and the candidates themselves.
+    watched : array (k, rows) of bool
+        The rows of the reduced problem that steps look at: equations, and what was violated on the way.
+    multipliers : array (k, rows)
+        Those of the last step.
+    settled : array (k,) of bool
+        Whether they are near enough to their candidates and only have to be feasible.
+    last : array (k,)
+        Length of the last step.
+    memory : Anderson
+    """
+
+    def __init__(self, nlp: NLP, start: np.ndarray) -> None:
+        (k, _), free, self.reduced = start.shape, nlp.free, nlp.reduced
+        self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)
+        self.origin, self.span, self.period = nlp.lower[free], nlp.span[free], nlp.period[free]
+        self.walls = np.where(self.period > 0, np.inf, 0.0)
+        self.index, self._vectors = np.arange(k), start.copy()
+        self.x = self.center = (start[:, free] - self.origin) / self.span
+        self.watched, self.multipliers = np.tile(self.reduced.equation, (k, 1)), np.zeros((k, len(self.reduced.equation)))
+        self.settled, self.last = np.zeros(k, dtype=bool), np.zeros(k)
+        self.memory = Anderson(k, len(free), MEMORY)
+
+    def keep(self, on: np.ndarray) -> None:
+        """Go on with some of them only."""
+        for name in ("index", "_vectors", "x", "center", "watched", "multipliers", "settled", "last"):
+            setattr(self, name, getattr(self, name)[on])
+        self.memory.keep(on)
+
+    def vectors(self) -> np.ndarray:
+        """Vectors (k, n) of the NLP with the free variables where they are: periodic ones wrapped, the others within bounds."""
+        x = np.where(self.period > 0, self.x - np.floor(self.x), self.x) if self.period.any() else self.x
+        self._vectors[:, self.free] = np.clip(self.origin + x * self.span, self.origin, self.origin + self.span)
+        return self._vectors
+
+    def towards(self, flown: Flown, pull: np.ndarray) -> np.ndarray:
+        """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched."""
+        step = pull.copy()
+        inside = (self.watched & self.reduced.inside).any(axis=1)
+        for some in (inside, ~inside):  # those that need the costly derivatives apart from the others
+            if some.all():
+                return self._towards(slice(None), flown, pull)
+            if some.any():
+                step[some] = self._towards(np.flatnonzero(some), Flown(flown.Z[some], flown.values[some]), pull[some])
+        return step
+
+    def _towards(self, some: slice | np.ndarray, flown: Flown, pull: np.ndarray) -> np.ndarray:
+        """The same for some of them, whose vectors and pull are given."""
+        reduced, watched = self.reduced, self.watched[some]
+        rows = np.flatnonzero(watched.any(axis=0))
+        box = -self.x[some] - self.walls, 1.0 - self.x[some] + self.walls
+        if not len(rows):
+            return np.clip(pull, *box)
+        scale, equation = reduced.scale[rows], reduced.equation[rows]
+        A = reduced.derivatives(flown, rows) * (self.span / scale[:, None])
+        values = flown.values[:, rows]
+        lower, upper = (reduced.lower[rows] - values) / scale, (reduced.upper[rows] - values) / scale
+        multipliers = self.multipliers[some][:, rows]
+        if not equation.all():
+            on = watched[:, rows]
+            lower, upper, multipliers = np.where(on, lower, -np.inf), np.where(on, upper, np.inf), np.where(on, multipliers, 0.0)
+        step, met, multipliers = least_distance(pull, A, lower, upper, box, multipliers)
+        if not met.all():
+            # Far from feasibility they may contradict each other: then inequalities wait until the equations are satisfied.
+            again = ~met
+            lower[:, ~equation], upper[:, ~equation], multipliers[again] = -np.inf, np.inf, 0.0
+            there = box[0][again], box[1][again]
+            step[again] = least_distance(pull[again], A[again], lower[again], upper[again], there, multipliers[again])[0]
+        self.multipliers[slice(None) if isinstance(some, slice) else some[:, None], rows] = multipliers
+        return step
 
 
-def _residual(reduced: Reduced, flown: Flown) -> np.ndarray:
-    """Scaled violation (k, rows) of what is left to satisfy; NaN where it is no number."""
-    with np.errstate(invalid="ignore"):
-        outside = np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale
-        return np.maximum(outside, 0.0)
+def _norm(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("kd,kd->k", vectors, vectors))
 
 
-def _values(X: np.ndarray, origin: np.ndarray, span: np.ndarray, period: np.ndarray) -> np.ndarray:
-    """From the unit cube to the user's units: periodic variables wrapped, the others clipped."""
-    X = np.where(period > 0, X - np.floor(X), np.clip(X, 0.0, 1.0))
-    return np.clip(origin + X * span, origin, origin + span)
+def _outside(reduced: Reduced, flown: Flown) -> np.ndarray:
+    """Scaled distance (k, rows) from the limits of what is left to satisfy, negative inside; NaN where it is no number."""
+    return np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale
