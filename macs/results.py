@@ -15,6 +15,7 @@ from .archive import Archive
 from .evaluation import CONVERGED, FAILED, INFEASIBLE
 from .front import Front
 from .point import Point
+from .tables import counted
 
 
 def trajectory_front(
@@ -101,4 +102,4 @@ def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
-    return f"nothing feasible in {stats['evaluations']} evaluations"
+    return f"nothing feasible in {counted(stats['evaluations'], 'evaluation')}"

@@ -58,8 +58,8 @@ class Assembly:
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
-        peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
-        self._largest = Batched(peaks)
+        tops = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
+        self._largest = Batched(tops)
         return NLP(
             problem=self.problem,
             transcription=transcription,
@@ -73,7 +73,7 @@ class Assembly:
             guess=self.guess(),
             first_guess=self.first_guess,
             march=self.march,
-            reduced=self._reduced(z, rows, peaks),
+            reduced=self._reduced(z, rows, tops),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
