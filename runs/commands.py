@@ -129,6 +129,19 @@ def verify(arguments: Namespace) -> int:
     return DONE if checks and not failed else NO
 
 
+def bench(arguments: Namespace) -> int:
+    """Ratios against the alternatives."""
+    from . import bench as benchmarks
+
+    if arguments.what == "study":
+        raise WrongCall("there is no benchmark of studies yet; there are inner, search")
+    kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
+    if arguments.csv:
+        check_target(arguments.csv)
+    benchmarks.bench(kinds, arguments.quick, arguments.csv)
+    return DONE
+
+
 # What the arguments mean
 
 
@@ -267,4 +280,4 @@ def verification_table(front: Front, checks: Sequence[Check]) -> str:
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 
 
-COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify}
+COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify, "bench": bench}
