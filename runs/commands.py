@@ -134,7 +134,7 @@ def bench(arguments: Namespace) -> int:
     from . import bench as benchmarks
 
     if arguments.what == "study":
-        raise WrongCall("there is no benchmark of studies yet; there are inner, search")
+        raise WrongCall("studies are not benchmarked yet; there are inner, search")
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)

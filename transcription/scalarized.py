@@ -22,7 +22,6 @@ from .base import NLP, expanded
 from .derivatives import objective_scales
 from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, TIMEOUT, back_in_bounds, origin, quiet, scaled_bounds
 from .stopping import stopping
-from .stopping import stopping
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -168,7 +169,7 @@ def compiling(when: str) -> Iterator[None]:
 def report(rows: Sequence[Row]) -> str:
     """What was measured, what it means, and what was asked."""
     used = compiler()
-    compiled = f"Functions are compiled ({used}) but in rows that say otherwise." if used else "No function is compiled."
+    compiled = f"Functions are compiled ({Path(used).name}) but in rows that say so." if used else "No function is compiled."
     lines = [
         "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
         f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few. {compiled}",

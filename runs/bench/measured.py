@@ -37,6 +37,8 @@ class Row:
         values = self.values.get(name)
         if not values:
             return "-"
+        if len(values) == 1:
+            return short(values[0])
         ends = np.quantile(values, [0.25, 0.75]) if len(values) > 4 else (min(values), max(values))
         return f"{short(np.median(values))} [{', '.join(map(short, ends))}]"
 

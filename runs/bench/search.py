@@ -37,10 +37,10 @@ class Search:
 
 
 CASES = (
-    Search("goddard", goddard.reference, 10_000, 1_000, "at least 0.999"),
-    Search("orbit_rise", orbit_rise.reference, 50_000, 2_000, "at least 0.999"),
-    Search("orbit_rise_full", orbit_rise.reference, 50_000, 2_000, "clearly above 1"),
-    Search("landing_site", landing_site.reference, 20_000, 3_000, "clearly above 1"),
+    Search("goddard", goddard.reference, 10_000, 600, "at least 0.999"),
+    Search("orbit_rise", orbit_rise.reference, 50_000, 1_000, "at least 0.999"),
+    Search("orbit_rise_full", orbit_rise.reference, 50_000, 1_000, "clearly above 1"),
+    Search("landing_site", landing_site.reference, 20_000, 2_000, "clearly above 1"),
 )
 
 
