@@ -55,8 +55,8 @@ class Progress:
 class Monitor(AbstractContextManager["Monitor"]):
     """Ends a search on Ctrl-C, after a time limit or when a callback says so, always with what it has.
 
-    While it is entered in the main thread, the first Ctrl-C only asks the search to stop, before its next batch; a second one interrupts
-    at once, as usual.
+    While it is entered in the main thread, the first Ctrl-C only asks the search to stop, before its next batch or the next long solve
+    within one; a second one interrupts at once, as usual.
     """
 
     def __init__(self, time_limit: float | None, callback: Callable[[Progress], Any] | None, display: Callable[[Progress], None] | None):
@@ -79,13 +79,18 @@ class Monitor(AbstractContextManager["Monitor"]):
         if self._previous is not None:
             signal.signal(signal.SIGINT, self._previous)
 
+    @property
+    def reason(self) -> str:
+        """Why to end: "interrupted", "time limit", or nothing as long as there is no reason."""
+        if self._interrupted:
+            return "interrupted"
+        return "time limit" if self._time_limit is not None and self.elapsed > self._time_limit else ""
+
     def before_batch(self, progress: Progress) -> None:
         """Pass progress on to the display; raise `Stopped` if the search is to end here."""
         self.show(progress)
-        if self._interrupted:
-            raise Stopped("interrupted")
-        if self._time_limit is not None and self.elapsed > self._time_limit:
-            raise Stopped("time limit")
+        if self.reason:
+            raise Stopped(self.reason)
 
     def show(self, progress: Progress) -> None:
         """Pass progress on to the display."""

@@ -7,6 +7,8 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from .tables import counted
+
 if TYPE_CHECKING:
     from .monitor import Progress
 
@@ -60,7 +62,7 @@ class Display(AbstractContextManager["Display"]):
     def _write(self) -> None:
         self._written = self._last
         if self._last is not None:
-            words = [self._title, f"{count(self._last)} evaluations", clock(self._last), *found(self._last)]
+            words = [self._title, count(self._last), clock(self._last), *found(self._last)]
             print(", ".join(word for word in words if word), file=self._stream, flush=True)
 
     def _render(self) -> Any:
@@ -113,8 +115,8 @@ class Told(AbstractContextManager["Told"]):
 
 
 def count(progress: Progress) -> str:
-    """Evaluations and budget: 1 200 / 10 000."""
-    return f"{progress.evaluations:,} / {progress.budget:,}".replace(",", " ")
+    """Evaluations and budget: 1 200 / 10 000 evaluations."""
+    return f"{progress.evaluations:,} / {counted(progress.budget, 'evaluation')}".replace(",", " ")
 
 
 def clock(progress: Progress) -> str:

@@ -16,6 +16,7 @@ from .archive import Archive
 from .evaluation import CONVERGED, FAILED, INFEASIBLE
 from .front import Front
 from .point import Point
+from .tables import counted
 
 
 def trajectory_front(
@@ -106,4 +107,4 @@ def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
-    return f"nothing feasible in {stats['evaluations']} evaluations"
+    return f"nothing feasible in {counted(stats['evaluations'], 'evaluation')}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from problems.compiled import Objective
+from transcription.stopping import stopped_by
 
 from .evaluation import Evaluator
 from .front import Front
@@ -62,9 +63,15 @@ class Run:
             Its `stats["stopped"]` says what ended the run: "budget", "interrupted", "time limit", "callback" or "idle".
         """
         self.seed = secrets.randbits(63) if self.seed is None else int(self.seed)
-        with _display(progress) as display, Monitor(time_limit, callback, display) as monitor:
+        self._state: Any = None
+        with (
+            _display(progress) as display,
+            Monitor(time_limit, callback, display) as monitor,
+            stopped_by(lambda: self._asked_to_stop(monitor)),
+        ):
+            self.evaluator.before_batch = lambda: monitor.show(self._standing(monitor))
             self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
-            # From here on there is something to return, so from here on it may stop.
+            # From here on there is something to return, so from here on a batch need not even begin. Before, it ends with what it has.
             self.evaluator.before_batch = lambda: monitor.before_batch(self._standing(monitor))
             stopped = self._advance(monitor)
             monitor.show(self._standing(monitor))
@@ -83,7 +90,15 @@ class Run:
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
-        return "budget" if counts.evaluations >= self.budget else "idle"
+        if counts.evaluations < self.budget:
+            return "idle"
+        # The last batch may have been cut short.
+        return monitor.reason if monitor.reason and counts.clocked else "budget"
+
+    def _asked_to_stop(self, monitor: Monitor) -> bool:
+        """Asked between long solves: also the time to show that it is still at work."""
+        monitor.show(self._standing(monitor))
+        return bool(monitor.reason)
 
     def _stats(self, monitor: Monitor, stopped: str) -> dict[str, Any]:
         counts = self.evaluator.counts
@@ -100,14 +115,15 @@ class Run:
         }
 
     def _standing(self, monitor: Monitor) -> Progress:
-        archive, counts = self._state.archive, self.evaluator.counts
-        best = archive.F.min(axis=0) if len(archive) else ()
+        counts = self.evaluator.counts
+        archived = len(self._state.archive) if self._state is not None else 0
+        best = self._state.archive.F.min(axis=0) if archived else ()
         return Progress(
             evaluations=counts.evaluations,
             budget=self.budget,
             elapsed=monitor.elapsed,
-            archive=len(archive),
-            ideal={goal.name: float(goal.sign * value) for goal, value in zip(self.goals(), best, strict=False)},
+            archive=archived,
+            ideal={goal.name: float(goal.sign * value) for goal, value in zip(self.goals() if archived else (), best, strict=False)},
             failures=dict(counts.failures),
             make_front=lambda: self.make_front(self._state, self._stats(monitor, "running")),
         )

@@ -92,8 +92,8 @@ class Solver(ABC):
         start : Front, Points or array (k, n), optional
             Decisions to begin with: all variables, or the free ones only.
         time_limit : float, optional
-            Seconds after which the search ends with what it has; looked at before each batch but the first, like Ctrl-C. A safety net: a
-            run that it ends is recorded as not reproducible.
+            Seconds after which the search ends with what it has; looked at, like Ctrl-C, before each batch and each solve by IPOPT. A
+            safety net: a run that it ends is recorded as not reproducible.
         progress : bool
             Show how the search stands on the terminal.
         callback : callable, optional

@@ -84,19 +84,15 @@ def headline(front: Front) -> str:
     """Problem, points, transcription, and what they cost, on one line."""
     seed, count = front.stats["seed"], len(front)
     parts = [
-        f"{count} point{'' if count == 1 else 's'}" if count else "no feasible point",
+        counted(count, "point") if count else "no feasible point",
         _transcribed(front),
         front.solver.get("name", ""),
-        _counted(front.stats["evaluations"], "evaluation"),
-        _counted(front.stats["gradient_solves"], "gradient solve") if front.stats["gradient_solves"] else "",
+        counted(front.stats["evaluations"], "evaluation"),
+        counted(front.stats["gradient_solves"], "gradient solve") if front.stats["gradient_solves"] else "",
         "" if seed is None else f"seed {seed}" if not isinstance(seed, list) else f"{len(seed)} seeds",
         duration(front.stats["wall_time"]),
     ]
     return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count:,} {what}{'' if count == 1 else 's'}".replace(",", " ")
 
 
 def _transcribed(front: Front) -> str:
@@ -115,6 +111,11 @@ def _elements(point: Point) -> str:
     """Elements of each phase."""
     flight = point.trajectory
     return "?" if flight is None else "+".join(str(len(phase.state.edges) - 1) for phase in flight.values())
+
+
+def counted(number: int, what: str) -> str:
+    """1 evaluation, 10 000 evaluations."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}".replace(",", " ")
 
 
 def call(name: str, settings: Mapping[str, Any]) -> str:
@@ -151,13 +152,15 @@ def _footer(front: Front) -> list[str]:
     ]
     if leaving:
         amount, name, index = max(leaving)
-        who = f"{len(leaving)} of {len(front)} points {'leaves its' if len(leaving) == 1 else 'leave their'} bounds between nodes"
+        who = (
+            f"{len(leaving)} of {counted(len(front), 'point')} {'leaves its' if len(leaving) == 1 else 'leave their'} bounds between nodes"
+        )
         lines.append(f"{who}: {name} of point {index} by {amount:.2g} of its scale at most.")
     elif front.source is not None and all(point.excursions is not None for point in front):
         lines.append("No point leaves its bounds between nodes.")
     bad = int((front.status != "converged").sum())
     if bad:
-        lines.append(f"{bad} of {len(front)} points did not converge.")
+        lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"

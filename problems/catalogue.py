@@ -17,6 +17,7 @@ CASES: dict[str, tuple[str, str]] = {
     "goddard": ("problems.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
     "orbit_rise": ("problems.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
     "orbit_rise_full": ("problems.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
+    "landing_site": ("problems.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
 }
 
 

@@ -1,0 +1,19 @@
+"""Floor 4: batches, statistics, files, people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+
+__all__ = ["additive_epsilon", "gd", "hypervolume", "igd", "igd_plus"]
+
+
+def __getattr__(name: str) -> Any:
+    # The command line lives here too: its help must not wait for numbers.
+    if name not in __all__:
+        raise AttributeError(f"module 'runs' has no attribute '{name}'")
+    from . import indicators
+
+    return getattr(indicators, name)

@@ -23,8 +23,20 @@ examples:
   macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
   macs show front.nc --point 3 --plot flight.png
   macs verify front.nc
+  macs bench inner --quick
 
 exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
+
+
+BENCH = """\
+Ratios against the alternatives, measured side by side in one run, with their spread: absolute times would tell of the machine.
+
+inner   how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+search  MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+
+A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
+machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
+compiled; where there is a C compiler, the inner benchmark shows both."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -32,6 +44,19 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise SystemExit(complain(message, self.prog))
+
+
+class Version(argparse.Action):
+    """Prints the version that is installed; looked up only if asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"macs {version('macs-trajectories')}")
+        except PackageNotFoundError:
+            print("macs, not installed")
+        raise SystemExit(DONE)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -77,11 +102,13 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    parser.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     _add(commands, "list", "the problems there are, one line each")
     _add_solve(commands)
     _add_show(commands)
     _add_verify(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -99,7 +126,10 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", default="auto", help="the inner level: auto, march, ipopt, ... (default: auto)")
-    solve.add_argument("--no-refine", action="store_true", help="search without derivatives (no effect yet: none are used)")
+    solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
+    solve.add_argument(
+        "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"
+    )
     solve.add_argument("--checkpoint", metavar="FILE", help="not available yet")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
     solve.add_argument("--plot", metavar="FRONT.png", help="draw the front too")
@@ -119,6 +149,15 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not say where to find it")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+
+
+def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
+    bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
+    bench.formatter_class = argparse.RawDescriptionHelpFormatter
+    bench.description = BENCH
+    bench.add_argument("what", metavar="inner|search", nargs="?", help="which one (default: both)")
+    bench.add_argument("--quick", action="store_true", help="fewer rounds, seeds and evaluations: both in about a minute, with more spread")
+    bench.add_argument("--csv", metavar="FILE", help="write what was measured to a file too, one number a line")
 
 
 def _unknown_option(word: str, parser: Parser) -> str:

@@ -27,6 +27,7 @@ from transcription.inner import NAMED
 
 from .cli import DONE, NO
 
+MESHES = ("fixed", "adaptive")
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
 
 
@@ -49,7 +50,7 @@ def solve(arguments: Namespace) -> int:
     method = problem.default_transcription if arguments.transcription is None else arguments.transcription
     with refused():
         scheme = transcription.parse(method) if isinstance(method, str) else method
-    solver = make_solver(arguments.solver, arguments.no_refine)
+    solver = make_solver(arguments.solver, arguments.no_refine, choose(arguments.mesh, MESHES, "kind of mesh"))
     choose(arguments.inner, NAMED, "inner level")
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
@@ -128,6 +129,19 @@ def verify(arguments: Namespace) -> int:
     return DONE if checks and not failed else NO
 
 
+def bench(arguments: Namespace) -> int:
+    """Ratios against the alternatives."""
+    from . import bench as benchmarks
+
+    if arguments.what == "study":
+        raise WrongCall("studies are not benchmarked yet; there are inner, search")
+    kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
+    if arguments.csv:
+        check_target(arguments.csv)
+    benchmarks.bench(kinds, arguments.quick, arguments.csv)
+    return DONE
+
+
 # What the arguments mean
 
 
@@ -154,18 +168,19 @@ def load_problem(address: str, **data: Any) -> Problem:
     return problem
 
 
-def make_solver(name: str, plain: bool) -> Solver:
-    """A solver by its name in lower case, `plain` without derivatives."""
+def make_solver(name: str, plain: bool = False, mesh: str = "fixed") -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive"."""
     exported = (getattr(macs, item) for item in macs.__all__)
     known: dict[str, Any] = {
         item.__name__.lower(): item for item in exported if inspect.isclass(item) and issubclass(item, Solver) and item is not Solver
     }
     solver = known[choose(name.lower(), known, "solver")]
-    if not plain:
-        return solver()
-    if "refine" not in inspect.signature(solver).parameters:
+    settings = inspect.signature(solver).parameters
+    if plain and "refine" not in settings:
         raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
-    return solver(refine=False)
+    if mesh != "fixed" and "mesh" not in settings:
+        raise WrongCall(f"--mesh {mesh} makes no sense for solver '{name}', which leaves meshes as they are")
+    return solver(**({"refine": False} if plain else {}), **({"mesh": mesh} if mesh != "fixed" else {}))
 
 
 def choose(word: str, known: Iterable[str], what: str) -> str:
@@ -239,10 +254,16 @@ def describe(front: Front, point: Point) -> str:
 
 
 def _ends(phase: Any) -> str:
-    rows = [
-        [f"  {v.name} [{v.unit}]" if v.unit else f"  {v.name}", *(f"{value:.6g}" for value in (a, b, column.min(), column.max()))]
-        for v, a, b, column in zip(phase.state_variables, phase.edge_states[0], phase.edge_states[-1], phase.states.T, strict=True)
-    ]
+    """What states and controls begin and end with, and between which values they are at the ends of elements and the nodes between."""
+    ends = [phase.at(time) for time in (phase.t0, phase.tf)]
+
+    def row(v: Any, first: float, last: float) -> list[str]:
+        values = phase[v.name]
+        return [f"  {label(v.name, v.unit)}", *(f"{value:.6g}" for value in (first, last, values.min(), values.max()))]
+
+    rows = [row(*three) for three in zip(phase.state_variables, phase.edge_states[0], phase.edge_states[-1], strict=True)]
+    rows += [["  control"] + 4 * [""]] if phase.control_variables else []
+    rows += [row(v, ends[0][v.name], ends[1][v.name]) for v in phase.control_variables]
     return text_table([["  state", "initial", "final", "least", "greatest"]], rows, [True, False, False, False, False])
 
 
@@ -259,4 +280,4 @@ def verification_table(front: Front, checks: Sequence[Check]) -> str:
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 
 
-COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify}
+COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify, "bench": bench}

@@ -28,7 +28,8 @@ class Batched:
     """A Function of dense inputs, for arrays with one row for each call.
 
     Where a C compiler is present, a Function that has worked enough is compiled. The compiled one does the same operations in the same
-    order; it is taken only if it gives the same bits on the batch at hand. Set the environment variable MACS_COMPILE to 0 to never compile.
+    order; it is taken only if it gives the same bits on the batch at hand. Set the environment variable MACS_COMPILE to 0 to never compile,
+    to "always" to compile at the first call.
 
     Parameters
     ----------
@@ -41,7 +42,8 @@ class Batched:
         self._function = function
         self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
-        self._may_compile = compiled and os.environ.get("MACS_COMPILE", "1") != "0"
+        self._may_compile = compiled and compiler() is not None
+        self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
         self._work, self._each = 0, _work(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
@@ -58,7 +60,7 @@ class Batched:
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
         self._work += k * self._each
-        if self._may_compile and self._work > PAYS:
+        if self._may_compile and self._work > self._pays:
             self._compile(arrays, outputs)
         return outputs
 
@@ -100,10 +102,17 @@ class Batched:
             self._function, self._blocks = interpreted, blocks
 
 
+def compiler() -> str | None:
+    """The C compiler of this machine that Functions are compiled with; None if they are not, or there is none."""
+    if os.environ.get("MACS_COMPILE", "1") == "0":
+        return None
+    return os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+
+
 def _library(function: ca.Function) -> ca.Function | None:
     """The function compiled by the C compiler of this machine; None where there is none, or it fails."""
-    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if not compiler:
+    command = compiler()
+    if not command:
         return None
     with tempfile.TemporaryDirectory(prefix="macs_") as folder:
         try:
@@ -112,8 +121,8 @@ def _library(function: ca.Function) -> ca.Function | None:
             generator.generate(folder + os.sep)
             # Contracted or reordered operations would round differently.
             options = ["-shared", "-fPIC", "-O1", "-ffp-contract=off"]
-            command = [*compiler.split(), *options, "compiled.c", "-o", "compiled.so", "-lm"]
-            subprocess.run(command, cwd=folder, check=True, capture_output=True)
+            words = [*command.split(), *options, "compiled.c", "-o", "compiled.so", "-lm"]
+            subprocess.run(words, cwd=folder, check=True, capture_output=True)
             return ca.external(function.name(), str(Path(folder) / "compiled.so"))
         except (OSError, subprocess.CalledProcessError, RuntimeError) as error:
             log.info("%s is not compiled: %s", function.name(), error)

@@ -20,7 +20,8 @@ from problems.peaks import refuse_peaks
 
 from .base import NLP, expanded
 from .derivatives import objective_scales
-from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, back_in_bounds, origin, quiet, scaled_bounds
+from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, TIMEOUT, back_in_bounds, origin, quiet, scaled_bounds
+from .stopping import stopping
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
@@ -151,7 +152,8 @@ def scalarize(
     Returns
     -------
     Solved
-        A local optimum. It may be worse than a feasible start: where that matters, compare, or give the start's objectives as ceiling.
+        A local optimum. It may be worse than a feasible start: where that matters, compare, or give the start's objectives as ceiling. The
+        start itself, with status "timeout", if the work is to end early (`stopping`).
 
     Raises
     ------
@@ -163,6 +165,8 @@ def scalarize(
     task = _task(nlp, start, reference, weights, ceiling)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
+    if stopping():
+        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True)
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     worse = feasible and task.value(first.F) > tolerance

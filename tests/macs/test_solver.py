@@ -95,6 +95,34 @@ def test_an_interrupt_keeps_what_was_found() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_the_first_population_of_a_hard_problem_may_be_cut_short(capsys) -> None:
+    front = MACS().solve(load("goddard"), MESH, evaluations=100, seed=1, inner="ipopt", time_limit=1e-9, progress=True)
+    assert len(front) == 0 and front.stats["stopped"] == "time limit" and not front.stats["reproducible"]
+    assert front.stats["failures"] == {"timeout": 10} and front.stats["evaluations"] == 10
+    assert front.message.startswith("nothing feasible in 10 evaluations") and front.closest is not None
+    assert capsys.readouterr().err.startswith("0 / 100 evaluations, 0:00, nothing feasible yet")
+
+
+def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch) -> None:
+    solve = Ipopt._solve_all
+
+    def interrupted(self, nlp, start, guess, tolerance):
+        first = solve(self, nlp, start[:3], guess[:3], tolerance)
+        os.kill(os.getpid(), signal.SIGINT)
+        rest = solve(self, nlp, start[3:], guess[3:], tolerance)
+        return tuple(np.concatenate(pair) for pair in zip(first, rest, strict=True))
+
+    monkeypatch.setattr(Ipopt, "_solve_all", interrupted)
+    front = MACS().solve(load("goddard"), MESH, evaluations=10, seed=1, inner="ipopt")
+    assert 0 < len(front) <= 3 and front.stats["failures"] == {"timeout": 7}
+    assert front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
+
+
+def test_one_evaluation_is_one() -> None:
+    front = MACS().solve(load("goddard"), MESH, evaluations=1, seed=1)
+    assert "MACS, 1 evaluation, seed 1" in front.table()
+
+
 def test_a_start_is_used_and_never_made_worse() -> None:
     first = MACS().solve(load("orbit_rise"), MESH, evaluations=300, seed=1)
     again = MACS().solve(load("orbit_rise"), MESH, evaluations=60, seed=2, start=first)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import macs
 from macs import Front
 from runs.cli import main
 
@@ -74,7 +75,7 @@ def wrong(capsys, *call: str) -> str:
 def test_help_is_instant():
     code = (
         "import sys\nfrom runs.cli import main\n"
-        "for call in (['--help'], ['solve', '--help']):\n"
+        "for call in (['--help'], ['solve', '--help'], ['bench', '--help'], ['--version']):\n"
         "    try: main(call)\n    except SystemExit as end: assert end.code == 0\n"
         "heavy = ('casadi', 'matplotlib', 'xarray', 'numpy', 'scipy', 'rich', 'pandas', 'h5netcdf', 'pymoo')\n"
         "sys.exit(str([m for m in heavy if m in sys.modules]) if any(m in sys.modules for m in heavy) else 0)"
@@ -83,6 +84,12 @@ def test_help_is_instant():
     assert done.returncode == 0, done.stderr
     for word in ("list", "solve", "show", "verify", "--transcription", "--no-refine", "exit codes"):
         assert word in done.stdout
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0 and capsys.readouterr().out.split()[0] == "macs"
 
 
 def test_list_names_every_case_on_a_line(capsys):
@@ -114,6 +121,13 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
     assert main(["verify", "glide.nc"]) == 0
 
 
+def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
+    from runs.commands import make_solver
+
+    assert make_solver("macs") == macs.MACS()
+    assert make_solver("MACS", plain=True, mesh="adaptive") == macs.MACS(refine=False, mesh="adaptive")
+
+
 def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
     assert main(["solve", "glide.py:impossible", "--out", "no.nc"]) == 1
     assert "twice" in capsys.readouterr().out
@@ -128,6 +142,7 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--solver", "mcas"], ["'mcas'", "did you mean macs?"]),
         (["solve", "goddard", "--transcription", "dfet:4"], ["'dfet:4'", "dfet:4x6"]),
         (["solve", "goddard", "--transcription", "shot:4x4"], ["'shot:4x4'", "dfet:4x6"]),
+        (["solve", "goddard", "--mesh", "adaptve"], ["'adaptve'", "did you mean adaptive?", "fixed"]),
         (["solve", "goddard", "--inner", "marsh"], ["'marsh'", "did you mean march?", "ipopt"]),
         (["solve", "goddard", "--evaluations", "ten"], ["--evaluations", "'ten' is not a whole number above 0"]),
         (["solve", "goddard", "--evaluations", "0"], ["'0' is not a whole number above 0"]),
@@ -193,6 +208,8 @@ def test_show_one_point(saved, capsys):
     assert main(["show", path, "--point", "-1", "--plot", "b.png", "--csv", "b.csv"]) == 0
     out = capsys.readouterr().out
     assert "phase ascent" in out and "final value of ascent.y" in out
+    state, control = out.index("  y [km]"), out.index("  u [rad]")
+    assert state < control and len(out[control:].splitlines()[0].split()) == 6
     assert Path("b.png").read_bytes().startswith(b"\x89PNG") and len(Path("b.csv").read_text().splitlines()) == 2
     assert "there is no point 99: the front has points 0 to" in wrong(capsys, "show", path, "--point", "99")
 

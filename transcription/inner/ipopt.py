@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base import NLP, expanded
 from ..programs import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from ..stopping import stopping
 from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
 
 
@@ -50,7 +51,8 @@ class Ipopt(InnerSolver):
         """See `InnerSolver.solve`.
 
         A projection that does not converge is tried once more from propagated states. What stays infeasible comes back as it would be
-        flown, so that its violation is that of the user's constraints, not one smeared over the dynamics.
+        flown, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
+        (`stopping`), what is left of the batch is not solved, and has the status "timeout".
         """
         start = started(nlp, candidates, warm)
         Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
@@ -78,6 +80,9 @@ class Ipopt(InnerSolver):
                 continue
             if violation[row] <= tolerance and self.objective == "projection":
                 Z[row] = guess[row]
+                continue
+            if stopping():
+                said[row] = TIMEOUT
                 continue
             y0 = np.clip((guess[row] - zero) / scale, lower, upper)
             answer = solver(

@@ -1,0 +1,6 @@
+"""Ratios against the alternatives, measured side by side in one run: inner levels in `inner`, on the batches of `cases`; searches in
+`search`."""
+
+from .command import KINDS, bench
+
+__all__ = ["KINDS", "bench"]

@@ -1,0 +1,45 @@
+"""`macs bench`: measures, prints and saves what there is, also after Ctrl-C."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+
+from macs.monitor import Stopped
+
+from . import inner, search
+from .measured import Row, save
+
+KINDS = ("inner", "search")
+SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
+
+
+def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
+    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one."""
+    measured: list[tuple[str, Row]] = []
+    for kind in kinds:
+        rows: list[Row] = []
+        ended = _run(kind, rows, quick)
+        measured += [(kind, row) for row in rows]
+        if rows:
+            print({"inner": inner.report, "search": search.report}[kind](rows), end="\n\n", flush=True)
+        if ended:
+            print("interrupted: this is what there was to say by then", file=sys.stderr)
+            break
+    if path:
+        save(path, measured)
+        print(f"values in {path}")
+
+
+def _run(kind: str, rows: list[Row], quick: bool) -> bool:
+    """Measure; whether somebody pressed Ctrl-C."""
+    cases = [case for case in inner.INNER if case.quick or not quick]
+    work: dict[str, Callable[[], None]] = {
+        "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
+        "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
+    }
+    try:
+        work[kind]()
+    except (Stopped, KeyboardInterrupt):
+        return True
+    return False

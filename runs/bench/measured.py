@@ -1,0 +1,78 @@
+"""What was measured: numbers of each round or seed, their spread, as tables and as a file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from macs.tables import text_table
+
+
+@dataclass
+class Row:
+    """All that was measured of one contender on one case: a list of numbers for each quantity, one for each round or seed."""
+
+    case: str
+    who: str
+    values: dict[str, list[float]] = field(default_factory=dict)
+
+    def add(self, **values: float) -> None:
+        """One more of each quantity; what is no number is left out."""
+        for name, value in values.items():
+            known = self.values.setdefault(name, [])
+            if np.isfinite(value):
+                known.append(float(value))
+
+    def of(self, name: str, how: Callable = np.median) -> float:
+        """The median of a quantity, or what else `how` makes of its values; NaN where there are none."""
+        values = self.values.get(name)
+        return float(how(values)) if values else np.nan
+
+    def spread(self, name: str) -> str:
+        """Median and quartiles, of few values least and greatest: 12 [10, 15]."""
+        values = self.values.get(name)
+        if not values:
+            return "-"
+        if len(values) == 1:
+            return short(values[0])
+        ends = np.quantile(values, [0.25, 0.75]) if len(values) > 4 else (min(values), max(values))
+        return f"{short(np.median(values))} [{', '.join(map(short, ends))}]"
+
+
+Column = tuple[str, str, Callable[[Row], str]]
+"""Two lines of header, and what to write for a row."""
+
+
+def short(value: float) -> str:
+    """Three significant digits, as a person would write them."""
+    if not np.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e5:
+        return f"{value:.1e}"
+    return f"{value:.{max(0, 2 - int(np.floor(np.log10(abs(value)))))}f}"
+
+
+def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:
+    """A line for each row, the case named once."""
+    cells = []
+    for i, row in enumerate(rows):
+        first = i == 0 or rows[i - 1].case != row.case
+        cells.append([row.case if first else "", row.who, *(write(row) for _, _, write in columns)])
+    headers = [["case", "", *(column[0] for column in columns)], ["", "", *(column[1] for column in columns)]]
+    return text_table(headers, cells, [True, True] + [False] * len(columns))
+
+
+def save(path: str | Path, measured: Sequence[tuple[str, Row]]) -> None:
+    """Write a CSV file: one number a line, with the benchmark, the case and the contender that it is of."""
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["benchmark", "case", "contender", "quantity", "repetition", "value"])
+        for bench, row in measured:
+            for quantity, values in row.values.items():
+                writer.writerows([bench, row.case, row.who, quantity, i, repr(value)] for i, value in enumerate(values))

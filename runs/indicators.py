@@ -1,0 +1,159 @@
+"""How good a front is, as numbers: distances to a reference and from it, and the volume that it dominates.
+
+Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False. Of a `Front`, the
+minimised objectives are taken; an array next to one is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns
+are minimised.
+"""
+
+from __future__ import annotations
+
+import moocore
+import numpy as np
+
+from macs.dominance import nondominated
+from macs.front import Front
+
+JOINED = 0.02
+"""Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
+SAMPLES = 2001
+"""How many points, evenly along its length, such a reference is looked at from."""
+
+Points = Front | np.ndarray
+
+
+def gd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+    """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
+
+    A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
+    about a quarter of their spacing.
+    """
+    F, R = _pair(front, reference, normalise)
+    return float(_to_reference(F, R).mean()) if len(F) else np.nan
+
+
+def igd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+    """Inverted generational distance: mean distance of the reference from the nearest point of the front. Infinite for an empty front.
+
+    Where the reference is a curve (see `gd`), the mean is taken evenly along its length.
+    """
+    F, R = _pair(front, reference, normalise)
+    return mean_distance(_evenly(R), F) if len(F) else np.inf
+
+
+def igd_plus(front: Points, reference: Points, *, normalise: bool = True) -> float:
+    """As `igd`, but only what a point is *worse* than the reference in each objective counts (Ishibuchi et al. 2015)."""
+    F, R = _pair(front, reference, normalise)
+    if not len(F):
+        return np.inf
+    worse = np.maximum(F - _evenly(R)[:, None], 0.0)
+    return float(np.linalg.norm(worse, axis=2).min(axis=1).mean())
+
+
+def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True) -> float:
+    """By how much the front would have to improve in every objective to be nowhere worse than the reference. Infinite if it is empty."""
+    F, R = _pair(front, reference, normalise)
+    return float((F - R[:, None]).max(axis=2).min(axis=1).max()) if len(F) else np.inf
+
+
+def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normalise: bool = True) -> float:
+    """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
+
+    With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
+    a tenth of the reference's range.
+    """
+    F, R = _pair(front, reference, normalise)
+    if not len(F):
+        return 0.0
+    ideal, nadir = R.min(axis=0), R.max(axis=0)
+    return float(moocore.hypervolume(np.ascontiguousarray(F), ref=ideal + point * np.where(nadir > ideal, nadir - ideal, 1.0)))
+
+
+# Plain distances, for arrays whose senses do not matter
+
+
+def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and reference in units of the reference's range."""
+    lower, range_ = reference.min(axis=0), np.ptp(reference, axis=0)
+    unit = np.where(range_ > 0, range_, 1.0)
+    return (F - lower) / unit, (reference - lower) / unit
+
+
+def distance_to_curve(F: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Distance of each point (n, 2) to the polygon through the reference (k, 2), in the order given, in units of its range."""
+    points, curve = normalised(F, reference)
+    return _to_segments(points, curve[:-1], np.diff(curve, axis=0))
+
+
+def inverted_distance(F: np.ndarray, reference: np.ndarray, samples: int = SAMPLES) -> float:
+    """Mean distance of the polygon through the reference, sampled evenly along its length, from the nearest point."""
+    points, curve = normalised(F, reference)
+    return mean_distance(_along(curve, samples), points)
+
+
+def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:
+    """Mean distance of the points of the reference (k, m) from the nearest of F (n, m), in the units that they have."""
+    return float(np.linalg.norm(reference[:, None] - F, axis=2).min(axis=1).mean())
+
+
+def _pair(front: Points, reference: Points, normalise: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Minimised objectives of both, (n, m) and (k, m); the reference without dominated points, in the order of its first objective."""
+    known = next((points for points in (front, reference) if isinstance(points, Front)), None)
+    signs = np.array([goal.sign for goal in known.goals]) if known is not None else 1.0
+    F, R = (points.F if isinstance(points, Front) else _rows(points) * signs for points in (front, reference))
+    if not len(R):
+        raise ValueError("the reference has no points")
+    if len(F) and F.shape[1] != R.shape[1]:
+        raise ValueError(f"the front has {F.shape[1]} objectives, the reference {R.shape[1]}")
+    R = R[nondominated(R)]
+    R = R[np.lexsort(R.T[::-1])]
+    return normalised(F, R) if normalise and len(F) else (F, R)
+
+
+def _rows(points: np.ndarray) -> np.ndarray:
+    rows = np.asarray(points, dtype=float)
+    if rows.ndim != 2:
+        raise ValueError(f"objectives must be an array (n, m), not one of shape {rows.shape}")
+    return rows
+
+
+def _pieces(R: np.ndarray) -> list[np.ndarray]:
+    """The curves of a reference in its order; none where its points are not dense, or not of two objectives."""
+    if R.shape[1] != 2:
+        return []
+    gaps = np.linalg.norm(np.diff(normalised(R, R)[0], axis=0), axis=1)
+    pieces = np.split(R, np.flatnonzero(gaps > JOINED) + 1)
+    return pieces if all(len(piece) > 1 for piece in pieces) else []
+
+
+def _to_reference(F: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points to a reference."""
+    pieces = _pieces(R)
+    if not pieces:
+        return np.linalg.norm(F[:, None] - R, axis=2).min(axis=1)
+    start, step = (np.vstack([part(piece) for piece in pieces]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
+    return _to_segments(F, start, step)
+
+
+def _evenly(R: np.ndarray) -> np.ndarray:
+    """The points of a reference, or where it is dense points evenly along it."""
+    pieces = _pieces(R)
+    if not pieces:
+        return R
+    lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in pieces])
+    counts = np.maximum(2, np.round(SAMPLES * lengths / lengths.sum()).astype(int))
+    return np.vstack([_along(piece, count) for piece, count in zip(pieces, counts, strict=True)])
+
+
+def _along(curve: np.ndarray, samples: int) -> np.ndarray:
+    """Points evenly along the length of a polygon."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    at = np.linspace(0.0, length[-1], samples)
+    return np.column_stack([np.interp(at, length, column) for column in curve.T])
+
+
+def _to_segments(points: np.ndarray, start: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points to the nearest of some segments (k, 2)."""
+    squared = np.maximum((step**2).sum(axis=1), 1e-300)
+    share = ((points[:, None] - start) * step).sum(axis=2) / squared
+    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
+    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)

@@ -1,0 +1,176 @@
+"""Benchmarks: what they print and save; never how fast anything is."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from macs.monitor import Stopped
+from problems import goddard, load
+from runs.bench import command, inner, search
+from runs.bench.cases import BATCH, INNER
+from runs.bench.measured import Row, short
+from runs.bench.steps import Steps
+from runs.cli import main
+from transcription import DFET
+
+TINY = inner.Effort(least=1, rounds=1, seconds=0.1, checked=1)
+COARSE = {"goddard, cold": DFET(2, 3), "goddard, warm": DFET(2, 3), "orbit_rise, cold, 1e-9": DFET(4, 1), "needle, cold": DFET(8, 3)}
+SMALL = tuple(replace(case, mesh=COARSE[case.name]) for case in INNER if case.name in COARSE)
+
+
+@pytest.fixture(autouse=True)
+def interpreted(monkeypatch):
+    monkeypatch.setenv("MACS_COMPILE", "0")
+
+
+def coarse(name):
+    problem = load(name)
+    problem.default_transcription = "dfet:2x2"
+    return problem
+
+
+@pytest.fixture
+def small(monkeypatch):
+    monkeypatch.setattr(search, "load", coarse)
+    monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
+    monkeypatch.setattr(command.inner, "QUICK", TINY)
+    monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
+    monkeypatch.setattr(search.bench_search, "__defaults__", (search.CASES,))
+
+
+def test_inner_levels_side_by_side():
+    rows: list[Row] = []
+    inner.bench_inner(rows, TINY, SMALL)
+    found = {(row.case, row.who): row for row in rows}
+    assert {case for case, _ in found} == set(COARSE)
+    for (case, who), row in found.items():
+        assert len(row.values["speed"]) == 1 and row.of("speed") > 0
+        if who == "auto":
+            assert row.of("converged") == 1.0
+            assert row.of("fallbacks") == (1.0 if case == "needle, cold" else 0.0)
+    assert {who for case, who in found if case.startswith("orbit")} >= {"march"} and ("goddard, cold", "march") not in found
+    assert found["goddard, warm", "auto"].of("off, largest") < 1e-3 < found["goddard, warm", inner.BASELINE].of("off, largest")
+    text = inner.report(rows)
+    for word in ("No function is compiled", "at least 15 times as fast", "moved by at most 0.07", "fall-", "needle, cold"):
+        assert word in text
+    assert all(len(line) <= 170 for line in text.splitlines())
+
+
+def test_batches_are_what_the_search_sends():
+    for case in SMALL:
+        nlp = case.mesh.transcribe(case.make())
+        candidates, warm = case.batch(nlp, np.random.default_rng(0))
+        again, _ = case.batch(nlp, np.random.default_rng(0))
+        assert candidates.shape == (BATCH, len(nlp.free)) and np.array_equal(candidates, again)
+        assert ((candidates >= nlp.lower[nlp.free]) & (candidates <= nlp.upper[nlp.free])).all()
+        assert (warm is not None) == case.warm
+        if warm is not None:
+            assert (nlp.evaluate(warm)[1] <= case.tolerance).all()
+            assert 0.0 < nlp.distance(nlp.first_guess(candidates), warm).mean() < 0.1 * len(nlp.free) ** 0.5
+
+
+def test_searches_for_the_same_time_and_points(small):
+    case = search.Search("goddard", goddard.reference, 10_000, 100, "at least 0.999")
+    rows: list[Row] = []
+    search.bench_search(rows, (1, 2), True, (case,))
+    ours, theirs = rows
+    assert (ours.who, theirs.who) == ("MACS", "sweeps")
+    for row in rows:
+        assert len(row.values["ratio"]) == 2 and max(row.values["points"]) <= 10
+        assert row.of("igd", np.min) > 0 and row.of("gd", np.min) >= 0
+    assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
+    assert all(t > 0.9 * o for o, t in zip(ours.values["seconds"], theirs.values["seconds"], strict=True))
+    assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
+
+
+def test_the_command_prints_and_saves(small, capsys, tmp_path):
+    path = tmp_path / "all.csv"
+    assert main(["bench", "--quick", "--csv", str(path)]) == 0
+    said = capsys.readouterr()
+    assert said.out.index("INNER LEVELS") < said.out.index("SEARCHES") < said.out.index(f"values in {path}")
+    assert "inner levels: " in said.err and "searches: goddard" in said.err
+    with path.open() as file:
+        table = list(csv.DictReader(file))
+    assert {row["benchmark"] for row in table} == {"inner", "search"}
+    assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
+    assert all(np.isfinite(float(row["value"])) for row in table)
+
+
+@pytest.mark.parametrize("how", [Stopped("interrupted"), KeyboardInterrupt()])
+def test_ctrl_c_prints_what_there_is(small, capsys, monkeypatch, how):
+    measure = inner._measure
+
+    def interrupted(case, *rest):
+        if case.name == "goddard, warm":
+            raise how
+        measure(case, *rest)
+
+    monkeypatch.setattr(inner, "_measure", interrupted)
+    assert main(["bench", "--quick"]) == 0
+    said = capsys.readouterr()
+    assert "goddard, cold" in said.out and "goddard, warm" not in said.out and "SEARCHES" not in said.out
+    assert "interrupted: this is what there was to say by then" in said.err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_an_interrupt_ends_the_steps():
+    with Steps("work", 3) as steps:
+        steps.begin("first")
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+        assert steps.asked()
+        with pytest.raises(Stopped):
+            steps.begin("second")
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (["bench", "study"], ["studies", "not", "inner, search"]),
+        (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
+        (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
+    ],
+)
+def test_wrong_calls(capsys, call, words):
+    assert main(call) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("\n") == 1 and all(word in said.err for word in words), said.err
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {here!r})
+import test_bench
+test_bench.inner.INNER, test_bench.inner.QUICK = test_bench.SMALL[:1], test_bench.TINY
+from runs.cli import main
+sys.exit(main(["bench", "inner", "--quick"]))
+"""
+
+
+def test_in_a_process():
+    code = SCRIPT.format(here=str(Path(__file__).parent))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "goddard, cold" in done.stdout and done.stderr.startswith("inner levels: goddard, cold, step 1 of 1")
+
+
+def test_spreads_are_short():
+    row = Row("a", "b")
+    row.add(x=1.0, y=np.nan)
+    assert row.spread("x") == "1.00" and row.spread("y") == row.spread("z") == "-" and np.isnan(row.of("y"))
+    row.add(x=3.0)
+    assert row.spread("x") == "2.00 [1.00, 3.00]"
+    for value in (3.0, 3.0, 100.0):
+        row.add(x=value)
+    assert row.spread("x") == "3.00 [3.00, 3.00]"
+    assert [short(v) for v in (0.0, 12.345, 1234.5, 0.05, 1e-7, np.nan, np.inf)] == ["0", "12.3", "1234", "0.0500", "1.0e-07", "-", "-"]

@@ -1,0 +1,57 @@
+"""Work that is to end early: what was solved comes back, the rest is a timeout."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cases import candidates
+
+from macs import sweep
+from problems import load
+from transcription import DFET
+from transcription.inner import Auto, Ipopt
+from transcription.scalarized import scalarize
+from transcription.stopping import stopped_by, stopping
+
+
+def after(solves: int):
+    """Asks to stop after so many questions."""
+    asked = iter(range(10**6))
+    return lambda: next(asked) >= solves
+
+
+def test_only_within_and_only_if_asked():
+    assert not stopping()
+    with stopped_by(lambda: True):
+        assert stopping()
+        with stopped_by(lambda: False):
+            assert not stopping()
+        assert stopping()
+    with pytest.raises(KeyError), stopped_by(lambda: True):
+        raise KeyError
+    assert not stopping()
+
+
+def test_ipopt_leaves_the_rest_of_a_batch():
+    nlp = DFET(3, 2).transcribe(load("goddard"))
+    C = candidates(nlp, 5)
+    whole = Ipopt().solve(nlp, C)
+    with stopped_by(after(2)):
+        part = Ipopt().solve(nlp, C)
+    assert part.status.tolist() == ["converged"] * 2 + ["timeout"] * 3 and part.clocked
+    assert np.array_equal(part.z[:2], whole.z[:2])
+    assert (part.violation[2:] > 1e-6).all()
+    with stopped_by(lambda: True):
+        assert set(Auto().solve(nlp, C).status) == {"converged"}, "Newton is quick enough to be let finish"
+
+
+def test_gradient_solves_end_with_what_they_have():
+    nlp = DFET(3, 2).transcribe(load("goddard"))
+    start = Auto().solve(nlp, candidates(nlp, 1)).z[0]
+    with stopped_by(lambda: True):
+        solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
+    assert solved.status == "timeout" and solved.clocked and np.array_equal(solved.z, start)
+    with stopped_by(after(8)):
+        part = sweep(load("goddard"), DFET(3, 2), points=10)
+    assert 0 < len(part) < 10 and part.stats["gradient_solves"] >= 8 and not part.stats["reproducible"]
+    assert part.stats["failures"]["timeout"] > 0 and (part.status == "converged").all()
