@@ -8,7 +8,7 @@ import numpy as np
 
 from .dominance import extremes, nondominated
 
-HUGE = 1e12
+HUGE = 1e9
 """Largest energy of a pair, in units of that of neighbours."""
 
 
@@ -38,13 +38,13 @@ class Archive:
         return Archive(self.Z[rows], self.F[rows], self.violation[rows])
 
 
-def pair_energies(F: np.ndarray, exponent: float | None = None) -> np.ndarray:
+def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None) -> np.ndarray:
     """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of the rows of F (n, m) scaled by their ranges.
 
     Without an exponent, s is 2 on a curve, which is the paper's, and 8 where more than two objectives vary: a long reach drives the points
     of a surface to its edges, and only a short one leaves them evenly spread (Hardin and Saff 2004). An objective that does not vary adds
-    nothing to any distance. Distances are in units of what there is between neighbours if all are evenly spread, so that coinciding points
-    have an energy that is huge but finite (more would drown the others in rounding).
+    nothing to any distance. Distances are in units of what there is between neighbours if `count` of the points (default: all) are evenly
+    spread, so that coinciding points have an energy that is huge but finite (more would drown the others in rounding).
     """
     span = F.max(axis=0) - F.min(axis=0)
     varying = np.flatnonzero(span > 0.0)
@@ -53,7 +53,7 @@ def pair_energies(F: np.ndarray, exponent: float | None = None) -> np.ndarray:
     for k in varying:
         column = F[:, k] / span[k]
         squared += (column[:, None] - column) ** 2
-    unit = len(F) ** (-2.0 / max(varying.size - 1, 1))
+    unit = (count or len(F)) ** (-2.0 / max(varying.size - 1, 1))
     energies = (unit / np.maximum(squared, unit * HUGE ** (-2.0 / s))) ** (s / 2.0)
     np.fill_diagonal(energies, 0.0)
     return energies
@@ -81,7 +81,7 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponen
     -------
     array (n,) of bool
     """
-    energies = pair_energies(F, exponent)
+    energies = pair_energies(F, exponent, limit)
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)[:limit]] = True
     inside = fixed.copy() if members is None else fixed | members

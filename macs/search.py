@@ -157,7 +157,7 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
     archive = box.to_unit(state.archive.Z[:, evaluator.free])
     trial = social.current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
     if len(archive) > 3:
-        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len(np.unique(everyone, axis=0)))
+        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len({row.tobytes() for row in everyone}))
         trial = np.where(pick[:, None], social.current_to_rand(box, X, archive, max(len(rows), 4), settings.F, rng), trial)
     if len(state.experience) > 3:
         pick = rng.random(len(rows)) < settings.experience
