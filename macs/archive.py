@@ -8,6 +8,9 @@ import numpy as np
 
 from .dominance import extremes, nondominated
 
+HUGE = 1e9
+"""Largest energy of a pair, in units of that of neighbours."""
+
 
 @dataclass(frozen=True)
 class Archive:
@@ -35,23 +38,33 @@ class Archive:
         return Archive(self.Z[rows], self.F[rows], self.violation[rows])
 
 
-def pair_energies(F: np.ndarray) -> np.ndarray:
-    """Energies 1/d^2 of all pairs, (n, n), zero on the diagonal; d is the distance of the rows of F (n, m) scaled by their ranges.
+def reach(F: np.ndarray, exponent: float | None) -> float:
+    """The exponent of the energy of points F (n, m), the given one or the default; see `pair_energies`."""
+    return exponent or (2.0 if np.count_nonzero(np.ptp(F, axis=0)) <= 2 else 8.0)
 
-    An objective that does not vary adds nothing to any distance, and coinciding points have an energy that is huge but finite
-    (more would drown the others in rounding).
+
+def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None) -> np.ndarray:
+    """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of the rows of F (n, m) scaled by their ranges.
+
+    Without an exponent, s is 2 on a curve, which is the paper's, and 8 where more than two objectives vary: a long reach drives the points
+    of a surface to its edges, and only a short one leaves them evenly spread (Hardin and Saff 2004). An objective that does not vary adds
+    nothing to any distance. Distances are in units of what there is between neighbours if `count` of the points (default: all) are evenly
+    spread, so that coinciding points have an energy that is huge but finite (more would drown the others in rounding).
     """
     span = F.max(axis=0) - F.min(axis=0)
-    scaled = F / np.where(span > 0.0, span, 1.0)
+    varying = np.flatnonzero(span > 0.0)
+    s = reach(F, exponent)
     squared = np.zeros((len(F), len(F)))
-    for column in scaled.T:
+    for k in varying:
+        column = F[:, k] / span[k]
         squared += (column[:, None] - column) ** 2
-    energies = 1.0 / np.maximum(squared, 1e-12)
+    unit = (count or len(F)) ** (-2.0 / max(varying.size - 1, 1))
+    energies = (unit / np.maximum(squared, unit * HUGE ** (-2.0 / s))) ** (s / 2.0)
     np.fill_diagonal(energies, 0.0)
     return energies
 
 
-def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None) -> np.ndarray:
+def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponent: float | None = None) -> np.ndarray:
     """Choose `limit` of the points F (n, m), n > limit, with a low energy of all their pairs; the best of each objective is always kept.
 
     Vacancies are filled one at a time by the point that adds least; then members are exchanged for points left over, the best exchange
@@ -66,12 +79,14 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None) -> np.n
         How many to choose, at least 1. Of fewer than m, only as many are kept for being best, in the order of the objectives.
     members : array (n,) of bool, optional
         Points to begin with, at most `limit`. Default: the best of each objective only.
+    exponent : float, optional
+        See `pair_energies`.
 
     Returns
     -------
     array (n,) of bool
     """
-    energies = pair_energies(F)
+    energies = pair_energies(F, exponent, limit)
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)[:limit]] = True
     inside = fixed.copy() if members is None else fixed | members
@@ -107,7 +122,16 @@ def _exchange(inside: np.ndarray, fixed: np.ndarray, energy: np.ndarray, energie
         _flip(inside, energy, energies, others[j])
 
 
-def insert(archive: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, *, limit: int, tolerance: float) -> Archive:
+def insert(
+    archive: Archive,
+    Z: np.ndarray,
+    F: np.ndarray,
+    violation: np.ndarray,
+    *,
+    limit: int,
+    tolerance: float,
+    exponent: float | None = None,
+) -> Archive:
     """The archive after it has been offered points.
 
     Parameters
@@ -119,6 +143,8 @@ def insert(archive: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray
         Largest number of points, at least m.
     tolerance : float
         A violation of at most this is feasible.
+    exponent : float, optional
+        See `pair_energies`.
 
     Returns
     -------
@@ -133,5 +159,5 @@ def insert(archive: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray
     )
     keep = np.flatnonzero(nondominated(every.F))
     if len(keep) > limit:
-        keep = keep[spread(every.F[keep], limit, keep < len(archive))]
+        keep = keep[spread(every.F[keep], limit, keep < len(archive), exponent)]
     return every.take(keep)

@@ -41,8 +41,8 @@ class Attempts:
         Z = self.state.agents.Z if rows is None else self.state.agents.Z[rows]
         return self.box.to_unit(Z[:, self.evaluator.free])
 
-    def look(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
-        """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d), and leave these as they are.
+    def look(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
+        """Evaluate the proposals `trial` (k, d) made from the full vectors Z (k, D), at X (k, d), and move nobody.
 
         Returns
         -------
@@ -55,7 +55,7 @@ class Attempts:
         if not moved.size:
             return moved, None
         X, trial, free = X[moved], trial[moved], self.evaluator.free
-        Z = self.state.agents.Z[rows[moved]]
+        Z = Z[moved]
         Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
         result = self.evaluator.evaluate(Z)
         self.state.evaluations = self.evaluator.counts.evaluations
@@ -74,7 +74,7 @@ class Attempts:
             Who had success. A proposal that did not move, or for which no budget is left, is not evaluated and has none.
         """
         success = np.zeros(len(rows), dtype=bool)
-        moved, result = self.look(rows, X, trial)
+        moved, result = self.look(self.state.agents.Z[rows], X, trial)
         if result is None:
             return success
         rows, X, trial = rows[moved], X[moved], trial[moved]

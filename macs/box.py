@@ -46,12 +46,13 @@ class Box:
 
     def put_back(self, X: np.ndarray) -> np.ndarray:
         """The points X (..., d), wrapped where periodic and clipped elsewhere."""
-        return np.where(self.wraps, X - np.floor(X), np.clip(X, 0.0, 1.0))
+        inside = np.clip(X, 0.0, 1.0)
+        return np.where(self.wraps, X - np.floor(X), inside) if self.wraps.any() else inside
 
     def difference(self, X: np.ndarray, origin: np.ndarray) -> np.ndarray:
         """The step (..., d) from `origin` to X, the short way round where periodic."""
         step = X - origin
-        return np.where(self.wraps, step - np.round(step), step)
+        return np.where(self.wraps, step - np.round(step), step) if self.wraps.any() else step
 
     def stop_outward(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
         """`step` (..., d) without the components that push a point on a bound out of the box."""

@@ -87,6 +87,15 @@ class MACS(Solver):
     keep_velocity : bool, default True
         Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
         later code).
+    breeding : float, default 1.0
+        How many offspring each point of the archive has in an iteration, in [0, 10]; altogether at least one for each agent. 0 in the
+        paper: there are none.
+    sample : int, optional
+        How many points are drawn to begin with, at least as many as agents. Default: as many as the archive holds, if these are more, but
+        of the budget no more than a twentieth. In the paper there are as many as agents.
+    exponent : float, optional
+        By which power of the distance the charges of the archive repel each other, in [1, 16]. Default: 2 as in the paper with two
+        objectives, 8 with more: on a surface a lower one drives the points to its edges.
 
     Raises
     ------
@@ -119,6 +128,9 @@ class MACS(Solver):
     keep_velocity: bool = True
     refine_every: int = 200
     polish_every: int = 20
+    breeding: float = 1.0
+    sample: int | None = None
+    exponent: float | None = None
 
     def __post_init__(self) -> None:
         self._check_count("agents", self.agents, 3)
@@ -129,6 +141,10 @@ class MACS(Solver):
         self._check_count("polish_every", self.polish_every, 1)
         if self.directions is not None:
             self._check_count("directions", self.directions, 1)
+        if self.sample is not None:
+            self._check_count("sample", self.sample, self.agents)
+        if self.exponent is not None:
+            self._check_range("exponent", "[1, 16]", lambda x: 1 <= x <= 16)
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
@@ -146,12 +162,14 @@ class MACS(Solver):
         self._check_range("momentum", "[0, 1)", lambda x: 0 <= x < 1)
         self._check_range("concentration", "[1, 10]", lambda x: 1 <= x <= 10)
         self._check_range("experience", "[0, 1]", lambda x: 0 <= x <= 1)
+        self._check_range("breeding", "[0, 10]", lambda x: 0 <= x <= 10)
 
     @classmethod
     def paper(cls, **overrides: Any) -> MACS:
         """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself.
 
-        There are as many directions as social agents, and these keep theirs. What deliberately stays different:
+        There are as many directions as social agents, and these keep theirs; as many points are sampled as there are agents. What
+        deliberately stays different:
 
         - Feasible points come before infeasible ones, and these by their violation; no penalty enters an objective.
         - The budget is met exactly. The best point of each objective never leaves the archive.
@@ -173,11 +191,12 @@ class MACS(Solver):
             "shorten": True,
             "social_moves": False,
             "keep_velocity": False,
+            "breeding": 0.0,
+            "exponent": 2.0,
         }
         paper = cls(**(settings | overrides))
-        if "directions" in overrides:
-            return paper
-        return replace(paper, directions=max(1, round(paper.social * paper.agents)))
+        counts: dict[str, Any] = {"directions": max(1, round(paper.social * paper.agents)), "sample": paper.agents}
+        return replace(paper, **{name: count for name, count in counts.items() if name not in overrides})
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
         """Sample, evaluate and archive the first population.
@@ -240,6 +259,14 @@ class MACS(Solver):
         limit = self.archive if m > 1 else 1
         ratio = 1.0 - (1.0 - 1.0 / d) * archived / limit if self.adaptive_coordinates else self.coordinates
         return max(1, ceil(d * ratio - 1e-9))
+
+    def points_to_sample(self, budget: int) -> int:
+        """How many points are drawn to begin with."""
+        return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
+
+    def offspring(self, archived: int) -> int:
+        """How many offspring an archive of so many points has in an iteration: none if there are no points."""
+        return max(self.agents, round(self.breeding * archived)) if self.breeding and archived else 0
 
     def social_agents(self, m: int) -> int:
         """How many agents own a direction, with m objectives: none, if they could not own all the orthogonal ones."""

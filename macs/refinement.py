@@ -98,11 +98,12 @@ class Solves:
         return Evaluation(Z, F, violation, status)
 
 
-def polish(state: SearchState, solves: Solves, limit: int) -> None:
+def polish(state: SearchState, solves: Solves, limit: int, exponent: float | None = None) -> None:
     """Bring every point of the archive down to the front, and spread them along it as evenly as their number allows.
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
-    better ones; then points slide along the front to where they repel each other least, or fill what places are left.
+    better ones; then points slide along the front to where they repel each other least, or fill what places are left. `exponent` is that of
+    the archive.
     """
     if not len(state.archive):
         return
@@ -111,22 +112,22 @@ def polish(state: SearchState, solves: Solves, limit: int) -> None:
         if not _learn_from_neighbours(state, solves):
             break
     pool, ranges = state.archive, _ranges(state)
-    state.archive = _thinned(pool, limit)
+    state.archive = _thinned(pool, limit, exponent)
     for _ in range(ROUNDS):
-        references, starts = _slides(state, limit)
+        references, starts = _slides(state, limit, exponent)
         if not (len(references) and solves.left):
             break
         found = solves(starts, references, np.tile(ranges, (len(references), 1)))
         good = found.status == CONVERGED
         pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), ranges)
-        before, state.archive = state.archive, _thinned(pool, limit)
+        before, state.archive = state.archive, _thinned(pool, limit, exponent)
         if np.array_equal(before.F, state.archive.F):
             break
 
 
-def _thinned(pool: Archive, limit: int) -> Archive:
+def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
     """No more points than the limit, evenly spread."""
-    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit))
+    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
 def _descend(state: SearchState, solves: Solves) -> None:
@@ -179,7 +180,7 @@ def _learn_from_neighbours(state: SearchState, solves: Solves) -> bool:
     return True
 
 
-def _slides(state: SearchState, limit: int) -> tuple[np.ndarray, np.ndarray]:
+def _slides(state: SearchState, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
     """References (k, m) on the lines between neighbours, and vectors (k, D) to start from: in the middle of wide gaps, and where points
     would repel each other less."""
     archive, ranges = state.archive, _ranges(state)
@@ -193,11 +194,11 @@ def _slides(state: SearchState, limit: int) -> tuple[np.ndarray, np.ndarray]:
     gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, limit - count)]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
     starts = [archive.Z[i] for i, _ in gaps]
-    share = np.linspace(0.0, 0.6, 25)[:, None]
+    power, share = 0.5 * archives.reach(F, exponent), np.linspace(0.0, 0.6, 25)[:, None]
     for i in np.setdiff1d(np.arange(count), extremes(archive.F)):
         others = np.delete(F, i, axis=0)
         lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])
-        energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12)).sum(axis=1)
+        energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12) ** power).sum(axis=1)
         best = int(np.argmin(energy))
         if energy[best] < GAIN * energy[0]:
             references.append(lines[best])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import archive as archives
-from . import directions, individual, refinement, social
+from . import breeding, directions, individual, refinement, social
 from .agent import NO_DIRECTION, Agents
 from .archive import Archive
 from .attempts import Attempts
@@ -18,6 +18,9 @@ from .evaluation import Evaluation, Evaluator
 
 if TYPE_CHECKING:
     from .macs import MACS
+
+FEW = 4
+"""An archive of so many points is too small to find mates in: the agents are mates too."""
 
 
 @dataclass
@@ -36,6 +39,8 @@ class SearchState:
         The pool that the agents' directions are drawn from.
     experience : array (k, d)
         The displacements of the last improvements of any agent, in units of span, oldest first.
+    credit : array (o, 2)
+        Of the operators that breed from the archive: how many of their offspring it kept, and how many there were, the older the less.
     iteration, evaluations, refinements : int
         Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
     rng : numpy.random.Generator
@@ -49,6 +54,7 @@ class SearchState:
     nadir: np.ndarray
     directions: np.ndarray
     experience: np.ndarray
+    credit: np.ndarray
     iteration: int
     evaluations: int
     rng: np.random.Generator
@@ -65,7 +71,7 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
     if budget <= evaluator.counts.evaluations:
         raise ValueError(f"evaluations: the budget of {budget} leaves none")
     box = box_of(evaluator)
-    missing = settings.agents - (0 if start is None else len(start))
+    missing = settings.points_to_sample(budget) - (0 if start is None else len(start))
     batches = [] if start is None else [np.asarray(start, dtype=float)]
     if missing > 0:
         batches.append(evaluator.first_guess(box.to_values(box.sample(missing, rng))))
@@ -82,13 +88,14 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
         nadir=np.full(m, np.nan),
         directions=directions.pool(m, settings.directions or 100 * m),
         experience=np.empty((0, len(evaluator.free))),
+        credit=breeding.no_credit(),
         iteration=0,
         evaluations=evaluator.counts.evaluations,
         rng=rng,
     )
     remember(state, [seen], settings, evaluator)
     seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # a failure may bring nothing back to start from again
-    state.agents = _population(seen, _choose(seen, settings.agents, evaluator.tolerance), len(evaluator.free), settings)
+    state.agents = _population(seen, _choose(seen, settings.agents, evaluator.tolerance, settings.exponent), len(evaluator.free), settings)
     assign(state, settings, box, evaluator)
     return state
 
@@ -104,6 +111,7 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
     attempts = Attempts(settings, state, evaluator, box, budget)
     social_actions(state, settings, box, attempts, evaluator)
     remember(state, attempts.seen, settings, evaluator)
+    breed_archive(state, settings, box, Attempts(settings, state, evaluator, box, budget))
     if settings.refine and evaluator.has_gradients:
         for _ in range(refinement.allowed(state.evaluations, settings.refine_every, state.refinements)):
             remember(state, refinement.individual_action(state, box, evaluator, settings.F), settings, evaluator)
@@ -115,7 +123,7 @@ def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
     """The last thing a search does (see `MACS.conclude`)."""
     if settings.refine and evaluator.has_gradients:
         left = state.evaluations // settings.polish_every - evaluator.counts.gradient_solves
-        refinement.polish(state, refinement.Solves(evaluator, left), settings.archive)
+        refinement.polish(state, refinement.Solves(evaluator, left), settings.archive, settings.exponent)
 
 
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
@@ -160,7 +168,7 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
     archive = box.to_unit(state.archive.Z[:, evaluator.free])
     trial = social.current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
     if len(archive) > 3:
-        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len(np.unique(everyone, axis=0)))
+        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len({row.tobytes() for row in everyone}))
         trial = np.where(pick[:, None], social.current_to_rand(box, X, archive, max(len(rows), 4), settings.F, rng), trial)
     if len(state.experience) > 3:
         pick = rng.random(len(rows)) < settings.experience
@@ -168,7 +176,26 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
     if settings.social_moves:
         attempts.try_out(rows, X, trial, settings.keep_velocity)
     else:
-        attempts.look(rows, X, trial)
+        attempts.look(agents.Z[rows], X, trial)
+
+
+def breed_archive(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
+    """Offspring of the archive's points, as many of each as of any other; the operators whose offspring it keeps will make more."""
+    archive, evaluator, rng = state.archive, attempts.evaluator, state.rng
+    count = settings.offspring(len(archive))
+    if not count:
+        return
+    rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
+    rows = np.concatenate(rounds)[:count]
+    points = box.to_unit(archive.Z[:, evaluator.free])
+    pool = points if len(points) > FEW else np.vstack([points, attempts.positions()])
+    trial, operator = breeding.breed(box, points[rows], pool, state.credit, rng)
+    bred, result = attempts.look(archive.Z[rows], points[rows], trial)
+    if result is None:
+        return
+    remember(state, attempts.seen, settings, evaluator)
+    kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
+    state.credit = breeding.learn(state.credit, operator[bred], kept)
 
 
 def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluator: Evaluator) -> None:
@@ -177,7 +204,8 @@ def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluat
         return
     Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
     violation = np.concatenate([e.violation for e in seen])
-    state.archive = archives.insert(state.archive, Z, F, violation, limit=settings.archive, tolerance=evaluator.tolerance)
+    limit, tolerance = settings.archive, evaluator.tolerance
+    state.archive = archives.insert(state.archive, Z, F, violation, limit=limit, tolerance=tolerance, exponent=settings.exponent)
     if len(state.archive):
         state.ideal = np.fmin(state.ideal, state.archive.F.min(axis=0))
         state.nadir = state.archive.F.max(axis=0)
@@ -203,7 +231,7 @@ def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -
     owners = np.flatnonzero(agents.direction != NO_DIRECTION)
     if len(archive) >= m:
         if settings.reseed == "spread" and len(archive) > len(owners) >= m:
-            archive = archive.take(archives.spread(archive.F, len(owners)))
+            archive = archive.take(archives.spread(archive.F, len(owners), exponent=settings.exponent))
         weights = state.directions[agents.direction[owners]]
         costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     elif settings.reseed == "spread":
@@ -217,7 +245,7 @@ def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -
     agents.place(rows, archive.Z[points], archive.F[points], archive.violation[points])
 
 
-def _choose(seen: Evaluation, count: int, tolerance: float) -> np.ndarray:
+def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | None) -> np.ndarray:
     """Rows, in order, of the points to start from: all, or of too many the best.
 
     Feasible ones come before infeasible ones, and these by violation; of the feasible ones those that no other dominates come first, well
@@ -228,7 +256,7 @@ def _choose(seen: Evaluation, count: int, tolerance: float) -> np.ndarray:
     feasible = np.flatnonzero(seen.violation <= tolerance)
     front = feasible[nondominated(seen.F[feasible])]
     if len(front) > count:
-        return front[archives.spread(seen.F[front], count)]
+        return front[archives.spread(seen.F[front], count, exponent=exponent)]
     worth = np.where(seen.violation <= tolerance, 0.0, seen.violation)
     dominators = [np.count_nonzero(dominates(seen.F[feasible], F)) for F in seen.F]
     return np.sort(np.lexsort((dominators, ~np.isin(np.arange(len(seen.F)), front), worth))[:count])

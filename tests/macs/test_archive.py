@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -106,3 +107,33 @@ def test_one_objective_keeps_the_best():
     archive = offer(empty(1), [[3.0], [1.0], [2.0]])
     assert archive.F.tolist() == [[1.0]]
     assert offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0])
+@pytest.mark.parametrize("exponent", [2.0, 8.0, 16.0])
+def test_points_that_almost_coincide_drown_nothing(exponent, scale):
+    curve = quarter_circle(60) * scale
+    F = np.vstack([curve, curve[1:-1] + scale * np.array([1e-10, -1e-10])])
+    chosen = spread(F, 12, exponent=exponent)
+    gaps = np.linalg.norm(np.diff(F[chosen][np.argsort(F[chosen][:, 0])], axis=0), axis=1)
+    assert chosen.sum() == 12
+    assert gaps.max() / gaps.min() < 1.6
+
+
+@pytest.mark.parametrize(("m", "least"), [(3, 0.7), (4, 0.6)])
+def test_surfaces_are_covered_evenly_with_their_ends(m, least):
+    rng = np.random.default_rng(2)
+    F = np.abs(rng.normal(size=(3000, m)))
+    F[: m * 40, :] *= ~np.eye(m, dtype=bool)[np.arange(m * 40) % m]  # its edges
+    F = np.vstack([np.eye(m), F / np.linalg.norm(F, axis=1, keepdims=True)])
+    spreads = {}
+    for exponent in (None, 2.0):
+        archive = empty(m)
+        for rows in np.array_split(rng.permutation(len(F)), 60):
+            archive = insert(archive, np.zeros((len(rows), 1)), F[rows], np.zeros(len(rows)), limit=60, tolerance=1e-6, exponent=exponent)
+        apart = np.linalg.norm(archive.F[:, None] - archive.F, axis=2) + 9 * np.eye(60)
+        nearest = apart.min(axis=1)
+        spreads[exponent] = nearest.min() / nearest.mean()
+        assert all((corner == archive.F).all(axis=1).any() for corner in np.eye(m))
+    assert spreads[None] > least
+    assert spreads[None] > spreads[2.0]

@@ -64,7 +64,7 @@ def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
     box, state, attempts = prepared()
     before, rows = copy.deepcopy(state), np.array([2, 5, 6])
     X = attempts.positions(rows)
-    looked, result = attempts.look(rows, X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
+    looked, result = attempts.look(state.agents.Z[rows], X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
     assert looked.tolist() == [0, 2]
     assert np.allclose(result.F[:, 0], [0.6, 0.5])
     assert attempts.seen == [result]

@@ -81,9 +81,7 @@ def _newton(
     return x, met, multipliers
 
 
-def _gram(
-    A: np.ndarray, transposed: np.ndarray, size: np.ndarray, active: np.ndarray, inside: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _gram(A: np.ndarray, transposed: np.ndarray, size: np.ndarray, active: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Products (k, r, r) of the rows over the variables `inside` (k, d), and their diagonals (k, r), to be altered in place."""
     gram = (A * inside[:, None, :]) @ transposed
     diagonal = np.einsum("kii->ki", gram)

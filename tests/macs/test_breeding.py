@@ -1,0 +1,138 @@
+"""What the archive's points propose, and how operators earn their share."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs import breeding
+from macs.blackbox import BlackBox
+from macs.box import Box
+from macs.macs import MACS
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def box(d, wraps=()):
+    return Box(np.zeros(d), np.ones(d), np.isin(np.arange(d), wraps))
+
+
+@given(SEEDS, st.integers(1, 40), st.integers(1, 6), st.booleans())
+def test_offspring_are_in_the_box_and_the_same_seed_gives_the_same(seed, size, d, wrap):
+    pool = np.random.default_rng(seed).random((size, d))
+    pool[::3] = np.round(pool[::3])  # some on the bounds
+    cube = box(d, [0] if wrap else [])
+    credit = breeding.no_credit()
+    first, again = (breeding.breed(cube, cube.put_back(pool), pool, credit, np.random.default_rng(seed)) for _ in range(2))
+    assert ((first[0] >= 0.0) & (first[0] <= 1.0)).all()
+    assert np.array_equal(first[0], again[0])
+    assert np.array_equal(first[1], again[1])
+    assert set(first[1]) <= set(range(len(breeding.OPERATORS)))
+
+
+@given(SEEDS, st.integers(4, 60))
+def test_mates_are_different_others(seed, size):
+    rng = np.random.default_rng(seed)
+    pool = rng.random((size, 3))
+    found = breeding.mates(box(3), pool, pool, rng)
+    assert found.shape == (3, size, 3)
+    every = np.concatenate([pool[None], found])
+    for i in range(size):
+        assert len(np.unique(every[:, i], axis=0)) == 4
+
+
+def test_mates_are_mostly_near():
+    pool = np.linspace(0.0, 1.0, 401)[:, None]
+    found = breeding.mates(box(1), np.tile(pool[:1], (1000, 1)), pool, np.random.default_rng(0))
+    near = (found < (breeding.NEAR + 0.5) / 400).all(axis=(0, 2)).mean()
+    assert 0.65 < near < 0.75
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_a_point_stands_in_for_the_mates_that_are_missing(size):
+    pool = np.linspace(0.2, 0.8, size)[:, None] * np.ones(4)
+    found = breeding.mates(box(4), pool[:1], pool, np.random.default_rng(0))
+    missing = (found == pool[0]).all(axis=(1, 2)).sum()
+    assert missing == 4 - size
+    if size == 1:
+        assert np.array_equal(breeding.differential(box(4), pool, found, np.random.default_rng(0)), pool)
+        assert np.array_equal(breeding.crossover(box(4), pool, found, np.random.default_rng(0)), pool)
+
+
+def test_crossover_leaves_what_parents_share_and_centres_between_them():
+    rng = np.random.default_rng(0)
+    X, mate = np.tile([0.3, 0.5], (4000, 1)), np.tile([0.3, 0.7], (4000, 1))
+    child = breeding.crossover(box(2), X, np.stack([mate] * 3), rng)
+    assert (child[:, 0] == 0.3).all()
+    changed = child[:, 1] != 0.5
+    assert 0.45 < changed.mean() < 0.55
+    near_mate = np.abs(child[changed, 1] - 0.7) < np.abs(child[changed, 1] - 0.5)
+    assert 0.2 < near_mate.mean() < 0.3
+    assert np.abs(child[changed, 1] - 0.6).mean() == pytest.approx(0.1, abs=0.01)
+
+
+def test_differences_take_the_short_way_round():
+    X = np.full((1, 2), 0.5)
+    others = np.array([[[0.5, 0.5]], [[0.05, 0.55]], [[0.95, 0.45]]])
+    steps = [breeding.differential(box(2, [0]), X, others, np.random.default_rng(seed)) - X for seed in range(20)]
+    assert np.abs(steps).max() == pytest.approx(0.05)
+
+
+def test_drawing_anew_changes_one_coordinate_and_reaches_everywhere():
+    X = np.full((5000, 3), 0.1)
+    trial = breeding.draw_anew(box(3), X, np.stack([X] * 3), np.random.default_rng(0))
+    assert ((trial != X).sum(axis=1) == 1).all()
+    assert np.histogram(trial[trial != X], bins=10, range=(0, 1))[0].min() > 400
+
+
+def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
+    X = np.zeros((20_000, 10))
+    step = breeding.mutate(X, np.random.default_rng(0))
+    assert (step != 0).sum(axis=1).mean() == pytest.approx(1.0, abs=0.03)
+    assert abs(step[step != 0].mean()) < 0.002
+    assert 0.02 < np.abs(step[step != 0]).mean() < 0.07
+    assert np.abs(step).max() <= 1.0
+
+
+def test_operators_that_succeed_get_more_and_none_gets_nothing():
+    credit, count = breeding.no_credit(), len(breeding.OPERATORS)
+    assert np.allclose(breeding.shares(credit), 1 / count)
+    operator = np.repeat(np.arange(count), 25)
+    for _ in range(40):
+        credit = breeding.learn(credit, operator, operator == 1)
+    share = breeding.shares(credit)
+    assert share.sum() == pytest.approx(1.0)
+    assert share.argmax() == 1
+    assert share[1] > 0.8
+    assert np.allclose(share[[0, 2, 3]], breeding.LEAST_SHARE, atol=0.01)
+    for _ in range(40):  # what was is forgotten
+        credit = breeding.learn(credit, operator, operator == 2)
+    assert breeding.shares(credit).argmax() == 2
+
+
+def test_nothing_tried_changes_nothing_that_can_be_seen():
+    credit = np.zeros((len(breeding.OPERATORS), 2))
+    assert np.array_equal(breeding.learn(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
+    assert np.allclose(breeding.shares(credit), 1 / len(credit))
+
+
+def test_the_search_credits_what_the_archive_keeps():
+    settings = MACS(archive=20)
+    box = BlackBox(lambda X: np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1), [(-2, 2)] * 4)
+    state = settings.begin(box, 2000, np.random.default_rng(0))
+    while state.evaluations < 2000:
+        settings.advance(state, box, 2000)
+        assert (state.credit[:, 0] <= state.credit[:, 1]).all()
+    assert not np.array_equal(state.credit, breeding.no_credit())
+
+
+def test_how_many_are_sampled_and_bred():
+    assert MACS().points_to_sample(10_000) == MACS().offspring(10) == 10
+    assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100).offspring(100) == 100
+    assert MACS(archive=100).points_to_sample(500) == 25
+    assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3) == 10
+    assert MACS(sample=40).points_to_sample(20) == 40
+    assert MACS().offspring(0) == MACS(breeding=0).offspring(50) == 0
+    assert MACS.paper(agents=7, archive=100).points_to_sample(30_000) == 7
+    assert MACS.paper(sample=30).sample == 30
+    assert MACS.paper().offspring(10) == 0
