@@ -129,7 +129,7 @@ def test_a_start_is_used_and_never_made_worse() -> None:
     for row in first.F:
         assert not (row < again.F).all(axis=1).all()
     best = first.F.min(axis=0)
-    assert (again.F.min(axis=0) <= best).all()
+    assert (again.F.min(axis=0) <= best + 1e-6 * np.ptp(first.F, axis=0)).all()  # equal to the digits that a solve has
     assert len(MACS().solve(load("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
 
 
