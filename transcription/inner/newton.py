@@ -19,7 +19,7 @@ STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
 FAR, COARSE = 0.5, 0.03
 """A candidate farther than this from anything feasible says little: there a step of this part of the distance will do."""
-PLAIN, MEMORY = 4, 6
+PLAIN, MEMORY = 2, 6
 """Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
 
 
@@ -39,7 +39,7 @@ class Newton(InnerSolver):
     """
 
     max_iterations: int = 30
-    cap: float = 0.2
+    cap: float = 0.3
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
@@ -88,7 +88,7 @@ class Newton(InnerSolver):
         length = _norm(step)
         if (far := length > self.cap).any():
             step[far] *= self.cap / length[far, None]
-            going.multipliers[far] = 0.0
+            going.multipliers[far] = 0.0  # the next step is of another kind: these would lead it astray
             length = np.minimum(length, self.cap)
         shrinks = np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
