@@ -14,8 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-PAYS, TYPICAL = 100_000_000, 1500
-"""Instructions done, about half a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
+PAYS, TYPICAL = 30_000_000, 1500
+"""Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
 proportion for longer ones."""
 LONG = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
