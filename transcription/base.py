@@ -128,8 +128,7 @@ class NLP:
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
         F, residuals = self._evaluate(Z)
-        with np.errstate(invalid="ignore"):
-            violation = residuals.max(axis=1, initial=0.0)
+        violation = residuals.max(axis=1, initial=0.0)
         return F, np.where(np.isfinite(violation), violation, np.inf)
 
     def violations(self, z: np.ndarray) -> dict[str, float]:
@@ -142,18 +141,27 @@ class NLP:
 
     def distance(self, Z: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Euclidean distance (k,) of the free variables of two sets of vectors (k, n), in spans of their bounds, periods taken round."""
-        difference = Z[:, self.free] - other[:, self.free]
-        period = self.period[self.free]
-        wrapped = difference - period * np.round(difference / np.where(period > 0, period, 1.0))
-        return np.linalg.norm(np.where(period > 0, wrapped, difference) / self.span[self.free], axis=1)
+        difference, period = Z[:, self.free] - other[:, self.free], self.period[self.free]
+        if period.any():
+            turns = np.where(period > 0, difference, 0.0) / np.where(period > 0, period, 1.0)
+            difference -= period * np.round(turns)
+        difference /= self.span[self.free]
+        return np.sqrt(np.einsum("kd,kd->k", difference, difference))
 
     def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        F, g = self._batched(Z)
+        """Objectives, and scaled residuals (k, n + r) of bounds and rows of g: negative inside, NaN where they are no numbers."""
+        (F, g), n = self._batched(Z), Z.shape[1]
+        residuals = np.empty((len(Z), n + g.shape[1]))
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore"):
-            outside = np.maximum(self.lower - Z, Z - self.upper) / self.scale
-            rows = np.maximum(self.g_lower - g, g - self.g_upper) / self.g_scale
-            return F, np.maximum(np.hstack([outside, rows]), 0.0)
+            np.maximum(self.lower - Z, Z - self.upper, out=residuals[:, :n])
+            np.maximum(self.g_lower - g, g - self.g_upper, out=residuals[:, n:])
+            residuals /= self._scales
+        return F, residuals
+
+    @cached_property
+    def _scales(self) -> np.ndarray:
+        return np.concatenate([self.scale, self.g_scale])
 
     @cached_property
     def _batched(self) -> Batched:

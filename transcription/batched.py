@@ -14,9 +14,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-PAYS = 100_000_000
-"""Instructions after which a Function is worth compiling: about half a second of CasADi's virtual machine."""
-LONG = 60_000
+PAYS, TYPICAL = 30_000_000, 1500
+"""Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
+proportion for longer ones."""
+LONG = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
@@ -44,7 +45,7 @@ class Batched:
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._may_compile = compiled and compiler() is not None
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
-        self._work, self._each = 0, _work(function)
+        self._work, self._each, self._length = 0, _work(function), _length(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -60,7 +61,7 @@ class Batched:
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
         self._work += k * self._each
-        if self._may_compile and self._work > self._pays:
+        if self._may_compile and self._work * TYPICAL > self._pays * max(self._length, TYPICAL):
             self._compile(arrays, outputs)
         return outputs
 
@@ -89,9 +90,9 @@ class Batched:
     def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
         """Replace the Function by its compiled form, if there is one and it agrees to the last bit."""
         self._may_compile = False
-        interpreted, blocks = self._function, self._blocks
-        if _length(interpreted) > LONG:
+        if self._length > LONG:
             return
+        interpreted, blocks = self._function, self._blocks
         library = _library(interpreted)
         if library is None:
             return

@@ -78,8 +78,8 @@ class Reduced:
     def fly(self, Z: np.ndarray) -> Flown:
         """Propagate vectors (k, n), of which only the free entries matter."""
         flown, values, residual = self._quick(Z)
-        unsolved = ~(residual.max(axis=1) <= SOLVED)
-        if unsolved.any():
+        if not residual.max(initial=0.0) <= SOLVED:
+            unsolved = ~(residual.max(axis=1) <= SOLVED)
             flown[unsolved], values[unsolved], _ = self._robust(Z[unsolved])
         return Flown(flown, values)
 

@@ -1,5 +1,7 @@
 """The reduced problem, its derivatives, and Newton's method on it: against differences, and against the projection by IPOPT."""
 
+import shutil
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from problems import Problem, load
-from transcription import DFET
+from transcription import DFET, batched
 from transcription.inner import Auto, Ipopt, March, Newton
 from transcription.inner.least_distance import least_distance
 
@@ -105,6 +107,43 @@ def test_inequalities_paths_and_phases():
     both = (fast.status == "converged") & (exact.status == "converged")
     assert both.sum() >= 15 and fast.violation[both].max() <= 1e-6
     assert (fast.moved[both] <= 1.05 * exact.moved[both] + 1e-3).mean() > 0.8
+
+
+def limited_speed():
+    """A double integrator whose speed limit is active nearly all along."""
+    problem = Problem("limited")
+    phase = problem.phase("p", t0=0.0, tf=(2.0, 6.0))
+    phase.state("x", bounds=(-5, 5), initial=0.0, final=2.0)
+    v = phase.state("v", bounds=(-5, 5), initial=0.0, final=0.0)
+    u = phase.control("u", bounds=(-2, 2))
+    phase.dynamics(x=v, v=u)
+    phase.path("speed", v, upper=0.6)
+    problem.minimize("time", phase.tf)
+    problem.minimize("effort", phase.integral(u**2))
+    return problem
+
+
+def test_active_path_constraints_are_met_at_the_nearest_point():
+    nlp = DFET(6, 3).transcribe(limited_speed())
+    C = candidates(nlp, 20)
+    fast, exact = Newton().solve(nlp, C), Ipopt().solve(nlp, C)
+    assert (fast.status == "converged").mean() > 0.9 and fast.violation[fast.status == "converged"].max() <= 1e-6
+    good = fast.status == "converged"
+    assert (fast.moved[good] <= 1.05 * exact.moved[good]).all()
+
+
+@pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
+def test_compiled_functions_give_the_same_bits(monkeypatch):
+    problem = load("goddard")
+    monkeypatch.setenv("MACS_COMPILE", "0")
+    C = candidates(DFET(3, 3).transcribe(problem), 12)
+    expected = Newton().solve(DFET(3, 3).transcribe(problem), C)
+    monkeypatch.setenv("MACS_COMPILE", "1")
+    monkeypatch.setattr(batched, "PAYS", 1)
+    nlp = DFET(3, 3).transcribe(problem)
+    for _ in range(2):
+        found = Newton().solve(nlp, C)
+        assert np.array_equal(found.z, expected.z) and np.array_equal(found.iterations, expected.iterations)
 
 
 def test_what_is_feasible_already_is_one_propagation():

@@ -83,13 +83,10 @@ def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterati
     """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
     F, violation = nlp.evaluate(Z)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
-    status = np.where(finite & (violation <= tolerance), CONVERGED, np.where(finite, said, FAILED))
-    return InnerResult(
-        z=np.where(finite[:, None], Z, start),
-        F=np.where(finite[:, None], F, np.nan),
-        violation=np.where(finite, violation, np.inf),
-        status=status,
-        moved=np.where(finite, nlp.distance(Z, start), 0.0),
-        iterations=iterations,
-        clocked=bool((said == TIMEOUT).any()),
-    )
+    status = np.where(violation <= tolerance, CONVERGED, said)
+    moved = nlp.distance(Z, start)
+    if not finite.all():
+        broken = ~finite
+        Z = np.where(finite[:, None], Z, start)
+        F[broken], violation[broken], moved[broken], status[broken] = np.nan, np.inf, 0.0, FAILED
+    return InnerResult(z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=TIMEOUT in said)

@@ -7,7 +7,7 @@ from scipy.optimize import nnls
 
 ITERATIONS = 7
 REGULAR = 1e-12
-"""Part of the largest diagonal entry that is added to it: rows may say the same thing twice."""
+"""Part of the diagonal entries that is added to them: rows may say the same thing twice."""
 STUCK = 1e-6
 """A row of whose size no more than this is left, where variables are clipped, could not be moved."""
 MET, EXACT = 1e-6, 1e-10
@@ -59,36 +59,30 @@ def _newton(
     center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box, multipliers: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (k, d), whether (k,) they are the nearest ones, and multipliers (k, r)."""
-    transposed, size = A.transpose(0, 2, 1), np.einsum("krd,krd->kr", A, A) + 1e-300
-    exact, equation = EXACT * np.sqrt(size), lower == upper
+    (low, high), (k, r, _), transposed = box, A.shape, A.transpose(0, 2, 1)
+    size = np.einsum("krd,krd->kr", A, A) + 1e-300
+    exact, floor = EXACT * np.sqrt(size), STUCK * size
+    equation = lower == upper
     only_equations = bool(equation.all())
     for iteration in range(ITERATIONS + 1):
-        shifted = center - _times(transposed, multipliers)
-        x = np.clip(shifted, *box)
-        values = _times(A, x)
-        pushed = lower if only_equations else values + size * multipliers
+        shifted = center - (transposed @ multipliers[:, :, None])[:, :, 0]
+        x = np.minimum(np.maximum(shifted, low), high)
+        values = (A @ x[:, :, None])[:, :, 0]
         # Nothing where an active constraint holds exactly, and where another one holds and has no multiplier.
+        pushed = values if only_equations else values + size * multipliers
         miss = values - (lower if only_equations else np.clip(pushed, lower, upper))
-        met = (np.abs(miss) <= exact).all(axis=1)
+        met = np.abs(miss) <= exact
         if iteration == ITERATIONS or met.all():
             break
-        active = equation if only_equations else equation | (pushed > upper) | (pushed < lower)
-        gram, diagonal = _gram(A, transposed, size, active, (shifted > box[0]) & (shifted < box[1]))
-        diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + 1e-300
+        gram = (A * (x == shifted)[:, None, :]) @ transposed  # over the variables that are not clipped
+        diagonal = gram.reshape(k, r * r)[:, :: r + 1]
+        # A row all of whose variables are clipped is moved as if none were.
+        diagonal[...] = np.where(diagonal > floor, diagonal * (1.0 + REGULAR), size)
         if not only_equations:
-            gram, miss = np.where(active[:, :, None], gram, np.eye(gram.shape[1])), np.where(active, miss, -multipliers)
+            active = equation | (pushed > upper) | (pushed < lower)
+            gram, miss = np.where(active[:, :, None], gram, np.eye(r)), np.where(active, miss, -multipliers)
         multipliers = multipliers + np.linalg.solve(gram, miss[:, :, None])[:, :, 0]
-    return x, met, multipliers
-
-
-def _gram(A: np.ndarray, transposed: np.ndarray, size: np.ndarray, active: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Products (k, r, r) of the rows over the variables `inside` (k, d), and their diagonals (k, r), to be altered in place."""
-    gram = (A * inside[:, None, :]) @ transposed
-    diagonal = np.einsum("kii->ki", gram)
-    stuck = ((diagonal < STUCK * size) & active).any(axis=1)
-    if stuck.any():  # a row all of whose variables are clipped could not be moved at all: all of them are let go
-        gram[stuck] = A[stuck] @ transposed[stuck]
-    return gram, diagonal
+    return x, met.all(axis=1), multipliers
 
 
 def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
@@ -109,7 +103,3 @@ def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarr
     if abs(left) < MET:
         return None
     return np.clip(center + sides.T @ u / left, *box), (u[r : 2 * r] - u[:r]) / left
-
-
-def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return (A @ x[:, :, None])[:, :, 0]

@@ -19,7 +19,7 @@ STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
 FAR, COARSE = 0.5, 0.03
 """A candidate farther than this from anything feasible says little: there a step of this part of the distance will do."""
-PLAIN, MEMORY = 4, 6
+PLAIN, MEMORY = 2, 6
 """Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
 
 
@@ -39,7 +39,7 @@ class Newton(InnerSolver):
     """
 
     max_iterations: int = 30
-    cap: float = 0.2
+    cap: float = 0.3
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
@@ -50,22 +50,21 @@ class Newton(InnerSolver):
         with np.errstate(invalid="ignore", over="ignore"):
             for iteration in range(self.max_iterations):
                 flown = nlp.reduced.fly(going.vectors())
-                iterations[going.index] += 1
                 outside = _outside(nlp.reduced, flown)
-                worst = np.maximum(outside.max(axis=1, initial=0.0), 0.0)
-                pull = going.center - going.x
+                worst, pull = outside.max(axis=1, initial=0.0), going.center - going.x
                 distance = _norm(pull)
                 found = (worst <= 0.1 * tolerance) & (going.settled | (distance == 0.0))
                 # Keep what was found; else what is nearest to the candidate of what is feasible, else what is least infeasible.
                 merit = np.where(found, -1.0, np.where(worst <= 0.5 * tolerance, distance, 2.0 * len(nlp.free) + worst))
-                better = merit < best[going.index]
+                better = np.flatnonzero(merit < best[going.index])
                 Z[going.index[better]], best[going.index[better]] = flown.Z[better], merit[better]
-                on = np.isfinite(worst) & ~found
-                if not on.all():
+                iterations[going.index] = iteration + 1
+                on = np.flatnonzero((worst < np.inf) & ~found)
+                if len(on) < len(found):
+                    if not len(on):
+                        break
                     going.keep(on)
                     flown, outside, pull, distance = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on], distance[on]
-                if not len(going.index):
-                    break
                 self._advance(going, iteration, flown, outside, pull, distance, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
@@ -82,28 +81,30 @@ class Newton(InnerSolver):
         tolerance: float,
     ) -> None:
         """One step of those that go on, from where they were flown."""
-        near = outside[:, going.equations].max(axis=1, initial=0.0) <= NEAR
-        going.watched |= (outside > 0.1 * tolerance) & near[:, None]
-        step = going.towards(flown, np.where(going.settled[:, None], 0.0, pull))
+        near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
+        going.watch((outside > 0.1 * tolerance) & near[:, None])
+        if going.settled.any():
+            pull = np.where(going.settled[:, None], 0.0, pull)
+        step = going.towards(flown, pull)
         length = _norm(step)
-        if (far := length > self.cap).any():
+        if length.max() > self.cap:
+            far = np.flatnonzero(length > self.cap)
             step[far] *= self.cap / length[far, None]
-            going.multipliers[far] = 0.0
+            going.multipliers[far] = 0.0  # the next step is of another kind: these would lead it astray
             length = np.minimum(length, self.cap)
-        shrinks = np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
+        # The next step, if it shrinks as this one did.
+        left = length * np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
-        settles = near & ~going.settled & (length * shrinks <= np.where(distance > FAR, COARSE * distance, STILL))
+        settles = near & ~going.settled & (left <= np.where(distance > FAR, COARSE * distance, STILL))
         if settles.any():
             going.settled |= settles
             going.multipliers[settles] = 0.0
-        if iteration >= PLAIN:
-            accelerated = near & ~going.settled
-            if accelerated.any():
-                step = np.where(accelerated[:, None], self._capped(going.memory.improve(going.x, step, accelerated)), step)
-        going.x = np.clip(going.x + step, -going.walls, 1.0 + going.walls)
-
-    def _capped(self, step: np.ndarray) -> np.ndarray:
-        return step * np.minimum(1.0, self.cap / np.maximum(_norm(step), 1e-300))[:, None]
+        accelerated = near & ~going.settled
+        if iteration >= PLAIN and accelerated.any():
+            improved = going.memory.improve(going.x, step, accelerated)
+            improved *= np.minimum(1.0, self.cap / np.maximum(_norm(improved), 1e-300))[:, None]
+            step = np.where(accelerated[:, None], improved, step)
+        going.x = np.minimum(np.maximum(going.x + step, -going.walls), 1.0 + going.walls)
 
 
 class _Going:
@@ -119,6 +120,8 @@ class _Going:
         The rows of the reduced problem that steps look at: equations, and what was violated on the way.
     multipliers : array (k, rows)
         Those of the last step.
+    inside : array (k,) of bool
+        Whether any of these needs states inside the elements.
     settled : array (k,) of bool
         Whether they are near enough to their candidates and only have to be feasible.
     last : array (k,)
@@ -130,34 +133,40 @@ class _Going:
         (k, _), free, self.reduced = start.shape, nlp.free, nlp.reduced
         self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)
         self.origin, self.span, self.period = nlp.lower[free], nlp.span[free], nlp.period[free]
+        self.top, self.periodic = self.origin + self.span, bool(self.period.any())
         self.walls = np.where(self.period > 0, np.inf, 0.0)
         self.index, self._vectors = np.arange(k), start.copy()
         self.x = self.center = (start[:, free] - self.origin) / self.span
         self.watched, self.multipliers = np.tile(self.reduced.equation, (k, 1)), np.zeros((k, len(self.reduced.equation)))
+        self.inside = (self.watched & self.reduced.inside).any(axis=1)
         self.settled, self.last = np.zeros(k, dtype=bool), np.zeros(k)
         self.memory = Anderson(k, len(free), MEMORY)
 
     def keep(self, on: np.ndarray) -> None:
         """Go on with some of them only."""
-        for name in ("index", "_vectors", "x", "center", "watched", "multipliers", "settled", "last"):
+        for name in ("index", "_vectors", "x", "center", "watched", "inside", "multipliers", "settled", "last"):
             setattr(self, name, getattr(self, name)[on])
         self.memory.keep(on)
 
+    def watch(self, rows: np.ndarray) -> None:
+        """From now on look at these rows (k, rows) too."""
+        self.watched |= rows
+        self.inside = (self.watched & self.reduced.inside).any(axis=1)
+
     def vectors(self) -> np.ndarray:
         """Vectors (k, n) of the NLP with the free variables where they are: periodic ones wrapped, the others within bounds."""
-        x = np.where(self.period > 0, self.x - np.floor(self.x), self.x) if self.period.any() else self.x
-        self._vectors[:, self.free] = np.clip(self.origin + x * self.span, self.origin, self.origin + self.span)
+        x = np.where(self.period > 0, self.x - np.floor(self.x), self.x) if self.periodic else self.x
+        self._vectors[:, self.free] = np.minimum(np.maximum(self.origin + x * self.span, self.origin), self.top)
         return self._vectors
 
     def towards(self, flown: Flown, pull: np.ndarray) -> np.ndarray:
         """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched."""
-        step = pull.copy()
-        inside = (self.watched & self.reduced.inside).any(axis=1)
-        for some in (inside, ~inside):  # those that need the costly derivatives apart from the others
-            if some.all():
-                return self._towards(slice(None), flown, pull)
-            if some.any():
-                step[some] = self._towards(np.flatnonzero(some), Flown(flown.Z[some], flown.values[some]), pull[some])
+        count = int(np.count_nonzero(self.inside))
+        if count in (0, len(pull)):
+            return self._towards(slice(None), flown, pull)
+        step = np.empty_like(pull)
+        for some in np.flatnonzero(self.inside), np.flatnonzero(~self.inside):  # apart: the derivatives of the first are costly
+            step[some] = self._towards(some, Flown(flown.Z[some], flown.values[some]), pull[some])
         return step
 
     def _towards(self, some: slice | np.ndarray, flown: Flown, pull: np.ndarray) -> np.ndarray:
