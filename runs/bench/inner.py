@@ -32,15 +32,17 @@ RANGES = 20
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved."""
+    """How much is measured: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
+    and whether functions are measured interpreted too, where they can be compiled."""
 
     least: int = 5
     rounds: int = 40
     seconds: float = 25.0
     checked: int = 6
+    interpreted: bool = True
 
 
-QUICK = Effort(least=2, rounds=6, seconds=1.0, checked=1)
+QUICK = Effort(least=2, rounds=6, seconds=1.0, checked=1, interpreted=False)
 
 
 @dataclass
@@ -76,7 +78,7 @@ def bench_inner(rows: list[Row], effort: Effort, cases: Sequence[Case] = INNER) 
 
 def _measure(case: Case, rows: list[Row], effort: Effort, steps: Steps) -> None:
     rng = np.random.default_rng(0)
-    contenders = _contenders(case)
+    contenders = _contenders(case, effort)
     nlp, when = contenders[0].nlp, contenders[0].when
     with compiling(when):
         ranges = _ranges(nlp, case.tolerance)
@@ -99,7 +101,7 @@ def _measure(case: Case, rows: list[Row], effort: Effort, steps: Steps) -> None:
             return
 
 
-def _contenders(case: Case) -> list[Contender]:
+def _contenders(case: Case, effort: Effort) -> list[Contender]:
     """The baseline comes first."""
     problem = case.make()
     when = "always" if compiler() else "0"
@@ -108,7 +110,7 @@ def _contenders(case: Case) -> list[Contender]:
     solvers: dict[str, InnerSolver] = {BASELINE: Ipopt(objective="constant"), PROJECTION: Ipopt(), "newton": Newton()}
     solvers |= {DEFAULT: Auto()} | ({"march": March()} if case.marches else {})
     contenders = [Contender(Row(case.name, name), solver, nlp, when) for name, solver in solvers.items()]
-    if when != "0":
+    if when != "0" and effort.interpreted:
         with compiling("0"):
             contenders.append(Contender(Row(case.name, f"{DEFAULT}, interpreted"), Auto(), case.mesh.transcribe(problem), "0"))
     return contenders
@@ -169,7 +171,7 @@ def compiling(when: str) -> Iterator[None]:
 def report(rows: Sequence[Row]) -> str:
     """What was measured, what it means, and what was asked."""
     used = compiler()
-    compiled = f"Functions are compiled ({Path(used).name}) but in rows that say so." if used else "No function is compiled."
+    compiled = f"Functions are compiled ({Path(used).name}) unless a row says otherwise." if used else "No function is compiled."
     lines = [
         "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
         f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few. {compiled}",
