@@ -37,7 +37,7 @@ class Effort:
 
     least: int = 5
     rounds: int = 40
-    seconds: float = 25.0
+    seconds: float = 12.0
     checked: int = 6
     interpreted: bool = True
 
@@ -174,7 +174,8 @@ def report(rows: Sequence[Row]) -> str:
     compiled = f"Functions are compiled ({Path(used).name}) unless a row says otherwise." if used else "No function is compiled."
     lines = [
         "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
-        f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few. {compiled}",
+        f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds (least and greatest of few), and in all: the ratio",
+        f"of the sums of all times. {compiled}",
         "moved: mean distance from the candidate, in spans. fallbacks: left to IPOPT. off: by how much objectives differ from the nearest",
         f"point's (projection by IPOPT at {EXACT_TOLERANCE:g}), in ranges of feasible points; large where another point is about as near.",
         "",
@@ -187,6 +188,7 @@ def report(rows: Sequence[Row]) -> str:
 
 COLUMNS: tuple[Column, ...] = (
     ("times as", "fast", lambda row: row.spread("speed") if row.who != BASELINE else "1"),
+    ("in", "all", lambda row: short(_overall(row)) if row.who != BASELINE else "1"),
     ("ms a", "candidate", lambda row: short(1e3 * row.of("seconds"))),
     ("con-", "verged", lambda row: f"{100 * row.of('converged', np.mean):.0f} %"),
     ("moved", "", lambda row: short(row.of("moved", np.mean))),
@@ -198,21 +200,28 @@ COLUMNS: tuple[Column, ...] = (
 )
 
 
+def _overall(row: Row) -> float:
+    """The ratio of the sums of all times: a batch that takes long, for one candidate of ten, weighs more in it than in the median."""
+    seconds = np.array(row.values["seconds"])
+    return float((np.array(row.values["speed"]) * seconds).sum() / seconds.sum())
+
+
 def _verdicts(rows: Sequence[Row]) -> list[str]:
     """What was asked of the default inner level, and whether it was met."""
     asked = {case.name: case.asked for case in INNER}
     found = {(row.case, row.who): row for row in rows}
     cells = []
 
-    def verdict(case: str, what: str, value: str, met: bool) -> None:
-        cells.append([case, what, value, "met" if met else "MISSED"])
+    def verdict(case: str, what: str, value: str, *met: bool) -> None:
+        cells.append([case, what, value, "met" if all(met) else "MISSED in all" if any(met) else "MISSED"])
 
     for (case, who), row in found.items():
         if who != DEFAULT:
             continue
         limits = asked.get(case, {})
         if "speed" in limits:
-            verdict(case, f"at least {limits['speed']:g} times as fast", row.spread("speed"), row.of("speed") >= limits["speed"])
+            value, overall, least = f"{row.spread('speed')}, in all {short(_overall(row))}", _overall(row), limits["speed"]
+            verdict(case, f"at least {least:g} times as fast", value, row.of("speed") >= least, overall >= least)
         if "moved" in limits:
             moved, nearest = (found[case, name].of("moved", np.mean) for name in (DEFAULT, PROJECTION))
             value = f"{short(moved)} (nearest: {short(nearest)})"
