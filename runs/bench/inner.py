@@ -174,7 +174,7 @@ def report(rows: Sequence[Row]) -> str:
     compiled = f"Functions are compiled ({Path(used).name}) unless a row says otherwise." if used else "No function is compiled."
     lines = [
         "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
-        f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds (least and greatest of few), and in all: the ratio",
+        f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few; in all: the ratio",
         f"of the sums of all times. {compiled}",
         "moved: mean distance from the candidate, in spans. fallbacks: left to IPOPT. off: by how much objectives differ from the nearest",
         f"point's (projection by IPOPT at {EXACT_TOLERANCE:g}), in ranges of feasible points; large where another point is about as near.",
