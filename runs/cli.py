@@ -36,7 +36,7 @@ search  MACS against gradient sweeps from many starts, on the same mesh, at the 
 
 A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
 machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
-compiled; where there is a C compiler, the inner benchmark shows both."""
+compiled; where there is a C compiler, the whole inner benchmark shows both."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -156,7 +156,9 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
     bench.add_argument("what", metavar="inner|search", nargs="?", help="which one (default: both)")
-    bench.add_argument("--quick", action="store_true", help="fewer rounds, seeds and evaluations: both in about a minute, with more spread")
+    bench.add_argument(
+        "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: both within a minute, with more spread"
+    )
     bench.add_argument("--csv", metavar="FILE", help="write what was measured to a file too, one number a line")
 
 

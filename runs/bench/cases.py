@@ -103,7 +103,7 @@ INNER = (
     Case("orbit_rise, warm", ORBIT, FINE, warm=True, marches=True, quick=False, asked={"speed": 100}),
     Case("orbit_rise, cold, 1e-9", ORBIT, FINE, tolerance=1e-9, marches=True, asked={"speed": 100}),
     Case("orbit_rise, warm, 1e-9", ORBIT, FINE, warm=True, tolerance=1e-9, marches=True, asked={"speed": 100}),
-    Case("corridor, cold", corridor, DFET(4, 2)),
+    Case("corridor, cold", corridor, DFET(4, 2), quick=False),
     Case("corridor, warm", corridor, DFET(4, 2), warm=True, quick=False),
     Case("needle, cold", needle, DFET(8, 3)),
     Case("needle, warm", needle, DFET(8, 3), warm=True, quick=False),

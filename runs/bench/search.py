@@ -27,7 +27,7 @@ OURS, THEIRS = "MACS", "sweeps"
 
 @dataclass(frozen=True)
 class Search:
-    """A case on its own mesh, the truth, the budgets of the whole and of the quick benchmark, and the hypervolume ratio that is asked."""
+    """A case on its own mesh, the truth, the budgets of the whole and of the quick benchmark (0: not in it), and what ratio is asked."""
 
     name: str
     reference: Callable[[], np.ndarray]
@@ -39,13 +39,14 @@ class Search:
 CASES = (
     Search("goddard", goddard.reference, 10_000, 600, "at least 0.999"),
     Search("orbit_rise", orbit_rise.reference, 50_000, 1_000, "at least 0.999"),
-    Search("orbit_rise_full", orbit_rise.reference, 50_000, 1_000, "clearly above 1"),
+    Search("orbit_rise_full", orbit_rise.reference, 50_000, 0, "clearly above 1"),
     Search("landing_site", landing_site.reference, 20_000, 2_000, "clearly above 1"),
 )
 
 
 def bench_search(rows: list[Row], seeds: Sequence[int], quick: bool, cases: Sequence[Search] = CASES) -> None:
     """Measure all cases, with each seed; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    cases = [case for case in cases if case.quick or not quick]
     with Steps("searches", 2 * len(seeds) * len(cases)) as steps:
         for case in cases:
             reference = case.reference()
