@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 FLAT = 0.05
 """Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
-SAME = 1e-7
-"""Objectives that differ by less than this part of their ranges are equal: what a point within the tolerance may promise too much."""
+SAME, PROMISE = 1e-7, 10.0
+"""Objectives that differ by less than this part of their ranges are equal; so many times its violation more may be what a point, feasible
+within the tolerance only, promises too much."""
 BETTER = 1e-6
 """By what part of the ranges a point has to be better to be worth another round."""
 ROUNDS = 6
@@ -69,7 +70,7 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
     weights = np.where(direction > 0, _ranges(state) / np.maximum(direction, FLAT), 0.0)
     found = evaluator.refine(start[None], agents.F[i][None], weights[None])
-    if _kept(found, agents.F[i][None], _ranges(state))[0]:
+    if _kept(found, agents.F[i][None], agents.violation[i : i + 1], _ranges(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
 
@@ -134,7 +135,7 @@ def _descend(state: SearchState, solves: Solves) -> None:
     """Guarded solves of all points; ends of the front are solved for their own objective first, then for the others."""
     archive, ranges = state.archive, _ranges(state)
     found = solves(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
-    kept = _kept(found, archive.F, ranges)
+    kept = _kept(found, archive.F, archive.violation, ranges)
     archive = Archive(
         np.where(kept[:, None], found.Z, archive.Z),
         np.where(kept[:, None], found.F, archive.F),
@@ -150,18 +151,15 @@ def _ends(archive: Archive, ranges: np.ndarray, solves: Solves) -> Archive:
     best = archive.take(extremes(archive.F))
     one = np.eye(m, dtype=bool)
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, ranges, 0.0))
-    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + SAME * ranges)
+    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + _slack(best.violation) * ranges)
     Z, F = np.where(kept[:, None], single.Z, best.Z), np.where(kept[:, None], single.F, best.F)
     if m == 1:
         return Archive(Z, F, np.where(kept, single.violation, best.violation))
     # From the least value of its own objective, which becomes a limit, all others together.
     both = solves(Z, F, np.where(one, 0.0, ranges))
-    good = _kept(both, F, ranges)
-    return Archive(
-        np.where(good[:, None], both.Z, Z),
-        np.where(good[:, None], both.F, F),
-        np.where(good, both.violation, np.where(kept, single.violation, best.violation)),
-    )
+    violation = np.where(kept, single.violation, best.violation)
+    good = _kept(both, F, violation, ranges)
+    return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
 
 
 def _learn_from_neighbours(state: SearchState, solves: Solves) -> bool:
@@ -206,10 +204,15 @@ def _slides(state: SearchState, limit: int, exponent: float | None) -> tuple[np.
     return np.array(references).reshape(-1, F.shape[1]) * ranges, np.array(starts).reshape(-1, archive.Z.shape[1])
 
 
-def _kept(found: Evaluation, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Which results (k,) are feasible optima that are nowhere worse than F (k, m)."""
+def _kept(found: Evaluation, F: np.ndarray, violation: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Which results (k,) are feasible optima that are nowhere worse than what points with F (k, m) and a violation (k,) promised."""
     with np.errstate(invalid="ignore"):
-        return (found.status == CONVERGED) & (F + SAME * ranges >= found.F).all(axis=1)
+        return (found.status == CONVERGED) & (F + _slack(violation)[:, None] * ranges >= found.F).all(axis=1)
+
+
+def _slack(violation: np.ndarray) -> np.ndarray:
+    """By what part of the ranges an optimum may be worse than points with a violation (k,), and still be as good."""
+    return SAME + PROMISE * violation
 
 
 def _front(points: Archive, ranges: np.ndarray) -> Archive:
