@@ -43,7 +43,7 @@ class Bilevel(Evaluator):
 
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
-        evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked)
+        evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks)
         return evaluation, int(np.sum(found.iterations))
 
     def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:

@@ -34,6 +34,8 @@ class Evaluation:
         "converged" (feasible within the tolerance), "infeasible", "failed" or "timeout".
     clocked : bool
         Whether a clock ended any of the work: then the same vectors need not give the same batch again.
+    fallbacks : int
+        How many vectors a faster method left to a slower one.
     """
 
     Z: np.ndarray
@@ -41,6 +43,7 @@ class Evaluation:
     violation: np.ndarray
     status: np.ndarray
     clocked: bool = False
+    fallbacks: int = 0
 
 
 @dataclass
@@ -50,6 +53,7 @@ class Counts:
     evaluations: int = 0
     inner_iterations: int = 0
     gradient_solves: int = 0
+    fallbacks: int = 0
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
 
@@ -100,6 +104,7 @@ class Evaluator(ABC):
         self.counts.evaluations += len(Z)
         self.counts.inner_iterations += iterations
         self.counts.clocked += evaluation.clocked
+        self.counts.fallbacks += evaluation.fallbacks
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation
 

@@ -82,7 +82,7 @@ def _solver(fronts: Sequence[Front]) -> dict[str, Any]:
 def _stats(fronts: Sequence[Front]) -> dict[str, Any]:
     """Costs are summed, seeds listed, the loosest tolerance and the least reproducible run stand for all."""
     stats = [front.stats for front in fronts]
-    summed = {key: sum(s[key] for s in stats) for key in ("evaluations", "inner_iterations", "gradient_solves", "wall_time")}
+    summed = {key: sum(s[key] for s in stats) for key in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time")}
     failures: Counter[str] = Counter()
     versions: dict[str, dict[str, None]] = {}
     seeds: list[Any] = []

@@ -106,6 +106,7 @@ class Run:
             "evaluations": counts.evaluations,
             "inner_iterations": counts.inner_iterations,
             "gradient_solves": counts.gradient_solves,
+            "fallbacks": counts.fallbacks,
             "failures": dict(counts.failures),
             "wall_time": monitor.elapsed,
             "seed": self.seed,

@@ -11,6 +11,7 @@ STATS: dict[str, Any] = {
     "evaluations": 0,
     "inner_iterations": 0,
     "gradient_solves": 0,
+    "fallbacks": 0,
     "failures": {},
     "wall_time": 0.0,
     "seed": None,

@@ -161,6 +161,8 @@ def _footer(front: Front) -> list[str]:
     bad = int((front.status != "converged").sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
+    if front.stats["fallbacks"]:
+        lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went from the fast inner level to IPOPT.")
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"

@@ -162,3 +162,15 @@ def test_a_start_of_another_mesh_is_interpolated() -> None:
 def test_a_clock_makes_a_run_not_reproducible() -> None:
     front = MACS().solve(load("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
     assert not front.stats["reproducible"]
+
+
+def test_candidates_that_the_fast_inner_level_leaves_are_counted() -> None:
+    problem = Problem("needle")
+    phase = problem.phase("p", t0=0.0, tf=8.0)
+    x = phase.state("x", bounds=(-2, 2), initial=0.5, final=0.0)
+    u = phase.control("u", bounds=(-10, 10))
+    phase.dynamics(x=4 * x + u)
+    problem.minimize("effort", phase.integral(u**2))
+    front = MACS(refine=False).solve(problem, DFET(8, 3), evaluations=20, seed=1)
+    assert len(front) == 1 and 0 < front.stats["fallbacks"] <= 20
+    assert "went from the fast inner level to IPOPT" in front.table()
