@@ -91,12 +91,15 @@ def test_warm_solves_agree_with_the_projection():
     assert auto.fallbacks == 0 and np.array_equal(auto.z, fast.z)
 
 
-def test_cold_solves_stay_near_the_candidate():
+def test_cold_solves_agree_with_the_projection():
+    """But for the few whose nearest point is not found in time, or has a rival as near."""
     nlp = DFET(4, 6).transcribe(load("goddard"))
     C = candidates(nlp, 30)
-    fast, exact = Auto().solve(nlp, C), Ipopt().solve(nlp, C)
+    fast, exact = Auto().solve(nlp, C), Ipopt().solve(nlp, C, tolerance=1e-9)
     assert set(fast.status) == {"converged"} and fast.fallbacks <= 3
-    assert (fast.moved <= 1.05 * exact.moved).mean() > 0.9
+    off = np.abs((fast.F - exact.F) / np.ptp(exact.F, axis=0)).max(axis=1)
+    assert (off < 1e-5).mean() > 0.85 and np.median(off) < 2e-6
+    assert (fast.moved <= 1.05 * exact.moved).mean() > 0.95
     assert np.array_equal(fast.violation, nlp.evaluate(fast.z)[1])
 
 

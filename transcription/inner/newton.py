@@ -17,8 +17,8 @@ NEAR = 0.1
 way."""
 STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
-FAR, COARSE = 0.5, 0.03
-"""A candidate farther than this from anything feasible says little: there a step of this part of the distance will do."""
+PATIENCE = 24
+"""Iterations after which a point only has to be feasible, be it the nearest one or not."""
 PLAIN, MEMORY = 2, 6
 """Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
 
@@ -64,22 +64,13 @@ class Newton(InnerSolver):
                     if not len(on):
                         break
                     going.keep(on)
-                    flown, outside, pull, distance = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on], distance[on]
-                self._advance(going, iteration, flown, outside, pull, distance, tolerance)
+                    flown, outside, pull = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on]
+                self._advance(going, iteration, flown, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
 
-    def _advance(
-        self,
-        going: _Going,
-        iteration: int,
-        flown: Flown,
-        outside: np.ndarray,
-        pull: np.ndarray,
-        distance: np.ndarray,
-        tolerance: float,
-    ) -> None:
+    def _advance(self, going: _Going, iteration: int, flown: Flown, outside: np.ndarray, pull: np.ndarray, tolerance: float) -> None:
         """One step of those that go on, from where they were flown."""
         near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
         going.watch((outside > 0.1 * tolerance) & near[:, None])
@@ -95,7 +86,7 @@ class Newton(InnerSolver):
         # The next step, if it shrinks as this one did.
         left = length * np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
-        settles = near & ~going.settled & (left <= np.where(distance > FAR, COARSE * distance, STILL))
+        settles = near & ~going.settled & ((left <= STILL) | (iteration >= PATIENCE))
         if settles.any():
             going.settled |= settles
             going.multipliers[settles] = 0.0
