@@ -17,7 +17,7 @@ NEAR = 0.1
 way."""
 STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
-PATIENCE = 24
+PATIENCE = 30
 """Iterations after which a point only has to be feasible, be it the nearest one or not."""
 PLAIN, MEMORY = 2, 6
 """Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
@@ -38,7 +38,7 @@ class Newton(InnerSolver):
         Longest step, in spans.
     """
 
-    max_iterations: int = 30
+    max_iterations: int = 40
     cap: float = 0.3
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
