@@ -87,9 +87,9 @@ class MACS(Solver):
     keep_velocity : bool, default True
         Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
         later code).
-    breeding : float, default 1.0
-        How many offspring each point of the archive has in an iteration, in [0, 10]; altogether at least one for each agent. 0 in the
-        paper: there are none.
+    breeding : float, default 0.15
+        How many offspring each point of the archive has in an iteration, in [0, 10]; altogether at least one for each agent. More of them
+        get out of more local fronts, fewer leave the agents more to spend on convergence. 0 in the paper: there are none.
     sample : int, optional
         How many points are drawn to begin with, at least as many as agents. Default: as many as the archive holds, if these are more, but
         of the budget no more than a twentieth. In the paper there are as many as agents.
@@ -128,7 +128,7 @@ class MACS(Solver):
     keep_velocity: bool = True
     refine_every: int = 200
     polish_every: int = 20
-    breeding: float = 1.0
+    breeding: float = 0.15
     sample: int | None = None
     exponent: float | None = None
 

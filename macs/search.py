@@ -180,7 +180,7 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
 
 
 def breed_archive(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
-    """Offspring of the archive's points, as many of each as of any other; the operators whose offspring it keeps will make more."""
+    """Offspring of points of the archive, of as many as possible; the operators whose offspring it keeps will make more."""
     archive, evaluator, rng = state.archive, attempts.evaluator, state.rng
     count = settings.offspring(len(archive))
     if not count:
