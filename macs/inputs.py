@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,13 @@ def check_count(name: str, value: Any, least: int) -> None:
     """Raise ValueError unless `value` is a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def unknown(what: str, word: Any, known: Iterable[str]) -> str:
+    """What to say of a word that is none of those known: the nearest, and all."""
+    words = [*known]
+    near = difflib.get_close_matches(str(word), words, n=1)
+    return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
 
 
 def check_problem(problem: Any, transcription: Any) -> None:

@@ -36,6 +36,9 @@ class Progress:
         The best value of each objective in the archive, by name, in the user's senses; empty as long as nothing feasible was found.
     failures : mapping
         Evaluations that did not converge, by status.
+    F : array (archive, m)
+        Objectives of the points in the archive, all minimised; costs nothing, unlike `front`.
+    inner_iterations, gradient_solves : int
     """
 
     evaluations: int
@@ -45,6 +48,9 @@ class Progress:
     ideal: Mapping[str, float]
     failures: Mapping[str, int]
     make_front: Callable[[], Front] = field(repr=False)
+    F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    inner_iterations: int = 0
+    gradient_solves: int = 0
 
     @property
     def front(self) -> Front:

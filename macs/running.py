@@ -127,6 +127,9 @@ class Run:
             ideal={goal.name: float(goal.sign * value) for goal, value in zip(self.goals() if archived else (), best, strict=False)},
             failures=dict(counts.failures),
             make_front=lambda: self.make_front(self._state, self._stats(monitor, "running")),
+            F=self._state.archive.F if self._state is not None else np.empty((0, 0)),
+            inner_iterations=counts.inner_iterations,
+            gradient_solves=counts.gradient_solves,
         )
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+    from .study import Study
 
-__all__ = ["additive_epsilon", "gd", "hypervolume", "igd", "igd_plus"]
+__all__ = ["Study", "additive_epsilon", "gd", "hypervolume", "igd", "igd_plus"]
 
 
 def __getattr__(name: str) -> Any:
     # The command line lives here too: its help must not wait for numbers.
     if name not in __all__:
         raise AttributeError(f"module 'runs' has no attribute '{name}'")
-    from . import indicators
-
-    return getattr(indicators, name)
+    return getattr(import_module(".study" if name == "Study" else ".indicators", __name__), name)

@@ -23,6 +23,8 @@ examples:
   macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
   macs show front.nc --point 3 --plot flight.png
   macs verify front.nc
+  macs study run goddard-table3 --jobs 2
+  macs study status out/goddard-table3
   macs bench inner --quick
 
 exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
@@ -37,6 +39,17 @@ search  MACS against gradient sweeps from many starts, on the same mesh, at the 
 A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
 machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
 compiled; where there is a C compiler, the whole inner benchmark shows both."""
+
+
+STUDY = """\
+Batches of independent runs: every problem of a study by every solver. A run is a file in the study's folder, written once, whole.
+
+macs study run STUDY     makes the runs that are missing. Stopped, killed, or with more --runs, the same command goes on; what is finished
+                         is neither made again nor touched. A run that crashes, hangs beyond the study's time_limit or is killed is
+                         recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
+macs study status DIR    tells how it stands.
+
+The exit code is 1 while any run is missing or failed."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -104,10 +117,11 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
-    _add(commands, "list", "the problems there are, one line each")
+    _add(commands, "list", "the problems and studies there are, one line each")
     _add_solve(commands)
     _add_show(commands)
     _add_verify(commands)
+    _add_study(commands)
     _add_bench(commands)
     return parser
 
@@ -149,6 +163,23 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not say where to find it")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+
+
+def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
+    study = _add(commands, "study", "batches of runs: make what is missing of them, see how they stand")
+    study.formatter_class = argparse.RawDescriptionHelpFormatter
+    study.description = STUDY
+    actions = study.add_subparsers(dest="action", metavar="ACTION", required=True, parser_class=Parser)
+    run = _add(actions, "run", "make the runs that are missing; the same again resumes where it stopped")
+    run.add_argument("study", metavar="STUDY", help="a name of `macs list`, or a TOML file")
+    run.add_argument("--out", metavar="DIR", help="the study's folder (default: out/NAME)")
+    run.add_argument("--runs", metavar="N", type=_positive, help="so many of each cell (default: the study's own)")
+    run.add_argument("--jobs", metavar="N", type=_positive, help="processes of this machine that work at a time (default: 1)")
+    run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
+    run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
+    run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
+    status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
+    status.add_argument("folder", metavar="DIR")
 
 
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:

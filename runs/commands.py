@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
@@ -11,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-import macs
 import problems
 import transcription
+from macs.catalogue import solver_class
 from macs.front import Front
+from macs.inputs import unknown
 from macs.plotting import label, save_picture
 from macs.point import Point
 from macs.solver import Solver
@@ -25,22 +25,21 @@ from macs.verification import verify as verify_front
 from problems import Problem
 from transcription.inner import NAMED
 
+from . import study_commands, studyfile
 from .cli import DONE, NO
+from .wrong import WrongCall, refused
 
 MESHES = ("fixed", "adaptive")
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
 
 
-class WrongCall(Exception):  # noqa: N818 - whoever called is to be told, in one line
-    """What the user asked for makes no sense. The text says why, in their words."""
-
-
-def list_problems(arguments: Namespace) -> int:
-    """The problems there are."""
-    names = problems.names()
-    width = max(map(len, names))
-    for name in names:
-        print(f"{name:{width}}  {problems.describe(name)}")
+def list_all(arguments: Namespace) -> int:
+    """The problems and the studies there are."""
+    cases = {name: problems.describe(name) for name in problems.names()}
+    batches = {name: f"study: {studyfile.describe(name)}" for name in studyfile.names()}
+    width = max(map(len, (*cases, *batches)))
+    for name, text in (cases | batches).items():
+        print(f"{name:{width}}  {text}")
     return DONE
 
 
@@ -145,17 +144,6 @@ def bench(arguments: Namespace) -> int:
 # What the arguments mean
 
 
-class refused:  # noqa: N801 - reads as a statement
-    """A ValueError inside is the caller's mistake."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, ValueError):
-            raise WrongCall(str(error)) from error
-
-
 def load_problem(address: str, **data: Any) -> Problem:
     """A problem by name or address; whatever goes wrong in the user's own file is told in one line."""
     try:
@@ -170,11 +158,8 @@ def load_problem(address: str, **data: Any) -> Problem:
 
 def make_solver(name: str, plain: bool = False, mesh: str = "fixed") -> Solver:
     """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive"."""
-    exported = (getattr(macs, item) for item in macs.__all__)
-    known: dict[str, Any] = {
-        item.__name__.lower(): item for item in exported if inspect.isclass(item) and issubclass(item, Solver) and item is not Solver
-    }
-    solver = known[choose(name.lower(), known, "solver")]
+    with refused():
+        solver = solver_class(name)
     settings = inspect.signature(solver).parameters
     if plain and "refine" not in settings:
         raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
@@ -185,10 +170,8 @@ def make_solver(name: str, plain: bool = False, mesh: str = "fixed") -> Solver:
 
 def choose(word: str, known: Iterable[str], what: str) -> str:
     """`word`, if it is known; else WrongCall with the ones that are."""
-    words = [*known]
-    if word not in words:
-        near = difflib.get_close_matches(word, words, n=1)
-        raise WrongCall(f"unknown {what} '{word}'{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}")
+    if word not in known:
+        raise WrongCall(unknown(what, word, known))
     return word
 
 
@@ -280,4 +263,4 @@ def verification_table(front: Front, checks: Sequence[Check]) -> str:
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 
 
-COMMANDS = {"list": list_problems, "solve": solve, "show": show, "verify": verify, "bench": bench}
+COMMANDS = {"list": list_all, "solve": solve, "show": show, "verify": verify, "study": study_commands.study, "bench": bench}

@@ -1,0 +1,183 @@
+"""A study: every problem on every transcription by every solver, many independent runs of each. What it is; `executing` runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import KW_ONLY, dataclass, field, replace
+from os import PathLike
+from typing import Any
+
+from macs.inputs import check_count, check_positive, unknown
+from transcription.inner import NAMED
+
+from . import combining, studyfile
+from .cell import Cell
+from .store import Store, Summary
+
+QUICK_RUNS, QUICK_EVALUATIONS = 2, 500
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Independent runs of solvers on problems; `run` makes them, and makes only those that are missing when it is called again.
+
+    Every problem is combined with each of its transcriptions and with every solver. Run i of such a cell has a seed that depends on `seed`,
+    on the cell's labels and on i alone: more runs, or more solvers, change none of those there are.
+
+    Parameters
+    ----------
+    name : str
+    problems : names, Problems, or mapping
+        A name or address that `problems.load` takes, a `Problem`, several of them, or {label: one of them}. A mapping's value may also be
+        {"problem": name, ...}, the rest of which `problems.load` gets as data.
+    transcriptions : words, Transcriptions, or mapping, optional
+        One or several, for all problems; {label: one}; or {label of a problem: one or several}, if its keys are the problems' labels.
+        Default: the problem's own.
+    solvers : names, Solvers, or mapping
+        One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
+    evaluations : int, or mapping, optional
+        Budget of each run, or {label of a problem: budget}. Default: the problem's own.
+    runs : int
+        Of each cell.
+    seed : int
+        The one that all seeds are spawned from.
+    reference : optional
+        What reports measure fronts against; see `report`.
+    inner : str, default "auto"
+        The inner level, by name.
+    tolerance : float, default 1e-6
+        As for `solve`.
+    time_limit : float, optional
+        Seconds of a run, after which it is ended and recorded as a timeout. It changes no number of a run that ends before.
+    description : str
+        One line, for lists.
+    paper : mapping
+        Published figures to print beside ours; see `report`.
+
+    Raises
+    ------
+    ValueError
+        Whatever does not make sense, before any work; the message names it.
+    """
+
+    name: str
+    _: KW_ONLY
+    problems: Any
+    transcriptions: Any = None
+    solvers: Any
+    evaluations: Any = None
+    runs: int
+    seed: int
+    reference: Any = None
+    inner: str = "auto"
+    tolerance: float = 1e-6
+    time_limit: float | None = None
+    description: str = ""
+    paper: Mapping[str, Any] = field(default_factory=dict)
+    cells: tuple[Cell, ...] = field(init=False, repr=False)
+    """Every combination, problems first."""
+    payloads: Mapping[tuple[str, str, str], bytes] = field(init=False, repr=False)
+    """By labels of a cell: its problem, transcription and solver, pickled for the processes that run them."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise ValueError(f"study: name must be a word, not {self.name!r}")
+        with studyfile.told(f"study '{self.name}'"):
+            self._check_values()
+            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+        object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
+        object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
+
+    @classmethod
+    def load(cls, source: str | PathLike[str]) -> Study:
+        """The study in a TOML file, or one that comes with the project, by name.
+
+        Raises
+        ------
+        ValueError
+            There is no such study, the file is not TOML, or a key or value in it makes no sense; the message names it.
+        """
+        return cls(**studyfile.read(source))
+
+    def run(
+        self,
+        out: str | PathLike[str],
+        *,
+        jobs: int = 1,
+        executor: Executor | None = None,
+        retry: bool = False,
+        progress: bool = False,
+    ) -> Summary:
+        """Make the runs that `out` does not have yet.
+
+        Parameters
+        ----------
+        out : path
+            A folder, made if it is not there; `store` says what is in it. A finished run in it is neither made again nor touched.
+        jobs : int
+            How many processes of this machine work at a time.
+        executor : concurrent.futures.Executor, optional
+            Who does the work instead: threads, processes, a Dask client's `get_executor()`. Each of its workers keeps one process, in which
+            the runs happen; so a run that crashes or hangs takes none of them down.
+        retry : bool
+            Make those runs again, too, that ended with an exception. Those that were killed or took too long always are.
+        progress : bool
+            Show on the terminal how it stands.
+
+        Returns
+        -------
+        Summary
+            How many runs of each cell there are by now, and why others failed. That some failed is no error.
+
+        Raises
+        ------
+        ValueError
+            `out` holds another study, or is in use by another process.
+        OSError
+            A run's file could not be written; those that are finished stay as they are.
+        KeyboardInterrupt
+            Ctrl-C; the same again goes on.
+        """
+        from .executing import execute
+
+        return execute(self, out, jobs=jobs, executor=executor, retry=retry, progress=progress)
+
+    def status(self, out: str | PathLike[str]) -> Summary:
+        """How many runs of each cell `out` has, and why others failed. Raises ValueError if it holds another study, or none."""
+        store = Store.open(out)
+        store.check(self.definition())
+        return store.summary(self.runs)
+
+    def quick(self) -> Study:
+        """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
+        budgets = {cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells}
+        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets)
+
+    def definition(self) -> dict[str, Any]:
+        """All that decides the numbers, and what reports print, as plain data."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "seed": int(self.seed),
+            "runs": int(self.runs),
+            "inner": self.inner,
+            "tolerance": float(self.tolerance),
+            "time_limit": self.time_limit,
+            "reference": studyfile.plain(self.reference),
+            "paper": studyfile.plain(self.paper),
+            "cells": [cell.to_dict() for cell in self.cells],
+        }
+
+    def _check_values(self) -> None:
+        check_count("runs", self.runs, 1)
+        check_count("seed", self.seed, 0)
+        check_positive("tolerance", self.tolerance)
+        if self.time_limit is not None:
+            check_positive("time_limit", self.time_limit)
+        if self.inner not in NAMED:
+            raise ValueError(unknown("inner level", self.inner, NAMED))
+        if not isinstance(self.paper, Mapping):
+            raise ValueError(f"paper must be a table, not {self.paper!r}")
+        if not isinstance(self.description, str):
+            raise ValueError(f"description must be a line of text, not {self.description!r}")

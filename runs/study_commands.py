@@ -1,0 +1,56 @@
+"""`macs study`: batches from the command line."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+from .cli import DONE, INTERRUPTED, NO
+from .wrong import WrongCall, refused
+
+
+def study(arguments: Namespace) -> int:
+    """Run a study, or tell how one stands."""
+    return {"run": run, "status": status}[arguments.action](arguments)
+
+
+def run(arguments: Namespace) -> int:
+    """Make the runs that are missing."""
+    from .cluster import cluster
+    from .executing import Deserted
+    from .study import Study
+
+    if arguments.dask and arguments.jobs:
+        raise WrongCall("--jobs is for this machine, --dask for a cluster: give one of them")
+    with refused():
+        batch = Study.load(arguments.study)
+        batch = batch if arguments.runs is None else replace(batch, runs=arguments.runs)
+        batch = batch.quick() if arguments.quick else batch
+    out = Path(arguments.out or Path("out") / batch.name)
+    again = "what is finished is kept, the same command goes on from there"
+    try:
+        with refused(), cluster(arguments.dask) if arguments.dask else nullcontext() as executor:
+            summary = batch.run(out, jobs=arguments.jobs or 1, executor=executor, retry=arguments.retry, progress=True)
+    except KeyboardInterrupt:
+        print(f"interrupted; {again}", file=sys.stderr)
+        return INTERRUPTED
+    except Deserted as error:
+        print(error, file=sys.stderr)
+        return NO
+    except OSError as error:
+        raise WrongCall(f"{error.strerror or error}; {again}") from error
+    print(f"{summary}\n\nin {out}")
+    return DONE if summary.finished == len(summary.runs) else NO
+
+
+def status(arguments: Namespace) -> int:
+    """How a study stands."""
+    from .store import Store
+
+    with refused():
+        summary = Store.open(arguments.folder).summary()
+    print(summary)
+    return DONE if summary.finished == len(summary.runs) else NO

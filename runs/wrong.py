@@ -1,0 +1,20 @@
+"""What commands answer a wrong call with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class WrongCall(Exception):  # noqa: N818 - whoever called is to be told, in one line
+    """What the user asked for makes no sense. The text says why, in their words."""
+
+
+class refused:  # noqa: N801 - reads as a statement
+    """A ValueError inside is the caller's mistake."""
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if isinstance(error, ValueError):
+            raise WrongCall(str(error)) from error
