@@ -14,6 +14,12 @@ import sys
 import threading
 from typing import Any
 
+# All that a run needs is there before the first one begins: its time is its own.
+import h5netcdf  # noqa: F401
+import xarray  # noqa: F401
+
+import macs.storage  # noqa: F401
+
 from .work import perform
 
 PATIENCE = 60.0

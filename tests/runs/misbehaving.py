@@ -1,0 +1,76 @@
+"""A tiny problem, and solvers that do to a run what may happen to one. Processes of their own import this module."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from macs import MACS
+from problems import Problem
+
+
+def glide(speed: float = 3.0, most: float = 20.0) -> Problem:
+    problem = Problem("glide")
+    phase = problem.phase("leg", t0=0.0, tf=(1.0, 5.0))
+    x = phase.state("x", bounds=(0, most), initial=0, unit="km")
+    u = phase.control("u", bounds=(0, speed), unit="km/s")
+    phase.dynamics(x=u)
+    problem.minimize("time", phase.tf, unit="s")
+    problem.maximize("distance", phase.final(x), unit="km")
+    problem.default_transcription = "dfet:2x2"
+    problem.default_evaluations = 60
+    return problem
+
+
+@dataclass(frozen=True)
+class Plain(MACS):
+    """Quick, and well-behaved."""
+
+    refine: bool = False
+
+
+@dataclass(frozen=True)
+class Crashing(Plain):
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        raise ArithmeticError("the root of all evil")
+
+
+@dataclass(frozen=True)
+class Hanging(Plain):
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        time.sleep(1000)
+
+
+@dataclass(frozen=True)
+class Hungry(Plain):
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        raise MemoryError("nothing left")
+
+
+@dataclass(frozen=True)
+class Dying(Plain):
+    """Killed from outside, as for want of memory: at every attempt, or as often as there are bytes in a file that it shortens."""
+
+    lives: str = ""
+
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        if not self.lives:
+            os.kill(os.getpid(), signal.SIGKILL)
+        left = Path(self.lives).read_bytes()
+        if left:
+            Path(self.lives).write_bytes(left[1:])
+            os.kill(os.getpid(), signal.SIGKILL)
+        super().advance(state, evaluator, budget)
+
+
+@dataclass(frozen=True)
+class Slow(Plain):
+    """So that there is time to interfere."""
+
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        time.sleep(0.05)
+        super().advance(state, evaluator, budget)

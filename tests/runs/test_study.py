@@ -1,0 +1,389 @@
+from __future__ import annotations
+
+import errno
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+from misbehaving import Crashing, Dying, Hanging, Hungry, Plain, Slow, glide
+
+from runs import Study
+from runs.store import Store
+from runs.work import perform
+from transcription import DFET
+
+HERE = Path(__file__).parent
+KEEP = {"problems": {"glide": glide()}, "solvers": {"plain": Plain()}, "runs": 3, "seed": 1, "evaluations": 60}
+
+
+def study(**changes) -> Study:
+    return Study("glides", **(KEEP | changes))
+
+
+def numbers(summary) -> dict:
+    """All that must not depend on who made a run, or when."""
+    return {
+        (run.cell.folder, run.number): (
+            run.front.F.tolist(),
+            [point.decision.tolist() for point in run.front],
+            run.front.stats["seed"],
+            run.front.stats["evaluations"],
+            run.history.get("F"),
+        )
+        for run in summary.runs
+        if run.finished
+    }
+
+
+class Inline(Executor):
+    """Makes runs here and now: no process has to start."""
+
+    def submit(self, function, task):
+        future = Future()
+        future.set_result(perform(task))
+        return future
+
+
+def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
+    return {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*.nc")}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A finished study of three runs."""
+    folder = tmp_path_factory.mktemp("made") / "out"
+    return folder, study().run(folder)
+
+
+# What it holds
+
+
+def test_every_run_leaves_its_front_its_seed_and_how_it_converged(made):
+    folder, summary = made
+    assert summary.finished == 3 and summary.failed == summary.missing == 0
+    assert len({run.seed for run in summary.runs}) == 3
+    for run in summary.runs:
+        assert run.front.stats["seed"] == run.seed and run.front.stats["evaluations"] <= 60
+        counts = run.history["evaluations"]
+        assert counts == sorted(counts) and counts[-1] == run.front.stats["evaluations"] and len(counts) <= 32
+        assert np.array_equal(run.history["F"][-1], run.front.F)
+        assert {len(column) for column in run.history.values()} == {len(counts)}
+        assert run.wall_time > 0 and run.history["elapsed"][-1] <= run.wall_time
+    assert not list(folder.rglob("*.part"))
+
+
+def test_a_run_is_what_solve_gives_for_its_seed(made):
+    run = made[1].runs[1]
+    front = Plain().solve(glide(), DFET(2, 2), evaluations=60, seed=run.seed)
+    assert np.array_equal(front.F, run.front.F)
+    assert all(np.array_equal(a.decision, b.decision) for a, b in zip(front, run.front, strict=True))
+
+
+def test_finished_runs_are_neither_made_again_nor_touched_and_more_may_be_added(made):
+    folder, summary = made
+    before, known = stamps(folder), numbers(summary)
+    again = study().run(folder)
+    assert stamps(folder) == before and numbers(again) == known
+    more = study(runs=4).run(folder, executor=Inline())
+    assert more.finished == 4 and {path: stamps(folder)[path] for path in before} == before
+    assert known.items() <= numbers(more).items()
+    # Fewer are no other study either.
+    assert len(study().run(folder).runs) == 3 and len(list(Store.open(folder).runs())) == 4
+
+
+@pytest.mark.parametrize("how", ["two jobs", "threads", "processes"])
+def test_numbers_do_not_depend_on_who_makes_the_runs(made, tmp_path, how):
+    if how == "two jobs":
+        found = study().run(tmp_path / "out", jobs=2)
+    elif how == "threads":
+        with ThreadPoolExecutor(1) as threads:
+            found = study().run(tmp_path / "out", executor=threads)
+    else:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes:
+            found = study().run(tmp_path / "out", executor=processes)
+    expected = numbers(made[1])
+    assert found.finished == 3 and numbers(found).items() <= expected.items()
+
+
+# Seeds
+
+
+def test_seeds_depend_on_labels_and_number_alone():
+    one = study().cells[0]
+    several = study(solvers={"other": Plain(agents=5), "plain": Plain()}, transcriptions=["dfet:2x2", "dfet:3x2"], runs=9)
+    same = [cell for cell in several.cells if cell.labels == one.labels]
+    assert [cell.seed(1, 2) for cell in same] == [one.seed(1, 2)]
+    seeds = {cell.seed(1, run) for cell in several.cells for run in range(1, 10)}
+    assert len(seeds) == 4 * 9 and all(0 <= seed < 2**63 for seed in seeds)
+    assert one.seed(1, 1) != one.seed(2, 1)
+    assert one.seed(1, 1) == 9144903288234304347
+
+
+def test_the_same_transcription_has_the_same_label_however_it_is_given():
+    for given in (None, "dfet:2x2", DFET(2, 2), [DFET(2, 2)], {"glide": DFET(2, 2)}):
+        assert study(transcriptions=given).cells[0].labels == ("glide", "dfet:2x2", "plain")
+
+
+# What goes wrong in runs
+
+
+@pytest.fixture(scope="module")
+def troubled(tmp_path_factory):
+    """Every kind of failure beside runs that are none of these."""
+    folder = tmp_path_factory.mktemp("troubled")
+    lives = folder / "lives"
+    lives.write_bytes(b"x")
+    solvers = {
+        "crash": Crashing(),
+        "hang": Hanging(),
+        "hungry": Hungry(),
+        "dead": Dying(),
+        "once": Dying(lives=str(lives)),
+        "plain": Plain(),
+    }
+    trouble = study(solvers=solvers, runs=1, time_limit=5.0)
+    return trouble, folder / "out", trouble.run(folder / "out")
+
+
+def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(troubled):
+    _, _, summary = troubled
+    status = {cell.solver: [run.status for run in runs] for cell, runs in summary.cells.items()}
+    assert status == {
+        "crash": ["crashed"],
+        "hang": ["timeout"],
+        "hungry": ["out of memory"],
+        "dead": ["killed"],
+        # One whose process is killed is begun once more.
+        "once": ["finished"],
+        "plain": ["finished"],
+    }
+    run = {run.cell.solver: run for run in summary.runs}
+    assert run["crash"].message == "ArithmeticError: the root of all evil" and "misbehaving.py" in run["crash"].traceback
+    assert "more than 5 s" in run["hang"].message and "misbehaving.py" in run["hang"].traceback
+    assert 5.0 <= run["hang"].wall_time < 30.0
+    assert "SIGKILL" in run["dead"].message and "memory" in run["dead"].message
+    with pytest.raises(FileNotFoundError):
+        _ = run["dead"].front
+    text = str(summary)
+    assert "2 of 6 runs finished" in text and "run 1 of glide, dfet:2x2, crash: crashed: ArithmeticError: the root of all evil" in text
+
+
+def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(troubled):
+    trouble, folder, _ = troubled
+    before = stamps(folder)
+    asked = []
+
+    class Asked(Inline):
+        def submit(self, function, task):
+            asked.append(pickle.loads(task.payload)[2])
+            return super().submit(function, replace(task, payload=trouble.payloads["glide", "dfet:2x2", "crash"]))
+
+    trouble.run(folder, executor=Asked())
+    assert [type(one) for one in asked] == [Hanging, Hungry, Dying]
+    asked.clear()
+    trouble.run(folder, executor=Asked(), retry=True)
+    assert [type(one) for one in asked] == [Crashing, Hanging, Hungry, Dying] and stamps(folder) == before
+
+
+def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
+    first = study().run(tmp_path / "out", executor=Inline())
+    expected = numbers(first)
+    paths = [run.path for run in first.runs]
+    paths[0].write_bytes(paths[0].read_bytes()[:5000])
+    paths[1].unlink()
+    first.runs[2].path.with_suffix(".json").write_text("{ not", encoding="utf-8")
+    status = study().status(tmp_path / "out")
+    assert [run.status for run in status.runs] == ["unreadable", "missing", "finished"]
+    assert status.runs[2].history == {} and status.runs[2].wall_time == 0.0
+    assert "1 of 3 runs finished" in str(status) and "unreadable" in str(status)
+    again = study().run(tmp_path / "out", executor=Inline())
+    assert again.finished == 3 and paths[0].with_name("0001.nc.unreadable").stat().st_size == 5000
+    assert {key: value[0] for key, value in numbers(again).items()} == {key: value[0] for key, value in expected.items()}
+
+
+def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkeypatch):
+    import runs.store as store
+
+    real = store.write_whole
+    written = []
+
+    def full(path, content):
+        if str(path).endswith(".nc"):
+            if written:
+                raise OSError(errno.ENOSPC, f"cannot write '{path}': No space left on device")
+            written.append(path)
+        real(path, content)
+
+    monkeypatch.setattr(store, "write_whole", full)
+    with pytest.raises(OSError, match=r"cannot write '.*0002\.nc': No space left"):
+        study().run(tmp_path / "out", executor=Inline())
+    before = stamps(tmp_path)
+    assert len(before) == 1
+    monkeypatch.setattr(store, "write_whole", real)
+    assert study().run(tmp_path / "out", executor=Inline()).finished == 3 and before.items() <= stamps(tmp_path).items()
+
+
+# Killed and interrupted
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {here!r})
+from test_study import slow
+slow().run("out", jobs=2)
+"""
+
+
+def slow() -> Study:
+    return study(solvers={"slow": Slow()}, runs=8, evaluations=100)
+
+
+def started(folder: Path) -> subprocess.Popen:
+    return subprocess.Popen([sys.executable, "-c", SCRIPT.format(here=str(HERE))], cwd=folder, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(condition, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.02)
+
+
+def workers_of(pid: int) -> list[int]:
+    return [int(word) for word in subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout.split()]
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_kill_9_of_the_study_and_of_a_worker_loses_nothing(tmp_path):
+    coordinator = started(tmp_path)
+    out = tmp_path / "out"
+    wait_for(lambda: len(stamps(tmp_path)) >= 1)
+    # A second one in the same folder is refused while the first one lives.
+    with pytest.raises(ValueError, match="another process"):
+        slow().run(out)
+    workers = workers_of(coordinator.pid)
+    assert workers
+    os.kill(workers[0], signal.SIGKILL)
+    count = len(stamps(tmp_path))
+    wait_for(lambda: len(stamps(tmp_path)) >= min(count + 1, 4))
+    workers = workers_of(coordinator.pid)
+    coordinator.kill()
+    coordinator.communicate()
+    before = stamps(tmp_path)
+    assert 2 <= len(before) < 8
+    wait_for(lambda: not any(alive(pid) for pid in workers))
+    assert stamps(tmp_path) == before
+    resumed = slow().run(out, executor=Inline())
+    assert resumed.finished == 8 and before.items() <= stamps(tmp_path).items()
+    assert numbers(resumed) == numbers(slow().run(tmp_path / "uninterrupted", executor=Inline()))
+
+
+def test_ctrl_c_stops_promptly_and_keeps_what_is_finished(tmp_path):
+    coordinator = started(tmp_path)
+    wait_for(lambda: len(stamps(tmp_path)) >= 1)
+    workers = workers_of(coordinator.pid)
+    began = time.monotonic()
+    coordinator.send_signal(signal.SIGINT)
+    _, said = coordinator.communicate(timeout=20)
+    assert "KeyboardInterrupt" in said and time.monotonic() - began < 20
+    assert workers and not any(alive(pid) for pid in workers)
+    statuses = {run.status for run in slow().status(tmp_path / "out").runs}
+    assert statuses == {"finished", "missing"}
+
+
+# Wrong definitions
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"runs": 0}, "runs must be a whole number of at least 1"),
+        ({"runs": True}, "runs"),
+        ({"seed": -1}, "seed"),
+        ({"evaluations": 0}, "evaluations must be a whole number"),
+        ({"evaluations": {"glider": 10}}, "no problem 'glider'"),
+        ({"solvers": "mac"}, "did you mean macs"),
+        ({"solvers": {"a": {"solver": "macs", "agent": 10}}}, "setting of solver 'macs' 'agent', did you mean agents"),
+        ({"solvers": {"a": {"solver": "macs", "agents": 1}}}, "agents must be"),
+        ({"solvers": []}, "solvers: there are none"),
+        ({"solvers": [Plain(), Plain(agents=5)]}, "'plain' is there twice"),
+        ({"problems": "godard"}, "did you mean 'goddard'"),
+        ({"problems": {"a": 7}}, "'a' must be a name"),
+        ({"transcriptions": "dfat:4x6"}, "unknown transcription 'dfat:4x6'"),
+        ({"transcriptions": {"glide": "dfet:2x2", "other": "dfet:2x2"}}, "no problem 'other'"),
+        ({"transcriptions": 3}, "must be a word such as dfet:4x6"),
+        ({"inner": "autos"}, "unknown inner level 'autos', did you mean auto?"),
+        ({"tolerance": 0}, "tolerance must be a positive number"),
+        ({"time_limit": "long"}, "time_limit must be a positive number"),
+    ],
+)
+def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, words):
+    with pytest.raises(ValueError) as refused:
+        study(**changes)
+    assert words in str(refused.value) and "study 'glides'" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"seed": 2}, "seed is 1 there and 2 here"),
+        ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
+        ({"solvers": {"plain": Plain(agents=5)}}, "agents is 10 there and 5 here"),
+        ({"solvers": {"other": Plain()}}, "plain' is there but not here"),
+        ({"problems": {"glide": glide(speed=2.0)}}, "fingerprint"),
+        ({"tolerance": 1e-5}, "tolerance"),
+    ],
+)
+def test_another_study_in_the_same_folder_is_refused(made, changes, words):
+    before = stamps(made[0])
+    with pytest.raises(ValueError, match="holds another study") as refused:
+        study(**changes).run(made[0])
+    assert words in str(refused.value) and stamps(made[0]) == before
+
+
+def test_wrong_calls_of_run(tmp_path):
+    (tmp_path / "letter.txt").write_text("dear", encoding="utf-8")
+    for out, more, words in (
+        (tmp_path, {}, "other things, 'letter.txt'"),
+        (tmp_path / "letter.txt", {}, "not a folder"),
+        (tmp_path / "new", {"jobs": 0}, "jobs"),
+        (tmp_path / "new", {"executor": 4}, "executor"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            study().run(out, **more)
+    assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"format": "macs study"}', '{"format": "else"}'])
+def test_a_folder_that_cannot_be_read_is_one_clear_line(tmp_path, content):
+    if content is not None:
+        (tmp_path / "study.json").write_text(content, encoding="utf-8")
+    with pytest.raises(ValueError) as refused:
+        Store.open(tmp_path)
+    assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_what_other_processes_cannot_have_is_refused_before_any_work(monkeypatch):
+    monkeypatch.setattr(Plain, "__module__", "__main__")
+    with pytest.raises(ValueError, match="cannot import Plain from a script"):
+        study()
+
+
+def test_records_are_plain_text(made):
+    record = json.loads((made[0] / "study.json").read_text(encoding="utf-8"))
+    assert record["study"]["cells"][0]["problem"] == "glide" and record["study"]["seed"] == 1

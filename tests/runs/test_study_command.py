@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import io
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from runs import Study, studyfile
+from runs.cli import main
+from runs.store import Store
+from runs.watching import Watch
+from runs.work import Outcome
+
+GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")
+TOML = """
+description = "gliders"
+problems = ["glide.py:glide"]
+evaluations = 60
+runs = 2
+seed = 1
+
+[solvers.plain]
+solver = "macs"
+refine = false
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "glide.py").write_text(GLIDE, encoding="utf-8")
+    (tmp_path / "gliders.toml").write_text(TOML, encoding="utf-8")
+    return tmp_path
+
+
+def test_run_resume_and_status(capsys):
+    assert main(["study", "run", "gliders.toml", "--runs", "1"]) == 0
+    said = capsys.readouterr()
+    assert "1 of 1 runs finished" in said.out and "in out/gliders" in said.out and "gliders: 0 of 1 finished, 1 left" in said.err
+    path = next(Path("out/gliders").rglob("*.nc"))
+    stamp = path.stat().st_mtime_ns
+    assert main(["study", "status", "out/gliders"]) == 0
+    assert main(["study", "run", "gliders.toml", "--runs", "1"]) == 0
+    assert path.stat().st_mtime_ns == stamp
+    study = Study.load("gliders.toml")
+    assert (
+        study.name == "gliders" and study.runs == 2 and [run.status for run in study.status("out/gliders").runs] == ["finished", "missing"]
+    )
+    assert main(["study", "run", "gliders.toml", "--runs", "1", "--out", "."]) == 2
+    assert "holds no study but other things" in capsys.readouterr().err
+
+
+def test_status_says_what_is_wrong(capsys):
+    study = Study.load("gliders.toml")
+    with Store.claim("out", study.definition()) as store:
+        store.keep(study.cells[0], 1, Outcome("killed", "its process was killed by SIGKILL"))
+    assert main(["study", "status", "out"]) == 1
+    said = capsys.readouterr().out
+    assert "0 of 2 runs finished" in said and "killed by SIGKILL" in said
+    assert main(["study", "status", "nowhere"]) == 2
+    assert capsys.readouterr().err == "macs study status: there is no folder 'nowhere'\n"
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        (TOML.replace("runs = 2", "run = 2"), "unknown key 'run', did you mean runs?"),
+        (TOML.replace("runs = 2", "runs = 0"), "runs must be a whole number of at least 1, not 0"),
+        (TOML.replace("runs = 2", 'runs = "two"'), "runs must be a whole number"),
+        (TOML.replace("runs = 2", ""), "runs is missing"),
+        (TOML.replace('"macs"', '"mcas"'), "unknown solver 'mcas', did you mean macs?"),
+        (TOML.replace("refine", "refined"), "'refined', did you mean refine?"),
+        (TOML.replace("glide.py:glide", "glide.py:glider"), "has no function 'glider'"),
+        (TOML.replace("glide.py:glide", "glides.py:glide"), "there is no file 'glides.py'"),
+        ("runs = ", "it is not TOML"),
+    ],
+)
+def test_a_wrong_file_is_one_line_before_any_work(here, capsys, toml, words):
+    (here / "gliders.toml").write_text(toml, encoding="utf-8")
+    assert main(["study", "run", "gliders.toml"]) == 2
+    said = capsys.readouterr()
+    assert words in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (["gliderz"], "unknown study 'gliderz'"),
+        (["goddard-table-3"], "did you mean goddard-table3?"),
+        (["nothing.toml"], "there is no file 'nothing.toml'"),
+        (["gliders.toml", "--jobs", "2", "--dask", "tcp://localhost:1"], "give one of them"),
+        (["gliders.toml", "--runs", "0"], "not a whole number above 0"),
+        (["gliders.toml", "--job", "2"], "did you mean --jobs?"),
+    ],
+)
+def test_a_wrong_call_is_one_line(here, capsys, call, words):
+    try:
+        code = main(["study", "run", *call])
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr()
+    assert code == 2 and words in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
+
+
+def test_ctrl_c_says_how_to_go_on(here):
+    (here / "gliders.toml").write_text(TOML.replace("60", "2_000_000"), encoding="utf-8")
+    call = [sys.executable, "-m", "runs.cli", "study", "run", "gliders.toml"]
+    process = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
+    while not (here / "out/gliders/study.json").exists():
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=20)[1]
+    assert process.returncode == 130 and "the same command goes on" in said and "Traceback" not in said
+
+
+def test_studies_are_listed_and_reproduce_the_published_table(capsys):
+    assert main(["list"]) == 0
+    said = capsys.readouterr().out
+    for name in ("goddard-table3", "orbit-table3", "orbit-full-table3"):
+        study = Study.load(name)
+        assert name in said and study.name == name and study.runs == 30 and len(study.cells) == 1
+        paper = study.paper[study.cells[0].problem]
+        # Table III.
+        published = (5.701e-3, 1.107e-5, 2.588e-2, 1.909e-5, 2456) if "goddard" in name else (7.384e-4, 4.217e-7, 5.179e-3, 5.052e-6, 41113)
+        assert tuple(paper[key] for key in ("gd_mean", "gd_variance", "igd_mean", "igd_variance", "seconds")) == published
+        assert study.cells[0].evaluations == (10_000 if "goddard" in name else 50_000)
+    quick = Study.load("orbit-table3").quick()
+    assert quick.name == "orbit-table3-quick" and quick.runs == 2 and quick.cells[0].evaluations == 500
+    assert set(studyfile.names()) >= {"goddard-table3", "orbit-table3", "orbit-full-table3"}
+
+
+def test_problems_transcriptions_and_budgets_may_be_given_each_by_name(here):
+    toml = """
+    problems = {fast = {problem = "glide.py:glide", speed = 4.0}, slow = {problem = "glide.py:glide", speed = 2.0}}
+    transcriptions = {fast = ["dfet:2x2", "dfet:3x2"], slow = "dfet:1x4"}
+    evaluations = {fast = 50, slow = 60}
+    solvers = ["macs"]
+    runs = 2
+    seed = 0
+    """
+    (here / "two.toml").write_text(toml, encoding="utf-8")
+    cells = Study.load("two.toml").cells
+    assert [(*cell.labels, cell.evaluations) for cell in cells] == [
+        ("fast", "dfet:2x2", "macs", 50),
+        ("fast", "dfet:3x2", "macs", 50),
+        ("slow", "dfet:1x4", "macs", 60),
+    ]
+    assert cells[0].details["problem"]["fingerprint"] != cells[2].details["problem"]["fingerprint"]
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_sees_the_runs_that_are_going_on(here):
+    study = Study.load("gliders.toml")
+    with Store.claim("out", study.definition()) as store:
+        runs = list(store.runs())
+    stream = Terminal()
+    with Watch("gliders", runs, runs, shown=True, stream=stream) as watch:
+        watch.reporter(runs[1])(40, 1.0)
+        watch.ended(runs[0], Outcome("crashed", "ValueError: no [such] thing"))
+    said = stream.getvalue()
+    assert "run 2" in said and "40 / 60 evaluations" in said and "1 failed, 1 left" in said
+    assert "run 1 of glide.py:glide, dfet:2x2, plain crashed: ValueError: no [such] thing" in " ".join(said.split())

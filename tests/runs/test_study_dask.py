@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed")
+
+from test_study import Inline, numbers, slow, stamps, wait_for
+
+from runs.cli import main
+from runs.cluster import cluster
+from runs.executing import Deserted
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    """A scheduler and two workers, processes of their own; with their address."""
+    processes, environment = [], {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [*sys.path, os.environ.get("PYTHONPATH")]))}
+
+    def start(*call: str) -> subprocess.Popen:
+        log = (tmp_path / f"{len(processes)}.log").open("w")
+        command = [sys.executable, "-m", "distributed.cli." + call[0], *call[1:]]
+        processes.append(subprocess.Popen(command, stderr=log, stdout=log, cwd=tmp_path, env=environment))
+        return processes[-1]
+
+    start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    said = tmp_path / "0.log"
+    wait_for(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text()))
+    address = re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())[1]
+    for _ in range(2):
+        start("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+    yield address, processes
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(scheduler, tmp_path):
+    address, (_, first, _) = scheduler
+
+    def kill():
+        wait_for(lambda: len(stamps(tmp_path)) >= 1)
+        os.kill(first.pid, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with cluster(address) as executor:
+        summary = slow().run(tmp_path / "out", executor=executor)
+    killer.join()
+    assert summary.finished == 8 and first.wait(timeout=5) == -signal.SIGKILL
+    assert numbers(summary) == numbers(slow().run(tmp_path / "here", executor=Inline()))
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_loses_nothing_that_is_finished(scheduler, tmp_path):
+    address, (main_process, *_) = scheduler
+
+    def kill():
+        wait_for(lambda: len(stamps(tmp_path)) >= 1)
+        main_process.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    began = time.monotonic()
+    with pytest.raises(Deserted, match="the same again goes on"), cluster(address) as executor:
+        slow().run(tmp_path / "out", executor=executor)
+    killer.join()
+    assert time.monotonic() - began < 90
+    before = stamps(tmp_path)
+    assert before
+    assert slow().run(tmp_path / "out", executor=Inline()).finished == 8 and before.items() <= stamps(tmp_path).items()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://here", "127.0.0.1:notaport"])
+def test_an_address_that_nobody_answers_is_one_line_within_seconds(tmp_path, monkeypatch, capfd, address):
+    monkeypatch.chdir(tmp_path)
+    began = time.monotonic()
+    assert main(["study", "run", "goddard-table3", "--dask", address]) == 2
+    assert time.monotonic() - began < 20
+    said = capfd.readouterr()
+    assert said.err.count("\n") == 1 and address in said.err and not Path("out").exists()
