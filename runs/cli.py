@@ -35,6 +35,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 
 inner   how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 search  MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+study   a study with two processes against one, and how much longer it takes than its runs do
 
 A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
 machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
@@ -186,9 +187,9 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|search", nargs="?", help="which one (default: both)")
+    bench.add_argument("what", metavar="inner|search|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
-        "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: both within a minute, with more spread"
+        "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
     bench.add_argument("--csv", metavar="FILE", help="write what was measured to a file too, one number a line")
 

@@ -132,8 +132,6 @@ def bench(arguments: Namespace) -> int:
     """Ratios against the alternatives."""
     from . import bench as benchmarks
 
-    if arguments.what == "study":
-        raise WrongCall("studies are not benchmarked yet; there are inner, search")
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)

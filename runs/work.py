@@ -82,11 +82,9 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         content = to_bytes(front)
         history.add(front.stats, front.stats["wall_time"], front.F)
         return Outcome(FINISHED, front.message, front=content, wall_time=time.perf_counter() - began, history=history.columns)
-    except MemoryError as error:
-        status, why = MEMORY, str(error)
     except Exception as error:
-        status, why = CRASHED, f"{type(error).__name__}: {error}"
-    return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
+        status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
+        return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
 
 
 @lru_cache(maxsize=1)

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 from macs.monitor import Stopped
 
-from . import inner, search
+from . import inner, search, study
 from .measured import Row, save
 
-KINDS = ("inner", "search")
+KINDS = ("inner", "search", "study")
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
@@ -22,7 +22,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
         ended = _run(kind, rows, quick)
         measured += [(kind, row) for row in rows]
         if rows:
-            print({"inner": inner.report, "search": search.report}[kind](rows), end="\n\n", flush=True)
+            print({"inner": inner.report, "search": search.report, "study": study.report}[kind](rows), end="\n\n", flush=True)
         if ended:
             print("interrupted: this is what there was to say by then", file=sys.stderr)
             break
@@ -37,6 +37,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     work: dict[str, Callable[[], None]] = {
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
+        "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),
     }
     try:
         work[kind]()

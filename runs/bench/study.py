@@ -1,0 +1,86 @@
+"""Studies: two processes against one, and what a study takes beyond its runs."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..study import Study
+from .measured import Column, Row, short, table
+from .steps import Steps
+
+ONE, TWO = "one process", "two processes"
+FASTER, BEYOND = 1.7, 0.05
+"""What is asked: how many times as fast two processes are at least, and what share of its runs' time a study takes beyond it at most."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured: rounds, runs in each, an even number, and the evaluations of a run."""
+
+    rounds: int = 3
+    runs: int = 8
+    evaluations: int = 5_000
+
+
+QUICK = Effort(rounds=1, runs=6, evaluations=500)
+
+
+def bench_study(rows: list[Row], effort: Effort) -> None:
+    """Measure; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    batch = Study("bench", problems="goddard", solvers="macs", evaluations=effort.evaluations, runs=effort.runs, seed=1)
+    case = f"goddard, {effort.runs} runs of {effort.evaluations}"
+    pair = {1: Row(case, ONE), 2: Row(case, TWO)}
+    with Steps("studies", 2 * effort.rounds) as steps:
+        for i in range(effort.rounds):
+            taken = {}
+            # Nobody is always the first.
+            for jobs in (1, 2) if i % 2 == 0 else (2, 1):
+                steps.begin(f"{pair[jobs].who}, round {i + 1}")
+                taken[jobs] = _timed(batch, jobs)
+            for jobs, (seconds, work) in taken.items():
+                pair[jobs].add(speed=taken[1][0] / seconds, seconds=seconds, work=work / taken[1][1], beyond=jobs * seconds / work - 1.0)
+            if i == 0:
+                rows += pair.values()
+
+
+def _timed(batch: Study, jobs: int) -> tuple[float, float]:
+    """Seconds of a study, and of all its runs together."""
+    with tempfile.TemporaryDirectory(prefix="macs_") as folder:
+        began = time.perf_counter()
+        summary = batch.run(Path(folder) / "out", jobs=jobs)
+        seconds = time.perf_counter() - began
+    if summary.finished < len(summary.runs):
+        raise RuntimeError(f"runs failed, so there is nothing to compare: {next(run.message for run in summary.runs if not run.finished)}")
+    return seconds, float(np.sum([run.wall_time for run in summary.runs]))
+
+
+def report(rows: Sequence[Row]) -> str:
+    """What was measured, and what was asked."""
+    found = {row.who: row for row in rows}
+    speed, beyond = found[TWO].of("speed"), found[ONE].of("beyond")
+    lines = [
+        "STUDIES: a whole study with two processes against one, in turn; median, least and greatest of few rounds. Runs' time: that of all",
+        "runs together, as multiples of what they take one at a time; above 1, runs that go on side by side slow each other down. Beyond:",
+        "what the study takes beyond its runs' time, as a share of it: starting processes, writing files, waiting for the last run.",
+        "",
+        table(rows, COLUMNS),
+        "",
+        f"two processes: asked at least {FASTER} times as fast, measured {short(speed)}, {'met' if speed >= FASTER else 'MISSED'}",
+        f"one process: asked at most {100 * BEYOND:g} % beyond, measured {100 * beyond:.1f} %, {'met' if beyond <= BEYOND else 'MISSED'}",
+    ]
+    return "\n".join(lines)
+
+
+COLUMNS: tuple[Column, ...] = (
+    ("times as", "fast", lambda row: row.spread("speed") if row.who == TWO else "1"),
+    ("runs'", "time", lambda row: row.spread("work") if row.who == TWO else "1"),
+    ("beyond", "", lambda row: f"{100 * row.of('beyond'):.1f} %"),
+    ("s", "", lambda row: short(row.of("seconds"))),
+    ("", "rounds", lambda row: str(len(row.values["speed"]))),
+)
