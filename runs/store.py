@@ -18,6 +18,7 @@ from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from macs.front import Front
 from macs.storage import write_whole
@@ -230,7 +231,7 @@ class Store:
         if path.exists():
             status = FINISHED
             try:
-                Front.load(path)
+                _check(path, record)
             except (ValueError, OSError) as error:
                 status, message = UNREADABLE, str(error)
         elif status not in (CRASHED, TIMEOUT, MEMORY, KILLED):
@@ -265,12 +266,19 @@ class Store:
         front.parent.mkdir(exist_ok=True)
         about = {"status": outcome.status, "message": outcome.message, "seed": cell.seed(self.definition["seed"], number)}
         about |= {"wall_time": outcome.wall_time, "traceback": outcome.traceback, "history": outcome.history}
+        about |= {"crc32": crc32(outcome.front)} if outcome.status == FINISHED else {}
         write_whole(record, json.dumps(about).encode())
         if outcome.status == FINISHED:
             if front.exists():
                 # Nobody could read it, but it is not ours to throw away.
                 front.replace(front.with_name(f"{front.name}.unreadable"))
             write_whole(front, outcome.front)
+
+
+def _check(path: Path, record: Mapping[str, Any]) -> None:
+    """Raise ValueError or OSError unless a front can be read: at once, where its content is what was written; else by reading it."""
+    if crc32(path.read_bytes()) != record.get("crc32"):
+        Front.load(path)
 
 
 def _record(path: Path) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import pytest
 
 from macs.monitor import Stopped
 from problems import goddard, load
-from runs.bench import command, inner, search
+from runs.bench import command, inner, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.bench.steps import Steps
@@ -42,6 +42,7 @@ def coarse(name):
 @pytest.fixture
 def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
+    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
@@ -97,11 +98,12 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    assert said.out.index("INNER LEVELS") < said.out.index("SEARCHES") < said.out.index(f"values in {path}")
+    assert said.out.index("INNER LEVELS") < said.out.index("SEARCHES") < said.out.index("STUDIES") < said.out.index(f"values in {path}")
+    assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "search"}
+    assert {row["benchmark"] for row in table} == {"inner", "search", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -136,7 +138,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "study"], ["studies", "not", "inner, search"]),
+        (["bench", "studies"], ["studies", "study", "inner, search"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],
