@@ -16,9 +16,10 @@ from transcription import DFET, Transcription, parse
 
 from .cell import Cell
 from .studyfile import plain, told
+from .work import Payload
 
 
-def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) -> list[tuple[Cell, bytes]]:
+def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) -> list[tuple[Cell, Payload]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
 
     Parameters are those of `Study`. Raises ValueError that names what makes no sense.
@@ -31,6 +32,7 @@ def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) 
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
         for scheme_label, scheme in schemes[label].items():
+            stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
             for method_label, method in methods.items():
                 place = f"{label}, {scheme_label}, {method_label}"
                 with told(place):
@@ -38,7 +40,7 @@ def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) 
                     method.check_transcription(scheme)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
                 cell = Cell(label, scheme_label, method_label, budgets[label], plain(details))
-                combined.append((cell, _pickled(place, (compiled, scheme, method))))
+                combined.append((cell, (stated_so, _pickled(place, method))))
     return combined
 
 
@@ -163,12 +165,12 @@ def _own(what: str, label: str, problem: Problem | CompiledProblem, name: str) -
     return getattr(problem, name)
 
 
-def _pickled(place: str, what: Any) -> bytes:
-    """Bytes that another process can make the same of."""
+def _pickled(place: str, *what: Any) -> bytes:
+    """Bytes that another process can make the same of: one thing, or a tuple of several."""
     for one in what:
         if type(one).__module__ == "__main__":
             raise ValueError(f"{place}: other processes cannot import {type(one).__name__} from a script; put it into a module of its own")
     try:
-        return pickle.dumps(what)
+        return pickle.dumps(what if len(what) > 1 else what[0])
     except Exception as error:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error

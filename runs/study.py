@@ -14,6 +14,7 @@ from transcription.inner import NAMED
 from . import combining, studyfile
 from .cell import Cell
 from .store import Store, Summary
+from .work import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS = 2, 500
 
@@ -77,8 +78,8 @@ class Study:
     paper: Mapping[str, Any] = field(default_factory=dict)
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
-    payloads: Mapping[tuple[str, str, str], bytes] = field(init=False, repr=False)
-    """By labels of a cell: its problem, transcription and solver, pickled for the processes that run them."""
+    payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
+    """By labels of a cell: its problem and transcription, and its solver, pickled for the processes that run them."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():

@@ -16,15 +16,16 @@ SAMPLES = 30
 EVERY = 0.25
 """Seconds between reports."""
 
+Payload = tuple[bytes, bytes]
 Report = Callable[[int, float], Any]
 """Called now and then with evaluations and seconds spent so far."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A run to be made: `payload` is its problem, transcription and solver, pickled."""
+    """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled."""
 
-    payload: bytes = field(repr=False)
+    payload: Payload = field(repr=False)
     evaluations: int
     seed: int
     inner: str
@@ -64,7 +65,8 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
     began = time.perf_counter()
     history = _History(task.evaluations, report)
     try:
-        problem, scheme, solver = _unpacked(task.payload)
+        problem, scheme = _unpacked(task.payload[0])
+        solver = pickle.loads(task.payload[1])
         front = solver.solve(
             problem,
             scheme,
@@ -87,14 +89,14 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
 
 
-@lru_cache(maxsize=1)
-def _unpacked(payload: bytes) -> tuple[Any, Any, Any]:
-    """Problem, transcription and solver; the runs of a cell that one process makes share an NLP, and all that is compiled of it."""
-    problem, scheme, solver = pickle.loads(payload)
+@lru_cache(maxsize=8)
+def _unpacked(payload: bytes) -> tuple[Any, Any]:
+    """Problem and transcription; the runs that one process makes of them share an NLP, and all that is compiled of it."""
+    problem, scheme = pickle.loads(payload)
     nlp = scheme.transcribe(problem)
     # It hides the method in this one value, which nobody else has.
     object.__setattr__(scheme, "transcribe", lambda _: nlp)
-    return problem, scheme, solver
+    return problem, scheme
 
 
 class _History:

@@ -67,7 +67,8 @@ def report(rows: Sequence[Row]) -> str:
     lines = [
         "STUDIES: a whole study with two processes against one, in turn; median, least and greatest of few rounds. Runs' time: that of all",
         "runs together, as multiples of what they take one at a time; above 1, runs that go on side by side slow each other down. Beyond:",
-        "what the study takes beyond its runs' time, as a share of it: starting processes, writing files, waiting for the last run.",
+        "what the study takes beyond its runs' time, as a share of it: writing files, waiting for the last run, and a second or two for",
+        "each process to start once, which weighs more here than in a study of many long runs.",
         "",
         table(rows, COLUMNS),
         "",

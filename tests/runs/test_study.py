@@ -185,7 +185,7 @@ def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(trouble
 
     class Asked(Inline):
         def submit(self, function, task):
-            asked.append(pickle.loads(task.payload)[2])
+            asked.append(pickle.loads(task.payload[1]))
             return super().submit(function, replace(task, payload=trouble.payloads["glide", "dfet:2x2", "crash"]))
 
     trouble.run(folder, executor=Asked())
@@ -293,6 +293,7 @@ def test_kill_9_of_the_study_and_of_a_worker_loses_nothing(tmp_path):
     assert numbers(resumed) == numbers(slow().run(tmp_path / "uninterrupted", executor=Inline()))
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_promptly_and_keeps_what_is_finished(tmp_path):
     coordinator = started(tmp_path)
     wait_for(lambda: len(stamps(tmp_path)) >= 1)
