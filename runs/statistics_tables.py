@@ -30,8 +30,9 @@ def summary_table(
     failed = any(row[3] for row in rows)
     told = [f"Variance with divisor n - {ddof}." if ddof else "Variance with divisor n."]
     told += ["Mean and variance are of the runs that did not fail; in all other columns failed runs are worse than any."] if failed else []
-    heads = ["runs", "failed", "mean", "variance", "median", "lower quartile", "upper quartile", "best", "worst"]
-    return table([Column("indicator", grouped=True), "solver", *heads], rows, caption, [*told, *notes])
+    heads = [Column(name, digits=4) for name in ("median", "lower quartile", "upper quartile", "best", "worst")]
+    first = [Column("indicator", grouped=True), "solver", "runs", "failed", Column("mean", digits=4), "variance"]
+    return table([*first, *heads], rows, caption, [*told, *notes])
 
 
 def comparison_table(

@@ -1,0 +1,118 @@
+"""Flights side by side: the states and controls of a few points of a front, beside laws that are known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from macs.archive import spread
+from macs.drawing import along, quantities
+from macs.evaluation import CONVERGED
+from macs.front import Front
+from macs.plotting import COLORS, label
+from macs.point import Point
+
+from .indicators import normalised
+from .plots import PAGE, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Law = tuple[np.ndarray, Mapping[str, np.ndarray]]
+"""A flight that is known: times (n,) and values (n,) by name, in the units of the problem."""
+
+
+def representatives(front: Front, count: int = 4) -> list[int]:
+    """Numbers of `count` converged points that stand for a front: the best of each objective, and others spread evenly between them."""
+    good = np.flatnonzero(front.status == CONVERGED)
+    F = front.F[good]
+    if len(F) <= count:
+        return good.tolist()
+    return sorted(good[spread(normalised(F, F)[0], count)].tolist())
+
+
+def flights_figure(
+    points: Sequence[Point],
+    *,
+    laws: Sequence[Law | None] = (),
+    names: Sequence[str] = (),
+    law_name: str = "analytic law",
+    solver: str = "",
+) -> Figure:
+    """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
+
+    Parameters
+    ----------
+    points : Points of one problem, of one to six
+        With trajectories.
+    laws : as many (times, {name: values}), or None
+        What to draw beside each point, dashed; names that a law does not hold are left out.
+    names : sequence of str, optional
+        Which states, controls and path constraints to draw, in that order; all states and controls by default.
+    law_name, solver : str
+        For the legend.
+
+    Raises
+    ------
+    ValueError
+        If there is no point, or one has no trajectory, or has not what is asked for.
+    """
+    _check(points, laws)
+    # What `_check` let pass has trajectories.
+    flights = [point.trajectory for point in points if point.trajectory is not None]
+    known = dict(quantities(flights[0]))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"there is no '{unknown[0]}' to draw; there are {', '.join(known)}")
+    rows = list(names) or [name for name, kind in known.items() if kind != "path"]
+    units = {v.name: v.unit for phase in flights[0].phases for v in (*phase.state_variables, *phase.control_variables)}
+    with style():
+        figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
+        grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
+        for column, (point, flight) in enumerate(zip(points, flights, strict=True)):
+            for ax, name in zip(grid[:, column], rows, strict=True):
+                for k, phase in enumerate(flight.phases):
+                    if name in phase.names:
+                        ax.plot(*along(phase, name), color=COLORS[k % len(COLORS)], lw=1.3)
+                law = laws[column] if column < len(laws) else None
+                if law is not None and name in law[1]:
+                    ax.plot(law[0], law[1][name], color="black", lw=0.9, ls=(0, (4, 2)), zorder=3)
+                ax.margins(x=0.0)
+            grid[0, column].set_title(_title(column + 1, point), loc="left", fontsize=7)
+        for ax, name in zip(grid[:, 0], rows, strict=True):
+            ax.set_ylabel(label(name, units.get(name, "")))
+        figure.align_ylabels(grid[:, 0])
+        unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
+        figure.supxlabel(label("time", unit), fontsize=8)
+        _legend(figure, flights[0], any(law is not None for law in laws), law_name, solver)
+    return figure
+
+
+def _check(points: Sequence[Point], laws: Sequence[Law | None]) -> None:
+    if not 1 <= len(points) <= 6:
+        raise ValueError(f"flights are drawn side by side of one to six points, not of {len(points)}")
+    for number, point in enumerate(points, 1):
+        if point.trajectory is None:
+            raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
+    if len(laws) not in (0, len(points)):
+        raise ValueError(f"{len(laws)} laws do not stand beside {len(points)} points; give None where there is none")
+
+
+def _title(number: int, point: Point) -> str:
+    goals = point._front.goals
+    lines = [f"{goal.name} {point.objectives[goal.name]:.5g}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
+    return "\n".join([f"point {number}", *lines])
+
+
+def _legend(figure: Any, flight: Any, with_law: bool, law_name: str, solver: str) -> None:
+    """Phases if there are several; else the solver, if it is named; and the law."""
+    from matplotlib.lines import Line2D
+
+    named = list(flight) if len(flight) > 1 else [solver] if solver or with_law else []
+    handles = [Line2D([], [], color=COLORS[k % len(COLORS)], lw=1.3, label=name or "found") for k, name in enumerate(named)]
+    if with_law:
+        handles.append(Line2D([], [], color="black", lw=0.9, ls=(0, (4, 2)), label=law_name))
+    if handles:
+        figure.legend(handles=handles, loc="outside upper right", ncols=len(handles), frameon=False)
