@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,6 +60,8 @@ def flights_figure(
     ValueError
         If there is no point, or one has no trajectory, or has not what is asked for.
     """
+    from matplotlib.ticker import MaxNLocator
+
     _check(points, laws)
     # What `_check` let pass has trajectories.
     flights = [point.trajectory for point in points if point.trajectory is not None]
@@ -80,9 +83,12 @@ def flights_figure(
                 if law is not None and name in law[1]:
                     ax.plot(law[0], law[1][name], color="black", lw=0.9, ls=(0, (4, 2)), zorder=3)
                 ax.margins(x=0.0)
-            grid[0, column].set_title(_title(column + 1, point), loc="left", fontsize=7)
+            grid[0, column].set_title(_title(column + 1, point, round(60 / len(points)) + 10), loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
             ax.set_ylabel(label(name, units.get(name, "")))
+            ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        for ax in grid[-1]:
+            ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         figure.align_ylabels(grid[:, 0])
         unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
         figure.supxlabel(label("time", unit), fontsize=8)
@@ -100,10 +106,12 @@ def _check(points: Sequence[Point], laws: Sequence[Law | None]) -> None:
         raise ValueError(f"{len(laws)} laws do not stand beside {len(points)} points; give None where there is none")
 
 
-def _title(number: int, point: Point) -> str:
+def _title(number: int, point: Point, width: int) -> str:
+    """The point's number and objectives, in lines of at most so many characters."""
     goals = point._front.goals
-    lines = [f"{goal.name} {point.objectives[goal.name]:.5g}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
-    return "\n".join([f"point {number}", *lines])
+    values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
+    lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
+    return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
 
 
 def _legend(figure: Any, flight: Any, with_law: bool, law_name: str, solver: str) -> None:

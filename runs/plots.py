@@ -94,7 +94,7 @@ def front_figure(
                 points_style = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
             if marked is not None:
-                _mark(ax, minimised(marked, known) * _signs(known), (i, j))
+                _mark(ax, minimised(marked, known) * _signs(known), _signs(known), (i, j))
             _label(ax, known, i, j)
         if len(pairs) == 1:
             grid[0].legend(frameon=False, loc="best")
@@ -204,14 +204,27 @@ def convergence_figure(
             ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
         if log:
             ax.set_yscale("log")
+            _log_ticks(ax, high / low)
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
         ax.set_xlim(0, last)
         ax.set_xlabel(xlabel)
         ax.set_ylabel(ylabel)
-        ax.legend(frameon=False, loc="lower right" if larger else "upper right", title="median, quartiles", alignment="left")
+        ax.legend(
+            frameon=False, loc="lower right" if larger else "upper right", title="median, quartiles", alignment="left", title_fontsize=7
+        )
     return figure
+
+
+def _log_ticks(ax: Any, ratio: float) -> None:
+    """Of less than two decades, plain numbers at 1, 2 and 5 of each; powers of ten otherwise."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if ratio < 100:
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio > 5 else tuple(range(1, 10))))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _known(points: Sequence[Points | None], goals: Sequence[Objective]) -> Front:
@@ -220,7 +233,7 @@ def _known(points: Sequence[Points | None], goals: Sequence[Objective]) -> Front
     if found is not None:
         return found
     if not goals:
-        m = next((np.shape(one)[1] for one in points if one is not None and np.ndim(one) == 2), 0)
+        m = next((one.shape[1] for one in points if isinstance(one, np.ndarray) and one.ndim == 2), 0)
         goals = [Objective(f"objective {i + 1}") for i in range(m)]
     if len(goals) < 2:
         raise ValueError("there are no fronts of two or more objectives to draw")
@@ -252,11 +265,14 @@ def _draw_truth(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int,
         ax.plot(values[:, i], values[:, j], ".", color=GREY, ms=2.0, zorder=1, label=name)
 
 
-def _mark(ax: Any, values: np.ndarray, pair: tuple[int, int]) -> None:
-    x, y = values[:, pair[0]], values[:, pair[1]]
-    ax.plot(x, y, "+", color="black", ms=8, mew=1.2, zorder=5)
-    for number, place in enumerate(zip(x, y, strict=True), 1):
-        ax.annotate(str(number), place, xytext=(4, 4), textcoords="offset points", fontsize=7, zorder=6)
+def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int]) -> None:
+    """Crosses, and numbers on their better side, where no point can be in the way."""
+    i, j = pair
+    ax.plot(values[:, i], values[:, j], "+", color="black", ms=7, mew=1.0, zorder=5)
+    sides = {"ha": "right" if signs[i] > 0 else "left", "va": "top" if signs[j] > 0 else "bottom"}
+    for number, place in enumerate(values[:, [i, j]], 1):
+        ax.annotate(str(number), place, xytext=(-3 * signs[i], -3 * signs[j]), textcoords="offset points", fontsize=7, zorder=6, **sides)
+    ax.margins(0.07)
 
 
 def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -> None:

@@ -31,7 +31,7 @@ def summary_table(
     told = [f"Variance with divisor n - {ddof}." if ddof else "Variance with divisor n."]
     told += ["Mean and variance are of the runs that did not fail; in all other columns failed runs are worse than any."] if failed else []
     heads = [Column(name, digits=4) for name in ("median", "lower quartile", "upper quartile", "best", "worst")]
-    first = [Column("indicator", grouped=True), "solver", "runs", "failed", Column("mean", digits=4), "variance"]
+    first: list[Column | str] = [Column("indicator", grouped=True), "solver", "runs", "failed", Column("mean", digits=4), "variance"]
     return table([*first, *heads], rows, caption, [*told, *notes])
 
 
