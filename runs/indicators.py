@@ -118,7 +118,9 @@ def minimised(points: Points, known: Front | None, what: str = "the front") -> n
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
         raise ValueError(f"row {bad[0]} of {what} is not finite: {rows[bad[0]].tolist()}; a failed point is no point of a front")
-    if known is None or not rows.size:
+    if not rows.size:
+        return rows if known is None else np.empty((0, len(known.goals)))
+    if known is None:
         return rows
     if rows.shape[1] != len(known.goals):
         raise ValueError(f"{what} has {rows.shape[1]} objectives, the other {len(known.goals)}: {', '.join(known.names)}")

@@ -11,7 +11,7 @@ from synthetic_fronts import flights
 from problems import goddard
 from problems.compiled import Objective
 from runs.attainment import attainment
-from runs.flight_plots import flights_figure, representatives
+from runs.flight_plots import flights_figure, paths_figure, representatives
 from runs.plots import attainment_figure, convergence_figure, front_figure
 from runs.references import foreign
 
@@ -42,6 +42,11 @@ def test_all_points_of_all_runs_and_the_truth(tmp_path):
     assert [text.get_text() for text in ax.texts] == ["1"]
     figure.savefig(tmp_path / "fronts.pdf")
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_arrays_without_a_shape_of_their_own_are_empty_runs():
+    figure = front_figure({"ours": [foreign(A, GOALS), np.empty((0, 0))]})
+    assert words(figure) == ["ours, 2 runs (1 empty)"]
 
 
 def test_a_truth_of_few_points_is_no_line():
@@ -102,6 +107,20 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     assert figure.axes[0].get_title(loc="left").startswith("point 1\ntime ")
     figure.savefig(tmp_path / "flights.png")
     assert len(flights_figure([front[0]], names=["load"]).axes) == 1
+
+
+def test_paths_in_one_picture():
+    front = flights(3)
+    law = (np.array([0.0, 1.0]), {"h": np.array([1.0, 2.0])})
+    figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws=[None, law])
+    (ax,) = figure.axes
+    drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
+    assert len(drawn) == 8, "two phases and an end each, a law and its entry in the legend"
+    assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
+    assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
+    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws=[(law[0], {})]).axes[0].get_lines()) == 3
+    with pytest.raises(ValueError, match="no 'w' to draw"):
+        paths_figure([front[0]], "h", "w")
 
 
 def test_flights_that_cannot_be_drawn():
