@@ -16,7 +16,7 @@ from macs.plotting import COLORS, label
 from macs.point import Point
 
 from .indicators import normalised
-from .plots import COLUMN, PAGE, new_figure, style
+from .paper import COLUMN, PAGE, new_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

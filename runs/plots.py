@@ -12,46 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from macs.front import Front
-from macs.plotting import COLORS, GREY, STYLE, better, blank_figure
+from macs.plotting import COLORS, GREY, better
 from problems.compiled import Objective
 
 from .attainment import Attainment, staircase
 from .convergence import History, band
 from .indicators import Points, minimised, pieces, truth
+from .paper import COLUMN, PAGE, legend, new_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLUMN, PAGE = 3.5, 7.2
-"""Inches: the width of a column, and of a page of two."""
-PAPER: dict[str, Any] = {
-    **STYLE,
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
-    "legend.fontsize": 7.0,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "axes.linewidth": 0.6,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.handlelength": 1.6,
-}
 MARKERS = "o^sDvP*"
-
-
-def style() -> Any:
-    """A context in which figures are drawn as papers want them."""
-    import matplotlib
-
-    return matplotlib.rc_context(PAPER)  # type: ignore[arg-type]
-
-
-def new_figure(width: float, height: float) -> Any:
-    """A figure of no window."""
-    figure = blank_figure()
-    figure.set_size_inches(width, height)
-    return figure
 
 
 def front_figure(
@@ -96,11 +68,7 @@ def front_figure(
             if marked is not None:
                 _mark(ax, minimised(marked, known) * _signs(known), _signs(known), (i, j))
             _label(ax, known, i, j)
-        if len(pairs) == 1:
-            grid[0].legend(frameon=False, loc="best")
-        else:
-            handles, names = grid[0].get_legend_handles_labels()
-            figure.legend(handles, names, loc="outside upper left", ncols=len(names), frameon=False)
+        legend(figure, grid[0], "best" if len(pairs) == 1 else None)
     return figure
 
 
@@ -211,9 +179,7 @@ def convergence_figure(
         ax.set_xlim(0, last)
         ax.set_xlabel(xlabel)
         ax.set_ylabel(ylabel)
-        ax.legend(
-            frameon=False, loc="lower right" if larger else "upper right", title="median, quartiles", alignment="left", title_fontsize=7
-        )
+        legend(figure, ax, "lower right" if larger else "upper right", "median, quartiles")
     return figure
 
 
@@ -277,16 +243,16 @@ def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int])
 
 def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -> None:
     drawn = {}
-    for name, corners, style in (
+    for name, corners, look in (
         ("best", surface.best, {"lw": 0.8, "ls": "--"}),
         ("median", surface.median, {"lw": 1.4, "ls": "-"}),
         ("worst", surface.worst, {"lw": 0.8, "ls": ":"}),
     ):
         if len(corners):
             drawn[name] = staircase(corners, surface.signs, ends)
-            ax.plot(*drawn[name].T, color=color, label=name, zorder=4, **style)
+            ax.plot(*drawn[name].T, color=color, label=name, zorder=4, **look)
         else:
-            ax.plot([], [], color=color, label=f"{name}: not attained", **style)
+            ax.plot([], [], color=color, label=f"{name}: not attained", **look)
     if "best" in drawn and "worst" in drawn:
         border = np.vstack([drawn["best"], drawn["worst"][::-1]])
         ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)
