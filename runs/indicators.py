@@ -26,29 +26,29 @@ SAMPLES = 2001
 Points = Front | np.ndarray
 
 
-def gd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
 
     A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
-    about a quarter of their spacing.
+    about a quarter of their spacing. With `curve=False` it is its points alone, always, as published tables mostly have it.
     """
     F, R = _pair(front, reference, normalise)
-    return float(_to_reference(F, R).mean()) if len(F) else np.nan
+    return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
 
 
-def igd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Inverted generational distance: mean distance of the reference from the nearest point of the front. Infinite for an empty front.
 
-    Where the reference is a curve (see `gd`), the mean is taken evenly along its length.
+    Where the reference is a curve (see `gd`, also for `curve`), the mean is taken evenly along its length.
     """
     F, R = _pair(front, reference, normalise)
-    return float(moocore.igd(F, ref=_evenly(R))) if len(F) else np.inf
+    return float(moocore.igd(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
-def igd_plus(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """As `igd`, but only what a point is *worse* than the reference in each objective counts (Ishibuchi et al. 2015)."""
     F, R = _pair(front, reference, normalise)
-    return float(moocore.igd_plus(F, ref=_evenly(R))) if len(F) else np.inf
+    return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
 def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True) -> float:
@@ -154,23 +154,23 @@ def pieces(R: np.ndarray) -> list[np.ndarray]:
     return parts if all(len(part) > 1 for part in parts) else []
 
 
-def _to_reference(F: np.ndarray, R: np.ndarray) -> np.ndarray:
+def _to_reference(F: np.ndarray, R: np.ndarray, curve: bool) -> np.ndarray:
     """Distance (n,) of points to a reference."""
-    curves = pieces(R)
+    curves = pieces(R) if curve else []
     if not curves:
         return np.linalg.norm(F[:, None] - R, axis=2).min(axis=1)
-    start, step = (np.vstack([part(curve) for curve in curves]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
+    start, step = (np.vstack([part(piece) for piece in curves]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
     return _to_segments(F, start, step)
 
 
-def _evenly(R: np.ndarray) -> np.ndarray:
+def _evenly(R: np.ndarray, curve: bool) -> np.ndarray:
     """The points of a reference, or where it is dense points evenly along it."""
-    curves = pieces(R)
+    curves = pieces(R) if curve else []
     if not curves:
         return R
-    lengths = np.array([np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() for curve in curves])
+    lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in curves])
     counts = np.maximum(2, np.round(SAMPLES * lengths / lengths.sum()).astype(int))
-    return np.vstack([_along(curve, count) for curve, count in zip(curves, counts, strict=True)])
+    return np.vstack([_along(piece, count) for piece, count in zip(curves, counts, strict=True)])
 
 
 def _along(curve: np.ndarray, samples: int) -> np.ndarray:

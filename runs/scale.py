@@ -9,7 +9,7 @@ import numpy as np
 
 from macs.front import Front
 
-from .indicators import Points, extent, truth
+from .indicators import Points, extent, pieces, truth
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Scale:
         How many points it has.
     normalise : bool
         Whether indicators are in these ranges, or in the objectives' own units.
+    curve : bool
+        Whether the points of the reference are taken as the curve through them; see `runs.indicators.gd`.
     """
 
     ideal: tuple[float, ...]
@@ -42,10 +44,17 @@ class Scale:
     what: str
     count: int
     normalise: bool = True
+    curve: bool = False
 
     @staticmethod
     def of(
-        reference: Points, *, like: Front | None = None, what: str = "the reference", point: float = 1.1, normalise: bool = True
+        reference: Points,
+        *,
+        like: Front | None = None,
+        what: str = "the reference",
+        point: float = 1.1,
+        normalise: bool = True,
+        curve: bool = True,
     ) -> Scale:
         """What the indicators of `runs.indicators` do with a reference.
 
@@ -57,7 +66,7 @@ class Scale:
             columns are minimised.
         what : str
             What the reference is, for captions.
-        point, normalise
+        point, normalise, curve
             As the indicators were given them.
         """
         known = reference if isinstance(reference, Front) else like
@@ -79,11 +88,13 @@ class Scale:
             what=what,
             count=len(R),
             normalise=normalise,
+            curve=curve and bool(pieces(R)),
         )
 
     def describe(self) -> str:
         """Two sentences for a caption."""
-        points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'})"
+        how = ", the curve through them" if self.curve else ""
+        points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
         if self.normalise:
             ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
             volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."

@@ -77,6 +77,8 @@ def test_to_a_curve_is_nearer_than_to_its_points(name):
     from pymoo.problems import get_problem
 
     truth = get_problem(name).pareto_front()
+    for ours, theirs in ((gd, GD), (igd, IGD)):
+        assert ours(truth * 1.05, truth, normalise=False, curve=False) == pytest.approx(theirs(truth)(truth * 1.05), rel=1e-10)
     spacing = np.linalg.norm(np.diff(truth, axis=0), axis=1).max()
     F = truth[5::10] * [1.0, 1.02]
     assert gd(F, truth) <= GD(truth)(F) + 1e-12 <= gd(F, truth) + spacing / 2 + 1e-9
@@ -115,6 +117,8 @@ def test_the_scale_says_what_was_done():
     words = scale.describe()
     assert "nadir (flight time 200 s, speed 0 km/s) of the closed form (3 points)" in words
     assert "up to 1.1 in each objective (flight time 210 s, speed -0.1 km/s)" in words
+    assert "(2001 points, the curve through them)" in Scale.of(goddard.reference(), like=front).describe()
+    assert "(2001 points)" in Scale.of(goddard.reference(), like=front, curve=False).describe()
     # What the volume is measured in: the box from the front's point to the corner, in ranges.
     assert hypervolume(front, truth) == pytest.approx(np.prod((np.array(scale.corner) - [110, 0.5]) / [100, -1]))
     plain = Scale.of(truth, like=front, normalise=False).describe()

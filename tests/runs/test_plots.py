@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import numpy as np
@@ -20,6 +21,16 @@ A = np.array([[1.0, 1.0], [3.0, 3.0]])
 B = np.array([[2.0, 2.5]])
 EMPTY = np.empty((0, 2))
 TRUTH = np.column_stack([np.linspace(1, 3, 201), np.linspace(1.5, 3.5, 201)])
+
+
+def test_nothing_heavy_is_imported_before_it_is_used():
+    code = (
+        "import sys, runs.plots, runs.flight_plots, runs.statistics_tables, runs.references, runs.scale\n"
+        "heavy = [m for m in ('matplotlib', 'scipy.stats', 'xarray', 'pymoo') if m in sys.modules]\n"
+        "sys.exit(str(heavy) if heavy else 0)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
 
 
 def lines(ax):
