@@ -62,46 +62,8 @@ def reference(points: int = 2001, longest: float = 250.0) -> np.ndarray:
     return np.array([(first, 0.0), *((tf, _speed(tf)) for tf in times)])
 
 
-def flight(tf: float, points: int = 201) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The optimal flight of duration `tf`, in closed form, by the same law.
-
-    Returns
-    -------
-    time : array (n,)
-        s, from 0 to `tf`: about `points` at equal steps, and as many at equal steps of asinh(tan u), which resolve a steep turn.
-    values : dict
-        x, y in km, vx, vy in km/s and u in rad, each (n,).
-
-    Raises
-    ------
-    ValueError
-        If `tf` is not longer than the shortest flight, whose thrust jumps.
-    """
-    if not tf > shortest_time():
-        raise ValueError(f"a flight takes more than {shortest_time():.6g} s, not {tf:g}")
-    a, b = _ends(tf)
-    p, q = np.sinh(a), np.sinh(b)
-    w = np.unique(np.concatenate([np.linspace(a, b, points), np.arcsinh(np.linspace(p, q, points)).clip(b, a)]))[::-1]
-    z, root, slope = np.sinh(w), np.cosh(w), tf / (p - q)
-    time = slope * (p - z)
-    push = THRUST * slope
-    return time, {
-        "x": push * slope * (np.cosh(a) - (a - w) * z - root),
-        "vx": push * (a - w),
-        "y": push * slope * (np.cosh(a) * (p - z) - 0.5 * (p * np.cosh(a) + a - z * root - w)) - 0.5 * GRAVITY * time**2,
-        "vy": push * (np.cosh(a) - root) - GRAVITY * time,
-        "u": np.arctan(z),
-    }
-
-
 def _speed(tf: float) -> float:
     """Greatest final horizontal speed in a flight of duration `tf`."""
-    a, b = _ends(tf)
-    return float(THRUST * tf * (a - b) / (np.sinh(a) - np.sinh(b)))
-
-
-def _ends(tf: float) -> tuple[float, float]:
-    """asinh of the tangent of the thrust angle at the beginning and at the end of the optimal flight of duration `tf`."""
     # The tangent z = tan u runs linearly from p = sinh a to q = sinh b, so dt = tf/(p - q) dz, and sin u = z/sqrt(1 + z^2). vy(tf) = 0
     # says that the mean of sin u, (cosh a - cosh b)/(sinh a - sinh b) = tanh((a + b)/2), is g/THRUST: the sum of a and b is known, and
     # the height fixes their difference.
@@ -115,4 +77,5 @@ def _ends(tf: float) -> tuple[float, float]:
         return float(THRUST * tf**2 * antiderivative / (p - q) ** 2 - 0.5 * GRAVITY * tf**2 - HEIGHT)
 
     difference = brentq(missing_height, 1e-3, 200.0, xtol=1e-13, rtol=1e-14)
-    return 0.5 * (total + difference), 0.5 * (total - difference)
+    a, b = 0.5 * (total + difference), 0.5 * (total - difference)
+    return float(THRUST * tf * difference / (np.sinh(a) - np.sinh(b)))

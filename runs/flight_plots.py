@@ -21,8 +21,8 @@ from .paper import COLUMN, PAGE, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Law = tuple[np.ndarray, Mapping[str, np.ndarray]]
-"""A flight that is known: times (n,) and values (n,) by name, in the units of the problem."""
+Law = Mapping[str, np.ndarray]
+"""A flight that is known: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 
 Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
 
@@ -52,7 +52,7 @@ def flights_figure(
     ----------
     points : Points of one problem, of one to six
         With trajectories.
-    laws : as many (times, {name: values}), or None
+    laws : as many {name: values}, or None
         What to draw beside each point, dashed; names that a law does not hold are left out.
     names : sequence of str, optional
         Which states, controls and path constraints to draw, in that order; all states and controls by default.
@@ -84,8 +84,8 @@ def flights_figure(
                     if name in phase.names:
                         ax.plot(*along(phase, name), color=COLORS[k % len(COLORS)], lw=1.3)
                 law = laws[column] if column < len(laws) else None
-                if law is not None and name in law[1]:
-                    ax.plot(law[0], law[1][name], color="black", lw=0.9, ls=LAW_DASHES, zorder=3)
+                if law is not None and name in law:
+                    ax.plot(law["time"], law[name], color="black", lw=0.9, ls=LAW_DASHES, zorder=3)
                 ax.margins(x=0.0)
             grid[0, column].set_title(_title(column + 1, point, round(75 / len(points)) + 10), loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
@@ -143,8 +143,8 @@ def paths_figure(
                     end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
                     ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
             law = laws[i] if laws else None
-            if law is not None and _holds(law[1], across) and _holds(law[1], up):
-                ax.plot(_of(law[1], across), _of(law[1], up), color="black", lw=0.9, ls=LAW_DASHES, zorder=4)
+            if law is not None and _holds(law, across) and _holds(law, up):
+                ax.plot(_of(law, across), _of(law, up), color="black", lw=0.9, ls=LAW_DASHES, zorder=4)
                 drawn_law = True
         units = _units(points[0])
         ax.set_xlabel(xlabel or label(str(across), units.get(str(across), "")))

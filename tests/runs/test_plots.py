@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from synthetic_fronts import flights
 
-from problems import goddard
 from problems.compiled import Objective
 from runs.attainment import attainment
 from runs.flight_plots import flights_figure, paths_figure, representatives
@@ -109,7 +108,7 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     chosen = representatives(front, 3)
     assert len(chosen) == 3 and {int(np.argmin(front.F[:, 0])), int(np.argmin(front.F[:, 1]))} <= set(chosen)
     assert representatives(front, 9) == list(range(5))
-    law = (np.array([0.0, 5.0]), {"h": np.array([1.0, 2.0])})
+    law = {"time": np.array([0.0, 5.0]), "h": np.array([1.0, 2.0])}
     figure = flights_figure([front[i] for i in chosen], laws=[law, None, law], solver="ours")
     names = [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
     assert names == ["h [km]", "v [km/s]", "u [km/s²]"] and len(figure.axes) == 9
@@ -122,14 +121,14 @@ def test_flights_side_by_side_and_the_law(tmp_path):
 
 def test_paths_in_one_picture():
     front = flights(3)
-    law = (np.array([0.0, 1.0]), {"h": np.array([1.0, 2.0])})
+    law = {"time": np.array([0.0, 1.0]), "h": np.array([1.0, 2.0])}
     figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws=[None, law])
     (ax,) = figure.axes
     drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
     assert len(drawn) == 8, "two phases and an end each, a law and its entry in the legend"
     assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
     assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
-    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws=[(law[0], {})]).axes[0].get_lines()) == 3
+    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws=[{}]).axes[0].get_lines()) == 3
     with pytest.raises(ValueError, match="no 'w' to draw"):
         paths_figure([front[0]], "h", "w")
 
@@ -144,25 +143,3 @@ def test_flights_that_cannot_be_drawn():
         flights_figure([])
     with pytest.raises(ValueError, match="point 1 of those to draw has no trajectory"):
         flights_figure([foreign(A, GOALS)[0]])
-
-
-@pytest.mark.parametrize("tf", [109.2, 130.0, 250.0])
-def test_the_closed_form_flight_is_a_flight(tf):
-    time, values = goddard.flight(tf, 2001)
-    assert time[0] == pytest.approx(0, abs=1e-9) and time[-1] == pytest.approx(tf) and np.all(np.diff(time) > 0)
-    ends = {name: (column[0], column[-1]) for name, column in values.items()}
-    assert ends["y"] == pytest.approx((0, 10), abs=1e-9) and ends["vy"] == pytest.approx((0, 0), abs=1e-12)
-    best = np.interp(tf, *goddard.reference().T)
-    assert ends["vx"] == pytest.approx((0, best), abs=2e-4) and ends["x"][0] == pytest.approx(0, abs=1e-9)
-    # The equations of motion, integrated by the trapezoidal rule.
-    rates = {
-        "x": values["vx"],
-        "y": values["vy"],
-        "vx": goddard.THRUST * np.cos(values["u"]),
-        "vy": goddard.THRUST * np.sin(values["u"]) - goddard.GRAVITY,
-    }
-    for name, rate in rates.items():
-        flown = np.concatenate([[0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
-        assert values[name] == pytest.approx(flown, abs=2e-5)
-    with pytest.raises(ValueError, match=r"more than 109\.109 s, not 100"):
-        goddard.flight(100.0)
