@@ -12,11 +12,11 @@ import logging
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, cast, get_type_hints
 
 import numpy as np
 
@@ -172,14 +172,14 @@ def _state_class(solver: Solver) -> type:
         found = get_type_hints(type(solver).begin).get("return", Any)
     except NameError as error:
         raise ValueError(f"checkpoint: what {type(solver).__name__}.begin returns is not known at run time: {error}") from error
-    if not isinstance(found, type):
+    if not is_dataclass(found):
         raise ValueError(f"checkpoint: {type(solver).__name__}.begin is not annotated with the class of the state that it returns")
-    return found
+    return cast(type, found)
 
 
 def _to_bytes(header: Mapping[str, Any], arrays: list[np.ndarray]) -> bytes:
     buffer = io.BytesIO()
-    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    text = np.frombuffer(json.dumps({**header, "arrays": len(arrays)}).encode(), dtype=np.uint8)
     named: dict[str, Any] = {f"array_{i}": array for i, array in enumerate(arrays)}
     np.savez(buffer, document=text, **named)
     return buffer.getvalue()
@@ -193,7 +193,7 @@ def _from_bytes(content: bytes) -> tuple[dict[str, Any], list[np.ndarray]]:
             raise ValueError("it is a file of something else")
         if header["version"] != VERSION:
             raise ValueError(f"its format is version {header['version']}, this MACS reads version {VERSION}")
-        return header, [file[f"array_{i}"] for i in range(len(file.files) - 1)]
+        return header, [file[f"array_{i}"] for i in range(header["arrays"])]
 
 
 def _reason(content: bytes, error: Exception) -> str:

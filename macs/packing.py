@@ -94,7 +94,7 @@ def unpack(tree: Any, annotation: Any, arrays: list[np.ndarray], where: str = ""
         _check(isinstance(tree, list), tree, annotation, where)
         each = zip(tree, kind.each(len(tree), where), strict=True)
         return kind.wanted([unpack(item, hint, arrays, f"{where}[{i}]") for i, (item, hint) in enumerate(each)])
-    _check(isinstance(tree, dict), tree, annotation, where)
+    _check(isinstance(tree, dict) and kind.wanted is not NoneType, tree, annotation, where)
     if not kind.is_dataclass:
         return kind.wanted({key: unpack(item, kind.items[0], arrays, f"{where}[{key!r}]") for key, item in tree.items()})
     hints = _hints(kind.wanted)
@@ -145,7 +145,7 @@ def _understood(annotation: Any) -> _Kind | None:
     options = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
     left = [option for option in options if option is not NoneType]
     if len(left) != 1:
-        return None
+        return None if left else _Kind(NoneType, True, ())
     wanted, items = get_origin(left[0]) or left[0], get_args(left[0])
     if wanted in (dict, Counter):
         if items[:1] != (str,):
