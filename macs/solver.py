@@ -108,8 +108,9 @@ class Solver(ABC):
             Called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
             A file that the run is kept in, now and then and whenever it ends. The same call goes on where it was, whether the run was
-            killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been; what was
-            begun since the last write is done again. `time_limit` counts from each call, `stats["wall_time"]` sums them up. Of a run that
+            killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been. What was done
+            since the last write, between iterations and a second or more apart, is done again; so is a first population that was not
+            finished. `time_limit` counts from each call, `stats["wall_time"]` sums them up. Of a run that
             has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined again. All that
             decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and seed; a seed of
             None takes over that of the file. Should the file not be writable any more in the middle of the run, the search goes on, logs a

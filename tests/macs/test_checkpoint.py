@@ -257,7 +257,7 @@ def test_kill_9(tmp_path) -> None:
     done = log.stat().st_size
     subprocess.run(call, cwd=tmp_path, check=True, timeout=60)
     again = log.stat().st_size - done
-    assert 400 - done <= again < 400 - done + 50  # at most what an iteration or two had evaluated since the last write
+    assert 400 - done <= again < 400 - done + 120 < 400  # what one or two iterations had evaluated since the last write
     assert_same(Front.load(tmp_path / "front.nc"), uninterrupted())
     assert {path.name for path in tmp_path.iterdir() if ".part" not in path.name} == {"script.py", "log", "run.ckpt", "front.nc"}
 
