@@ -34,9 +34,9 @@ MAY_BE = (
 def pack(value: Any, annotation: Any, arrays: list[np.ndarray], where: str = "") -> Any:
     """The tree of a value, by its annotation: a class, or what else an annotation may be.
 
-    Numbers are exact, NaN and infinities included. Arrays are copied with the order of their axes in memory, which sums depend on.
-    Generators keep what they have spawned. Scalars of numpy come back as Python's. Nothing that changes may be there twice: two fields
-    that are one array or one generator come back as two.
+    Numbers are exact, infinities included, and a NaN comes back as one. Arrays are copied with the order of their axes in memory, which
+    sums depend on. Generators keep what they have spawned. Scalars of numpy come back as Python's. Nothing that changes may be there twice:
+    two fields that are one array or one generator come back as two.
 
     Parameters
     ----------
