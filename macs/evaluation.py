@@ -89,6 +89,10 @@ class Evaluator(ABC):
     counts: Counts
     before_batch: Callable[[], None] = staticmethod(lambda: None)
 
+    def resume(self, counts: Counts, m: int) -> None:
+        """Go on counting where another run of the same had got to, which knew the number of objectives to be m."""
+        self.counts = counts
+
     @abstractmethod
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """Full vectors (k, D) for candidates (k, d) that nothing is known of yet."""
