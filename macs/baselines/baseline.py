@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from abc import abstractmethod
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -98,7 +97,11 @@ class Baseline(Solver):
         """`count` candidates (count, d), drawn as pymoo draws them."""
         return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))
 
-    def _cut(self, algorithm: Any, count: int) -> None:  # noqa: B027 - most algorithms do not mind
+    def _place(self, members: Members, evaluator: Evaluator) -> Members:
+        """The first population, of which some were given, each in a place that suits it."""
+        return members
+
+    def _cut(self, algorithm: Any, count: int) -> None:
         """Prepare the algorithm for being told of only the first `count` of those that it has asked for."""
 
     def _told(self, points: Members, tolerance: float) -> handlings.Told:
@@ -126,6 +129,8 @@ class Baseline(Solver):
         if len(Z):
             members = evaluate(evaluator, Z) if members is None else members.join(evaluate(evaluator, Z))
         assert members is not None
+        if len(given):
+            members = self._place(members, evaluator)
         nobody = members.take(np.arange(0))
         none = Archive(nobody.Z, nobody.F, nobody.violation)
         common = {"members": members, "archive": none, "closest": none, "iteration": 0, "rng": rng}
@@ -148,11 +153,11 @@ class Baseline(Solver):
         self._restore(algorithm, state, self._people(table, evaluator))
         algorithm.is_initialized, algorithm.n_iter, algorithm.opt = True, state.iteration + 1, ()
         while algorithm.n_iter == state.iteration + 1 and left > 0:  # some ask for one candidate at a time
-            with warnings.catch_warnings():
-                asked = algorithm.ask()
+            asked = algorithm.ask()
             if asked is None:  # nothing could be bred that is not there already
                 break
-            offspring = [asked] if not hasattr(asked, "__len__") else asked[:left]
+            alone = not hasattr(asked, "__len__")
+            offspring = [asked] if alone else asked[:left]
             if len(offspring) == left:
                 self._cut(algorithm, left)
             X = np.array([one.X for one in offspring])
@@ -161,7 +166,7 @@ class Baseline(Solver):
             self._tell(offspring, bred, len(table), evaluator)
             table = table.join(bred)
             with warnings.catch_warnings():
-                algorithm.tell(infills=asked if not hasattr(asked, "__len__") else offspring)
+                algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
         state.iteration += 1
 
@@ -229,7 +234,7 @@ class Baseline(Solver):
                 check_count(f"{name}: {setting}", getattr(self, setting), least)
         for setting, (low, high) in {**ranges, "penalty": (0.0, np.inf)}.items():
             value = getattr(self, setting)
-            if not isinstance(value, Real) or isinstance(value, bool) or not low <= value <= high or not np.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value <= high or np.isinf(value):
                 wanted = f"in [{low:g}, {high:g}]" if np.isfinite(high) else f"a number of at least {low:g}"
                 raise ValueError(f"{name}: {setting} must be {wanted}, not {value!r}")
         if self.handling not in handlings.HANDLINGS:
@@ -239,4 +244,4 @@ class Baseline(Solver):
 
 def rows_of(people: Any) -> np.ndarray:
     """The rows (n,), in the table of all points, of pymoo's individuals."""
-    return np.array([one.get("row") for one in people], dtype=int)
+    return np.array([one.data["row"] for one in people], dtype=int)

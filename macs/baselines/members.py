@@ -47,13 +47,13 @@ class Members:
 
 
 def evaluate(evaluator: Evaluator, Z: np.ndarray) -> Members:
-    """Evaluate full vectors (k, D). A point is where the evaluator moved it; a failure that brought nothing back stays where it was sent."""
+    """Evaluate full vectors (k, D). A point is where the evaluator moved it; a failure that brought nothing back, where it was sent."""
     seen = evaluator.evaluate(Z)
     return Members(np.where(np.isfinite(seen.Z), seen.Z, Z), seen.F, seen.violation)
 
 
 def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.ndarray:
-    """Full vectors (k, D) for candidates X (k, d): what is not free comes from the nearest member, in spans, whose evaluation did not fail."""
+    """Full vectors (k, D) for candidates X (k, d): the rest is that of the nearest member, in spans, whose evaluation did not fail."""
     free = evaluator.free
     usable = np.flatnonzero(np.isfinite(members.violation))
     if members.Z.shape[1] == len(free) or not usable.size:

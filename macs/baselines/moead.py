@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..directions import tchebycheff
 from ..evaluation import Evaluator
+from ..social import pair_up
 from . import handling as handlings
 from .baseline import Baseline, State
 from .members import Members
@@ -32,7 +34,7 @@ class MOEAD(Baseline):
     """MOEA/D (Zhang and Li 2007), that of pymoo; see `Baseline`. For two objectives or more.
 
     It knows nothing of constraints; they are handled here, before it is told of a point. It asks for one candidate at a time, so that the
-    inner level cannot work on many at once: see `batch`.
+    inner level cannot work on many at once: see `batch`. Given points of a `start` are sent to the directions that they serve best.
 
     Parameters
     ----------
@@ -95,14 +97,13 @@ class MOEAD(Baseline):
         return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
-        from pymoo.algorithms.moo.moead import MOEAD as OneByOne
-        from pymoo.algorithms.moo.moead import ParallelMOEAD
+        from pymoo.algorithms.moo import moead
         from pymoo.decomposition.pbi import PBI
         from pymoo.decomposition.tchebicheff import Tchebicheff
         from pymoo.operators.crossover.sbx import SBX
         from pymoo.operators.mutation.pm import PM
 
-        algorithm = ParallelMOEAD if self.batch else OneByOne
+        algorithm = moead.ParallelMOEAD if self.batch else moead.MOEAD
         return algorithm(
             ref_dirs=reference_directions(m, self.population, self.divisions),
             n_neighbors=self.neighbors,
@@ -117,6 +118,12 @@ class MOEAD(Baseline):
     def _told(self, points: Members, tolerance: float) -> handlings.Told:
         F, cv = super()._told(points, tolerance)
         return handlings.by_objectives(F, cv), np.zeros(len(cv))
+
+    def _place(self, members: Members, evaluator: Evaluator) -> Members:
+        F = self._told(members, evaluator.tolerance)[0]
+        directions = reference_directions(F.shape[1], self.population, self.divisions)[: len(F)]
+        rows, places = pair_up(tchebycheff(F[:, None], directions, F.min(axis=0), F.max(axis=0)))
+        return members.take(rows[np.argsort(places)])
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> DecomposedState:
         return DecomposedState(**common, ideal=np.full(members.F.shape[1] + (self.handling == "objective"), np.inf))

@@ -39,11 +39,11 @@ class MOPSOCD(Baseline):
     It knows nothing of constraints; they are handled here, before it is told of a point. The front is its archive. Two things differ from
     pymoo's, neither in the points that it flies through:
 
-    - pymoo evaluates a swarm that it then throws away, and counts it. Here it is drawn, for the sake of the same random numbers, but neither
-      evaluated nor counted: n generations cost as many evaluations less as there are particles.
+    - pymoo evaluates a swarm that it then throws away, and counts it. Here it is drawn, for the sake of the same random numbers, but
+      neither evaluated nor counted: n generations cost fewer evaluations, by as many as there are particles.
     - pymoo offers the archive once more what crowding has just kept out of it, and if it overflows by that, throws out a random half of
-      it, which no seed governs. Here these points stay out. So the two are equal as long as the archive has room, and beyond that pymoo's
-      is not even equal to itself.
+      it, which no seed governs. Here these points stay out. So the two are equal as long as the archive has room; beyond that pymoo's is
+      not even equal to itself.
 
     Parameters
     ----------

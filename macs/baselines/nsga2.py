@@ -69,12 +69,12 @@ class NSGA2(Baseline):
         return self.population
 
     def _algorithm(self, m: int) -> Any:
-        from pymoo.algorithms.moo.nsga2 import NSGA2 as Algorithm
+        from pymoo.algorithms.moo import nsga2
         from pymoo.operators.crossover.sbx import SBX
         from pymoo.operators.mutation.pm import PM
 
         crossover, mutation = SBX(eta=self.crossover_eta, prob=self.crossover), PM(eta=self.mutation_eta)
-        return Algorithm(pop_size=self.population, crossover=crossover, mutation=mutation)
+        return nsga2.NSGA2(pop_size=self.population, crossover=crossover, mutation=mutation)
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> RankedState:
         return RankedState(**common, rank=np.full(len(members), UNRANKED), crowding=np.full(len(members), np.nan))

@@ -34,8 +34,8 @@ class NormalisedState(State):
 class NSGA3(Baseline):
     """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), that of pymoo; see `Baseline`. For two objectives or more.
 
-    The front are the non-dominated points nearest to the reference directions. Where two infeasible candidates tie, the winner is drawn from
-    the run's own generator; pymoo's draws from one that no seed governs.
+    The front are the non-dominated points nearest to the reference directions. Where two infeasible candidates tie, the winner is drawn
+    from the run's own generator; pymoo's draws from one that no seed governs.
 
     Parameters
     ----------
@@ -78,12 +78,12 @@ class NSGA3(Baseline):
         return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
-        from pymoo.algorithms.moo.nsga3 import NSGA3 as Algorithm
+        from pymoo.algorithms.moo import nsga3
         from pymoo.operators.crossover.sbx import SBX
         from pymoo.operators.mutation.pm import PM
         from pymoo.operators.selection.tournament import TournamentSelection
 
-        return Algorithm(
+        return nsga3.NSGA3(
             ref_dirs=reference_directions(m, self.population, self.divisions),
             pop_size=population_size(m, self.population, self.divisions),
             selection=TournamentSelection(func_comp=less_violated),
