@@ -66,6 +66,7 @@ class Baseline(Solver):
 
     handling: str
     penalty: float
+    _knows_constraints = True
 
     # The hooks
 
@@ -115,20 +116,23 @@ class Baseline(Solver):
         if budget <= evaluator.counts.evaluations:
             raise ValueError(f"evaluations: the budget of {budget} leaves none")
         given = np.empty((0, 0)) if start is None else start[np.sort(np.unique(start, axis=0, return_index=True)[1])]
-        members = None
-        if self._size(evaluator.m_known) is None:  # one point tells how many objectives there are
-            members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng))
-        m = evaluator.m_known if members is None else members.F.shape[1]
+        m, members = evaluator.m_known, None
         if m is not None:
             self.check_objectives(m)
-        size, done = self._size(m), 0 if members is None else 1
+        size = self._size(m)
+        if size is None:  # one point tells how many objectives there are
+            members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng))
+            self.check_objectives(members.F.shape[1])
+            size = self._size(members.F.shape[1])
         assert size is not None
+        done = 0 if members is None else 1
         if len(given) > size:
             given = given[np.linspace(0, len(given) - 1, size).round().astype(int)]
         Z = self._candidates(evaluator, given[done:], size - done, rng)[: budget - evaluator.counts.evaluations]
         if len(Z):
             members = evaluate(evaluator, Z) if members is None else members.join(evaluate(evaluator, Z))
         assert members is not None
+        self.check_objectives(members.F.shape[1])
         if len(given):
             members = self._place(members, evaluator)
         nobody = members.take(np.arange(0))
@@ -189,14 +193,11 @@ class Baseline(Solver):
 
         Config.warnings["not_compiled"] = False  # it would print
         m += self.handling == "objective"
-        algorithm = self._algorithm(m)
-        constrained = int(self._knows_constraints)
-        problem = Problem(n_var=len(evaluator.free), n_obj=m, n_ieq_constr=constrained, xl=evaluator.lower, xu=evaluator.upper)
+        algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._knows_constraints)
+        problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
         algorithm.setup(problem, termination=NoTermination(), evaluator=VoidEvaluator(value=None), seed=0)
         algorithm.random_state = rng
         return algorithm
-
-    _knows_constraints = True
 
     def _people(self, points: Members, evaluator: Evaluator) -> Any:
         """A pymoo Population of points."""
@@ -230,7 +231,7 @@ class Baseline(Solver):
         """Raise ValueError for settings that make no sense: `counts` gives the least of each, `ranges` the closed interval."""
         name = type(self).__name__
         for setting, least in counts.items():
-            if getattr(self, setting) is not None:
+            if getattr(self, setting) is not None or getattr(type(self), setting) is not None:  # None only where that is the default
                 check_count(f"{name}: {setting}", getattr(self, setting), least)
         for setting, (low, high) in {**ranges, "penalty": (0.0, np.inf)}.items():
             value = getattr(self, setting)

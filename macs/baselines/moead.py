@@ -73,6 +73,7 @@ class MOEAD(Baseline):
     mutation_eta: float = 20.0
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    _knows_constraints = False
 
     def __post_init__(self) -> None:
         counts = {"population": 2, "divisions": 1, "neighbors": 2}
@@ -112,8 +113,6 @@ class MOEAD(Baseline):
             crossover=SBX(eta=self.crossover_eta, prob=1.0),
             mutation=PM(eta=self.mutation_eta, prob_var=None),
         )
-
-    _knows_constraints = False
 
     def _told(self, points: Members, tolerance: float) -> handlings.Told:
         F, cv = super()._told(points, tolerance)

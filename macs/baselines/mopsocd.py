@@ -72,6 +72,7 @@ class MOPSOCD(Baseline):
     max_velocity: float = 0.5
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    _knows_constraints = False
 
     def __post_init__(self) -> None:
         weights = dict.fromkeys(("inertia", "cognitive", "social"), (0.0, np.inf))
@@ -92,8 +93,6 @@ class MOPSOCD(Baseline):
             archive_size=self.archive,
             callback=_keep_out,
         )
-
-    _knows_constraints = False
 
     def _told(self, points: Members, tolerance: float) -> handlings.Told:
         F, cv = super()._told(points, tolerance)
