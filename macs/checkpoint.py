@@ -74,7 +74,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
     ----------
     path : path
     solver : Solver
-        The class of its state is the one that its `begin` is annotated to return.
+        The class of its state is the one that its `makes_state` is annotated to return.
     belongs : mapping
         Everything but the seed that decides what the run does, as data.
 
@@ -168,12 +168,13 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
 
 def _state_class(solver: Solver) -> type:
+    name = type(solver).__name__
     try:
-        found = get_type_hints(type(solver).begin).get("return", Any)
+        found = get_type_hints(solver.makes_state).get("return", Any)
     except NameError as error:
-        raise ValueError(f"checkpoint: what {type(solver).__name__}.begin returns is not known at run time: {error}") from error
+        raise ValueError(f"checkpoint: what {name}.{solver.makes_state.__name__} returns is not known at run time: {error}") from error
     if not is_dataclass(found):
-        raise ValueError(f"checkpoint: {type(solver).__name__}.begin is not annotated with the class of the state that it returns")
+        raise ValueError(f"checkpoint: {name}.{solver.makes_state.__name__} is not annotated with the class of the state that it returns")
     return cast(type, found)
 
 

@@ -34,12 +34,13 @@ class Solver(ABC):
     between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
 
     So that runs can be kept in a checkpoint, and go on from it to the same bits, the state is a dataclass, of the very class that `begin`
-    is annotated to return; names in that annotation and in those of the fields are known at run time, not only to type checkers. Its
-    fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator, dataclasses of these, and
-    lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full: `X | None` may be missing, other unions are refused,
-    and so is `Any`. It is rebuilt from its fields alone, without `__init__`. Hence nothing else may change between two iterations, neither
-    in the solver nor in what the state refers to; no generator may be in two fields; and arrays that are changed in place must not share
-    their memory with others. An error says which field does not comply. Budget and evaluator are not the state's to keep.
+    (or what `makes_state` names) is annotated to return; names in that annotation and in those of the fields are known at run time, not
+    only to type checkers. Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator,
+    dataclasses of these, and lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full: `X | None` may be missing,
+    other unions are refused, and so is `Any`. It is rebuilt from its fields alone, without `__init__`. Hence nothing else may change
+    between two iterations, neither in the solver nor in what the state refers to; no generator may be in two fields; and arrays that are
+    changed in place must not share their memory with others. An error says which field does not comply. Budget and evaluator are not the
+    state's to keep.
     """
 
     @abstractmethod
@@ -52,6 +53,11 @@ class Solver(ABC):
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
         """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        """The method that is annotated to return the class of the state, which checkpoints have to know."""
+        return self.begin
 
     @property
     def certifies(self) -> bool:

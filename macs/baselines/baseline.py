@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,6 +111,11 @@ class Baseline(Solver):
         return handlings.told(self.handling, self.penalty, points.F, points.violation, tolerance)
 
     # The contract
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        """See `Solver.makes_state`."""
+        return self._first
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
         """Evaluate a first population; see `Solver.begin`."""

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from macs import MACS, Front, checkpoint, refinement
+from macs import MACS, MOEAD, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, refinement
 from macs.solver import Solver
 from problems import load
 from transcription import DFET
@@ -90,6 +90,29 @@ def test_a_black_box_goes_on_to_the_same_bits(file, iterations) -> None:
     assert counted.rows == 400 - part.stats["evaluations"]
     assert_same(rest, uninterrupted())
     assert rest.stats["wall_time"] > part.stats["wall_time"]
+
+
+BASELINES = [NSGA2(population=12), NSGA3(divisions=11), MOEAD(divisions=11), MOEAD(divisions=11, batch=True), MOPSOCD(particles=12)]
+
+
+@pytest.mark.parametrize("solver", BASELINES, ids=str)
+@pytest.mark.parametrize("constraints", [None, lambda X: 0.5 - X[:, :1]], ids=["free", "constrained"])
+def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
+    given = {"evaluations": 150, "constraints": constraints}
+    for iterations in (0, 2):
+        counted = Counted()
+        stopped = minimize(solver, f=counted, checkpoint=file, callback=after(iterations), **given)
+        assert stopped.stats["stopped"] == "callback"
+        resumed = Counted()
+        assert_same(minimize(solver, f=resumed, checkpoint=file, **given), minimize(solver, **given))
+        assert counted.rows + resumed.rows == 150
+        file.unlink()
+
+
+@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6)], ids=str)
+def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
+    solve(solver, 30, checkpoint=file, callback=after(1))
+    assert_same(solve(solver, 30, checkpoint=file), solve(solver, 30))
 
 
 def test_several_interruptions_in_a_row(file) -> None:
