@@ -1,5 +1,6 @@
 """Floor 3: the search over several objectives, and the fronts that it finds."""
 
+from .baselines import MOEAD, MOPSOCD, NSGA2, NSGA3
 from .evaluation import Evaluation, Evaluator
 from .front import Front
 from .gradient import optimize, payoff, sweep
@@ -8,4 +9,19 @@ from .monitor import Progress
 from .point import Point
 from .solver import Solver
 
-__all__ = ["MACS", "Evaluation", "Evaluator", "Front", "Point", "Progress", "Solver", "optimize", "payoff", "sweep"]
+__all__ = [
+    "MACS",
+    "MOEAD",
+    "MOPSOCD",
+    "NSGA2",
+    "NSGA3",
+    "Evaluation",
+    "Evaluator",
+    "Front",
+    "Point",
+    "Progress",
+    "Solver",
+    "optimize",
+    "payoff",
+    "sweep",
+]

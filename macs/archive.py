@@ -161,3 +161,9 @@ def insert(
     if len(keep) > limit:
         keep = keep[spread(every.F[keep], limit, keep < len(archive), exponent)]
     return every.take(keep)
+
+
+def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray) -> Archive:
+    """The least violated, one row, of `closest` and of the points offered: Z (k, D), F (k, m), violation (k,). The first of equal ones."""
+    every = Archive(np.vstack([closest.Z, Z]), np.vstack([closest.F, F]), np.concatenate([closest.violation, violation]))
+    return every.take(np.argsort(every.violation, kind="stable")[:1])

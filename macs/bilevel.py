@@ -30,6 +30,7 @@ class Bilevel(Evaluator):
         self.nlp, self.inner, self.tolerance = nlp, inner, tolerance
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
+        self.m_known = len(nlp.problem.goals)
         self.counts = Counts()
         try:
             refuse_peaks(nlp.problem)

@@ -110,6 +110,11 @@ class BlackBox(Evaluator):
         """ "minimize" or "maximize" of each objective, (m,)."""
         return self._senses or ("minimize",) * self.m
 
+    def resume(self, counts: Counts, m: int) -> None:
+        """See `Evaluator.resume`. Raises ValueError if the number of objectives is known to be another."""
+        super().resume(counts, m)
+        self._learn(m, f"the checkpoint has {m}")
+
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """The candidates (k, d): a black box has no other variables."""
         return np.array(candidates, dtype=float)

@@ -9,7 +9,13 @@ from typing import Any
 from .inputs import unknown
 from .solver import Solver
 
-SOLVERS: dict[str, str] = {"macs": "macs.macs:MACS"}
+SOLVERS: dict[str, str] = {
+    "macs": "macs.macs:MACS",
+    "nsga2": "macs.baselines.nsga2:NSGA2",
+    "nsga3": "macs.baselines.nsga3:NSGA3",
+    "moead": "macs.baselines.moead:MOEAD",
+    "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
+}
 """Where each class is, imported only when it is asked for."""
 
 

@@ -48,7 +48,7 @@ def draw_point(point: Point, figure: Any = None) -> np.ndarray:
     if flight is None:
         raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        panels = _panels(flight)
+        panels = quantities(flight)
         columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
         rows = -(-len(panels) // columns)
         if figure is None:
@@ -64,7 +64,7 @@ def draw_point(point: Point, figure: Any = None) -> np.ndarray:
     return grid[: len(panels)]
 
 
-def _panels(flight: Trajectory) -> list[tuple[str, str]]:
+def quantities(flight: Trajectory) -> list[tuple[str, str]]:
     """Names of all states, then controls, then path constraints, each once, and what they are."""
     kinds = {
         "state": [v.name for phase in flight.phases for v in phase.state_variables],
@@ -72,6 +72,15 @@ def _panels(flight: Trajectory) -> list[tuple[str, str]]:
         "path": [limit.name for phase in flight.phases for limit in phase.path_limits],
     }
     return [(name, kind) for kind, names in kinds.items() for name in dict.fromkeys(names)]
+
+
+def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a state or control along every element, with gaps (NaN) between them; of a path constraint at the nodes."""
+    for variables, on_element in ((phase.state_variables, phase.state.on_element), (phase.control_variables, phase.controls_on)):
+        for index, variable in enumerate(variables):
+            if variable.name == name:
+                return _dense(phase.state.edges, on_element, index, variable.period)
+    return phase.time, phase[name]
 
 
 def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
@@ -87,14 +96,9 @@ def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
         if index is None:
             continue
         color = COLORS[k % len(COLORS)]
-        values = {"state": phase.states, "control": phase.controls, "path": phase.paths}[kind][:, index]
-        if kind == "path":
-            ax.plot(phase.time, values, color=color, lw=0.9)
-        else:
-            period = getattr(owners[kind][index], "period", None)
-            times, line = _dense(phase.state.edges, phase.state.on_element if kind == "state" else phase.controls_on, index, period)
-            ax.plot(times, line, color=color, lw=1.3)
-            drawn.append(line[np.isfinite(line)])
+        values, (times, line) = phase[name], along(phase, name)
+        ax.plot(times, line, color=color, lw=0.9 if kind == "path" else 1.3)
+        drawn.append(line[np.isfinite(line)])
         ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
         drawn.append(values)
         limits.append((phase, owners[kind][index]))

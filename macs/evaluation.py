@@ -75,6 +75,8 @@ class Evaluator(ABC):
         A point whose violation is at most this is feasible.
     has_gradients : bool
         Whether `refine` works.
+    m_known : int or None
+        Number of objectives; None as long as only an evaluation could tell.
     counts : Counts
     before_batch : callable
         Called without arguments before each batch; it may end the search by raising an exception.
@@ -86,8 +88,13 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     has_gradients: bool = False
+    m_known: int | None = None
     counts: Counts
     before_batch: Callable[[], None] = staticmethod(lambda: None)
+
+    def resume(self, counts: Counts, m: int) -> None:
+        """Go on counting where another run of the same had got to, which knew the number of objectives to be m."""
+        self.counts = counts
 
     @abstractmethod
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:

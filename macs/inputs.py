@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Sequence
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from transcription.base import NLP, Transcription
 
 from .front import Front
 from .point import Point
+from .storage import check_target
 
 OTHER = "start: the points are of other variables; a start belongs to one problem"
 
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
-    """Raise ValueError for arguments of `solve` and `minimize` that make no sense."""
+    """Raise ValueError for arguments of `solve` and `minimize` that make no sense, OSError for a checkpoint that cannot be written."""
     check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
@@ -30,7 +32,9 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
     if callback is not None and not callable(callback):
         raise ValueError(f"callback must be callable, not {callback!r}")
     if checkpoint is not None:
-        raise ValueError("checkpoint: not available yet")
+        if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
+            raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
+        check_target(checkpoint)
 
 
 def check_positive(name: str, value: Any) -> None:

@@ -63,17 +63,30 @@ class Monitor(AbstractContextManager["Monitor"]):
 
     While it is entered in the main thread, the first Ctrl-C only asks the search to stop, before its next batch or the next long solve
     within one; a second one interrupts at once, as usual.
+
+    The time limit is for this process; `earlier` are the seconds that the search has taken in others.
     """
 
-    def __init__(self, time_limit: float | None, callback: Callable[[Progress], Any] | None, display: Callable[[Progress], None] | None):
+    def __init__(
+        self,
+        time_limit: float | None,
+        callback: Callable[[Progress], Any] | None,
+        display: Callable[[Progress], None] | None,
+        earlier: float = 0.0,
+    ):
         self._time_limit, self._callback, self._display = time_limit, callback, display
         self._interrupted = False
         self._previous: Any = None
+        self._earlier = earlier
         self.started = time.perf_counter()
 
     @property
     def elapsed(self) -> float:
-        """Seconds since the start."""
+        """Seconds that the search has taken, earlier ones included."""
+        return self._earlier + self._here
+
+    @property
+    def _here(self) -> float:
         return time.perf_counter() - self.started
 
     def __enter__(self) -> Monitor:
@@ -90,7 +103,7 @@ class Monitor(AbstractContextManager["Monitor"]):
         """Why to end: "interrupted", "time limit", or nothing as long as there is no reason."""
         if self._interrupted:
             return "interrupted"
-        return "time limit" if self._time_limit is not None and self.elapsed > self._time_limit else ""
+        return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""
 
     def before_batch(self, progress: Progress) -> None:
         """Pass progress on to the display; raise `Stopped` if the search is to end here."""

@@ -115,7 +115,7 @@ def label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def _better(goal: Objective) -> str:
+def better(goal: Objective) -> str:
     """An axis' label that says where it is better. On an upright axis, left is down."""
     text = label(goal.name, goal.unit)
     return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"
@@ -144,9 +144,9 @@ def _scatter(front: Front, ax: Any) -> None:
         ax.scatter(*axes[:, ~good], s=26, facecolors="none", edgecolors=GREY, linewidths=0.9, zorder=2, label="not feasible")
         ax.legend(frameon=False)
     if third and good.any():
-        ax.figure.colorbar(drawn, ax=ax, label=_better(goals[2]), pad=0.02).outline.set_visible(False)
+        ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
-        getattr(ax, f"set_{axis}label")(_better(goal) if goal in front.goals else goal.name)
+        getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
     if len(front.goals) == 2 and good.sum() > 1:
         _mark_extremes(front, ax)
 

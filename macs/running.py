@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +15,8 @@ import numpy as np
 from problems.compiled import Objective
 from transcription.stopping import stopped_by
 
-from .evaluation import Evaluator
+from .checkpoint import Checkpoint, Kept
+from .evaluation import Counts, Evaluator
 from .front import Front
 from .monitor import Monitor, Progress, Stopped
 
@@ -44,6 +47,8 @@ class Run:
         None draws one.
     start : array (k, D) or None
         Full vectors to begin with.
+    what : mapping
+        What is searched and how, as data: with what is above, a checkpoint belongs to it.
     """
 
     solver: Solver
@@ -53,40 +58,61 @@ class Run:
     budget: int
     seed: int | None
     start: np.ndarray | None
+    what: Mapping[str, Any]
 
-    def go(self, time_limit: float | None, progress: bool, callback: Callable[[Progress], Any] | None) -> Front:
-        """Search until the budget is spent, or until something stops it.
+    def go(
+        self,
+        time_limit: float | None,
+        progress: bool,
+        callback: Callable[[Progress], Any] | None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Front:
+        """Search, from where a checkpoint was left if there is one, until the budget is spent, or until something stops it.
 
         Returns
         -------
         Front
             Its `stats["stopped"]` says what ended the run: "budget", "interrupted", "time limit", "callback" or "idle".
         """
-        self.seed = secrets.randbits(63) if self.seed is None else int(self.seed)
-        self._state: Any = None
+        self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs())
+        found = self._checkpoint.read(self.seed) if self._checkpoint else None
+        kept = found[1] if found else Kept(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)
+        self._state: Any = found[0] if found else None
+        self.seed, self._idle = kept.seed, kept.idle
+        if self._state is not None:
+            self.evaluator.resume(kept.counts, self._state.archive.F.shape[1])
+        self._uncut = kept.counts.clocked
         with (
+            self._checkpoint or nullcontext(),
             _display(progress) as display,
-            Monitor(time_limit, callback, display) as monitor,
+            Monitor(time_limit, callback, display, kept.elapsed) as monitor,
             stopped_by(lambda: self._asked_to_stop(monitor)),
         ):
-            self.evaluator.before_batch = lambda: monitor.show(self._standing(monitor))
-            self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
-            # From here on there is something to return, so from here on a batch need not even begin. Before, it ends with what it has.
-            self.evaluator.before_batch = lambda: monitor.before_batch(self._standing(monitor))
-            stopped = self._advance(monitor)
+            stopped = kept.stopped or self._search(monitor)
+            if not kept.stopped and stopped in ENDED:
+                self._keep(monitor, stopped)
             monitor.show(self._standing(monitor))
+            if self._checkpoint:
+                self._checkpoint.write()
             return self.make_front(self._state, self._stats(monitor, stopped))
 
-    def _advance(self, monitor: Monitor) -> str:
-        counts, idle = self.evaluator.counts, 0
+    def _search(self, monitor: Monitor) -> str:
+        """To the end of the search; returns what ended it."""
+        if self._state is None:
+            self.evaluator.before_batch = lambda: monitor.show(self._standing(monitor))
+            self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
+            self._keep(monitor)
+        # From here on there is something to return, so from here on a batch need not even begin. Before, it ends with what it has.
+        self.evaluator.before_batch = lambda: monitor.before_batch(self._standing(monitor))
+        counts = self.evaluator.counts
         try:
-            while counts.evaluations < self.budget:
+            # A search that evaluates nothing any more has nothing left to try.
+            while counts.evaluations < self.budget and self._idle < IDLE_ITERATIONS:
                 spent = counts.evaluations
                 self.solver.advance(self._state, self.evaluator, self.budget)
+                self._idle = self._idle + 1 if counts.evaluations == spent else 0
+                self._keep(monitor)
                 monitor.after_iteration(self._standing(monitor))
-                idle = idle + 1 if counts.evaluations == spent else 0
-                if idle == IDLE_ITERATIONS:
-                    break
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
@@ -94,6 +120,20 @@ class Run:
             return "idle"
         # The last batch may have been cut short.
         return monitor.reason if monitor.reason and counts.clocked else "budget"
+
+    def _keep(self, monitor: Monitor, stopped: str = "") -> None:
+        """Tell the checkpoint how the run stands, unless something of the last iteration was cut short: that has to be done again."""
+        counts = self.evaluator.counts
+        if self._checkpoint is None or (monitor.reason and counts.clocked > self._uncut):
+            return
+        self._uncut = counts.clocked
+        assert self.seed is not None
+        self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, monitor.elapsed, stopped))
+
+    def _belongs(self) -> dict[str, Any]:
+        """What a checkpoint has to be of, but for the seed."""
+        start = None if self.start is None else {"shape": self.start.shape, "hash": hashlib.sha256(self.start.tobytes()).hexdigest()}
+        return {**self.what, "evaluations": self.budget, "tolerance": self.evaluator.tolerance, "start": start}
 
     def _asked_to_stop(self, monitor: Monitor) -> bool:
         """Asked between long solves: also the time to show that it is still at work."""
@@ -112,7 +152,8 @@ class Run:
             "seed": self.seed,
             "tolerance": self.evaluator.tolerance,
             "stopped": stopped,
-            "reproducible": stopped in ENDED and not counts.clocked,
+            "reproducible": stopped in ENDED and not counts.clocked and not (self._checkpoint and self._checkpoint.mixed),
+            **({"checkpoint": self._checkpoint.failure} if self._checkpoint and self._checkpoint.failure else {}),
         }
 
     def _standing(self, monitor: Monitor) -> Progress:

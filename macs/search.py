@@ -211,8 +211,7 @@ def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluat
         state.nadir = state.archive.F.max(axis=0)
         state.closest = state.closest.take(np.arange(0))
         return
-    every = Archive(np.vstack([state.closest.Z, Z]), np.vstack([state.closest.F, F]), np.concatenate([state.closest.violation, violation]))
-    state.closest = every.take(np.argsort(every.violation, kind="stable")[:1])
+    state.closest = archives.least_violated(state.closest, Z, F, violation)
 
 
 def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -> None:

@@ -32,6 +32,15 @@ class Solver(ABC):
 
     An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state is all that it knows
     between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
+
+    So that runs can be kept in a checkpoint, and go on from it to the same bits, the state is a dataclass, of the very class that `begin`
+    (or what `makes_state` names) is annotated to return; names in that annotation and in those of the fields are known at run time, not
+    only to type checkers. Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator,
+    dataclasses of these, and lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full: `X | None` may be missing,
+    other unions are refused, and so is `Any`. It is rebuilt from its fields alone, without `__init__`. Hence nothing else may change
+    between two iterations, neither in the solver nor in what the state refers to; no generator may be in two fields; and arrays that are
+    changed in place must not share their memory with others. An error says which field does not comply. Budget and evaluator are not the
+    state's to keep.
     """
 
     @abstractmethod
@@ -44,6 +53,11 @@ class Solver(ABC):
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
         """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        """The method that is annotated to return the class of the state, which checkpoints have to know."""
+        return self.begin
 
     @property
     def certifies(self) -> bool:
@@ -99,7 +113,14 @@ class Solver(ABC):
         callback : callable, optional
             Called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
-            Not available yet.
+            A file that the run is kept in, now and then and whenever it ends. The same call goes on where it was, whether the run was
+            killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been. What was done
+            since the last write, between iterations and a second or more apart, is done again; so is a first population that was not
+            finished. `time_limit` counts from each call, `stats["wall_time"]` sums them up. Of a run that
+            has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined again. All that
+            decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and seed; a seed of
+            None takes over that of the file. Should the file not be writable any more in the middle of the run, the search goes on, logs a
+            warning, and `stats["checkpoint"]` says why.
 
         Returns
         -------
@@ -109,7 +130,9 @@ class Solver(ABC):
         Raises
         ------
         ValueError
-            If the problem is stated wrongly or an argument makes no sense, before any work.
+            If the problem is stated wrongly, an argument makes no sense, or the checkpoint is damaged or of another run, before any work.
+        OSError
+            If the checkpoint could not be written, before any work.
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
@@ -130,8 +153,14 @@ class Solver(ABC):
             budget=evaluations,
             seed=seed,
             start=beginning(start, nlp),
+            what={
+                "solver": about,
+                "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
+                "transcription": transcription.to_dict(),
+                **level,
+            },
         )
-        front = run.go(time_limit, progress, callback)
+        front = run.go(time_limit, progress, callback, checkpoint)
         return self.finish(front, progress) if front.stats["stopped"] in ENDED else front
 
     def minimize(
@@ -167,7 +196,7 @@ class Solver(ABC):
         names, units, senses : sequences of str, optional
             Of the objectives; senses are "minimize" or "maximize".
         seed, tolerance, start, time_limit, progress, callback, checkpoint
-            As for `solve`.
+            As for `solve`. Of the function, a checkpoint only knows its bounds and names: that it is the same one is the caller's to say.
 
         Returns
         -------
@@ -176,7 +205,9 @@ class Solver(ABC):
         Raises
         ------
         ValueError
-            If an argument, or what the function returns, makes no sense.
+            If an argument, or what the function returns, makes no sense, or the checkpoint is damaged or of another run.
+        OSError
+            If the checkpoint could not be written, before any work.
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
@@ -198,8 +229,14 @@ class Solver(ABC):
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),
+            what={
+                "solver": about,
+                "bounds": {v.name: (v.lower, v.upper) for v in variables},
+                "objectives": {"number": box.m_known, "names": names, "units": units, "senses": senses},
+                "constraints": constraints is not None,
+            },
         )
-        return run.go(time_limit, progress, callback)
+        return run.go(time_limit, progress, callback, checkpoint)
 
     def _about(self) -> dict[str, Any]:
         if not is_dataclass(self):

@@ -16,6 +16,8 @@ from .problem import Problem
 GRAVITY = 1.6e-3
 THRUST = 4e-3
 HEIGHT = 10.0
+MESH_ERROR = 1e-3
+"""By how much, relatively, a flight on a coarse mesh may be shorter than any real one."""
 
 
 def problem() -> Problem:
@@ -62,8 +64,54 @@ def reference(points: int = 2001, longest: float = 250.0) -> np.ndarray:
     return np.array([(first, 0.0), *((tf, _speed(tf)) for tf in times)])
 
 
+def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
+    """The flight of greatest horizontal speed in a given time, in closed form: the linear tangent law.
+
+    Parameters
+    ----------
+    flight_time : float
+        At least `shortest_time()`, s; what a coarse mesh makes a little shorter counts as that.
+    points : int
+        At how many times, evenly.
+
+    Returns
+    -------
+    dict of arrays (points,)
+        "time", the states "x", "vx", "y", "vy", and the control "u".
+
+    Raises
+    ------
+    ValueError
+        If there is no flight as short as that.
+    """
+    shortest = shortest_time()
+    if not flight_time >= (1.0 - MESH_ERROR) * shortest:
+        raise ValueError(f"goddard: no flight takes {flight_time} s, the shortest one takes {shortest:.6f} s")
+    flight_time = max(flight_time, shortest)
+    t = np.linspace(0.0, flight_time, points)
+    a, b = _ends(flight_time)
+    p, q = np.sinh(a), np.sinh(b)
+    # In terms of the tangent z, k = dt/dz: the integrals of cos u and sin u are those of 1/sqrt(1 + z^2) and z/sqrt(1 + z^2).
+    k, z = flight_time / (p - q), p + (q - p) * t / flight_time
+    root, first = np.sqrt(1.0 + z**2), np.cosh(a)
+    return {
+        "time": t,
+        "x": THRUST * k**2 * (z * np.arcsinh(z) - root - z * a + first),
+        "vx": THRUST * k * (a - np.arcsinh(z)),
+        "y": THRUST * k**2 * ((p - z) * first - 0.5 * (p * first + a - z * root - np.arcsinh(z))) - 0.5 * GRAVITY * t**2,
+        "vy": THRUST * k * (first - root) - GRAVITY * t,
+        "u": np.arctan(z),
+    }
+
+
 def _speed(tf: float) -> float:
     """Greatest final horizontal speed in a flight of duration `tf`."""
+    a, b = _ends(tf)
+    return float(THRUST * tf * (a - b) / (np.sinh(a) - np.sinh(b)))
+
+
+def _ends(tf: float) -> tuple[float, float]:
+    """The inverse hyperbolic sines of the tangent of the thrust angle, at the beginning and at the end of a flight of duration `tf`."""
     # The tangent z = tan u runs linearly from p = sinh a to q = sinh b, so dt = tf/(p - q) dz, and sin u = z/sqrt(1 + z^2). vy(tf) = 0
     # says that the mean of sin u, (cosh a - cosh b)/(sinh a - sinh b) = tanh((a + b)/2), is g/THRUST: the sum of a and b is known, and
     # the height fixes their difference.
@@ -77,5 +125,4 @@ def _speed(tf: float) -> float:
         return float(THRUST * tf**2 * antiderivative / (p - q) ** 2 - 0.5 * GRAVITY * tf**2 - HEIGHT)
 
     difference = brentq(missing_height, 1e-3, 200.0, xtol=1e-13, rtol=1e-14)
-    a, b = 0.5 * (total + difference), 0.5 * (total - difference)
-    return float(THRUST * tf * difference / (np.sinh(a) - np.sinh(b)))
+    return 0.5 * (total + difference), 0.5 * (total - difference)

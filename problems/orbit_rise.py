@@ -49,6 +49,62 @@ def reference_with_costates() -> np.ndarray:
         return np.loadtxt(file, delimiter=",", skiprows=1)
 
 
+def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
+    """The flight of greatest final energy in a given time, by indirect shooting from the costates of the nearest row of the table.
+
+    Parameters
+    ----------
+    flight_time : float
+        From 20 to 80 TU, as in the table.
+    points : int
+        At how many times, evenly.
+
+    Returns
+    -------
+    dict of arrays (points,)
+        "time", the states "r", "vr", "theta", "vt", and the control "u".
+
+    Raises
+    ------
+    ValueError
+        Outside the times of the table.
+    """
+    from scipy.integrate import solve_ivp  # slow to import
+    from scipy.optimize import root
+
+    table = reference_with_costates()
+    if not table[0, 0] <= flight_time <= table[-1, 0]:
+        raise ValueError(f"orbit_rise: the flight time must be from {table[0, 0]:g} to {table[-1, 0]:g} TU, not {flight_time}")
+    times = np.linspace(0.0, flight_time, points)
+
+    def flown(costate: np.ndarray) -> np.ndarray:
+        start = np.array([START_RADIUS, 0.0, 0.0, START_RADIUS**-0.5, *costate])
+        return solve_ivp(_with_costates, (0.0, flight_time), start, "DOP853", times, rtol=1e-11, atol=1e-12).y
+
+    def missing(costate: np.ndarray) -> np.ndarray:
+        r, vr, _, vt, *last = flown(costate)[:, -1]
+        return np.array(last) - [1 / r**2, vr, vt]  # at the end the costate is the gradient of the energy
+
+    found = root(missing, [np.interp(flight_time, table[:, 0], column) for column in table[:, 2:].T], tol=1e-11)
+    r, vr, theta, vt, _, toward_vr, toward_vt = flown(found.x)
+    return {"time": times, "r": r, "vr": vr, "theta": theta, "vt": vt, "u": np.arctan2(toward_vt, toward_vr)}
+
+
+def _with_costates(_: float, x: np.ndarray) -> list[float]:
+    """Rates of r, vr, theta, vt and of the costates of r, vr, vt (that of theta is zero), with thrust along those of the velocities."""
+    r, vr, _theta, vt, by_r, by_vr, by_vt = x
+    thrust = ACCELERATION / np.hypot(by_vr, by_vt)
+    return [
+        vr,
+        vt**2 / r - 1 / r**2 + thrust * by_vr,
+        vt / r,
+        -vt * vr / r + thrust * by_vt,
+        by_vr * (vt**2 / r**2 - 2 / r**3) - by_vt * vt * vr / r**2,
+        -by_r + by_vt * vt / r,
+        -2 * by_vr * vt / r + by_vt * vr / r,
+    ]
+
+
 def _orbit_rise(name: str, angles: tuple[float, float], period: float | None) -> Problem:
     problem = Problem(name)
     rise = problem.phase("rise", t0=0.0, tf=(20.0, 80.0), time_unit="TU")

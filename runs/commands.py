@@ -54,6 +54,8 @@ def solve(arguments: Namespace) -> int:
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_picture(arguments.plot)
+    if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
+        raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
     with refused():
         front = solver.solve(
             problem,

@@ -1,8 +1,12 @@
 """How good a front is, as numbers: distances to a reference and from it, and the volume that it dominates.
 
-Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False. Of a `Front`, the
-minimised objectives are taken; an array next to one is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns
-are minimised.
+Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False; `runs.scale.Scale`
+says so in words, for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
+is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns are minimised.
+
+Against a sparse reference, or one of three and more objectives, all five are what moocore and pymoo compute. A dense reference of two
+objectives is the curve through its points, which those packages do not have: there `gd` is less than theirs, by up to half the spacing of
+the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by how many points lie on it.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ import moocore
 import numpy as np
 
 from macs.dominance import nondominated
+from macs.evaluation import CONVERGED
 from macs.front import Front
 
 JOINED = 0.02
@@ -21,38 +26,35 @@ SAMPLES = 2001
 Points = Front | np.ndarray
 
 
-def gd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
 
     A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
-    about a quarter of their spacing.
+    about a quarter of their spacing. With `curve=False` it is its points alone, always, as published tables mostly have it.
     """
     F, R = _pair(front, reference, normalise)
-    return float(_to_reference(F, R).mean()) if len(F) else np.nan
+    return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
 
 
-def igd(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Inverted generational distance: mean distance of the reference from the nearest point of the front. Infinite for an empty front.
 
-    Where the reference is a curve (see `gd`), the mean is taken evenly along its length.
+    Where the reference is a curve (see `gd`, also for `curve`), the mean is taken evenly along its length.
     """
     F, R = _pair(front, reference, normalise)
-    return mean_distance(_evenly(R), F) if len(F) else np.inf
+    return float(moocore.igd(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
-def igd_plus(front: Points, reference: Points, *, normalise: bool = True) -> float:
+def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """As `igd`, but only what a point is *worse* than the reference in each objective counts (Ishibuchi et al. 2015)."""
     F, R = _pair(front, reference, normalise)
-    if not len(F):
-        return np.inf
-    worse = np.maximum(F - _evenly(R)[:, None], 0.0)
-    return float(np.linalg.norm(worse, axis=2).min(axis=1).mean())
+    return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
 def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True) -> float:
     """By how much the front would have to improve in every objective to be nowhere worse than the reference. Infinite if it is empty."""
     F, R = _pair(front, reference, normalise)
-    return float((F - R[:, None]).max(axis=2).min(axis=1).max()) if len(F) else np.inf
+    return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
 
 def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normalise: bool = True) -> float:
@@ -64,17 +66,22 @@ def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normali
     F, R = _pair(front, reference, normalise)
     if not len(F):
         return 0.0
-    ideal, nadir = R.min(axis=0), R.max(axis=0)
-    return float(moocore.hypervolume(np.ascontiguousarray(F), ref=ideal + point * np.where(nadir > ideal, nadir - ideal, 1.0)))
+    ideal, unit = extent(R)
+    return float(moocore.hypervolume(np.ascontiguousarray(F), ref=ideal + point * unit))
 
 
 # Plain distances, for arrays whose senses do not matter
 
 
+def extent(R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal (m,) of the rows of R (k, m), minimised, and how far it is from there to their nadir; 1 where all are the same."""
+    range_ = np.ptp(R, axis=0)
+    return R.min(axis=0), np.where(range_ > 0, range_, 1.0)
+
+
 def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points and reference in units of the reference's range."""
-    lower, range_ = reference.min(axis=0), np.ptp(reference, axis=0)
-    unit = np.where(range_ > 0, range_, 1.0)
+    lower, unit = extent(reference)
     return (F - lower) / unit, (reference - lower) / unit
 
 
@@ -95,53 +102,75 @@ def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:
     return float(np.linalg.norm(reference[:, None] - F, axis=2).min(axis=1).mean())
 
 
-def _pair(front: Points, reference: Points, normalise: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Minimised objectives of both, (n, m) and (k, m); the reference without dominated points, in the order of its first objective."""
-    known = next((points for points in (front, reference) if isinstance(points, Front)), None)
-    signs = np.array([goal.sign for goal in known.goals]) if known is not None else 1.0
-    F, R = (points.F if isinstance(points, Front) else _rows(points) * signs for points in (front, reference))
-    if not len(R):
-        raise ValueError("the reference has no points")
-    if len(F) and F.shape[1] != R.shape[1]:
-        raise ValueError(f"the front has {F.shape[1]} objectives, the reference {R.shape[1]}")
-    R = R[nondominated(R)]
-    R = R[np.lexsort(R.T[::-1])]
-    return normalised(F, R) if normalise and len(F) else (F, R)
+def minimised(points: Points, known: Front | None, what: str = "the front") -> np.ndarray:
+    """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of the front `known`, if any.
 
-
-def _rows(points: np.ndarray) -> np.ndarray:
+    Raises
+    ------
+    ValueError
+        For an array that is not (n, m), has another number of objectives than `known`, or holds NaN or infinite values.
+    """
+    if isinstance(points, Front):
+        return points.F[points.status == CONVERGED]
     rows = np.asarray(points, dtype=float)
     if rows.ndim != 2:
         raise ValueError(f"objectives must be an array (n, m), not one of shape {rows.shape}")
-    return rows
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(bad):
+        raise ValueError(f"row {bad[0]} of {what} is not finite: {rows[bad[0]].tolist()}; a failed point is no point of a front")
+    if not rows.size:
+        return rows if known is None else np.empty((0, len(known.goals)))
+    if known is None:
+        return rows
+    if rows.shape[1] != len(known.goals):
+        raise ValueError(f"{what} has {rows.shape[1]} objectives, the other {len(known.goals)}: {', '.join(known.names)}")
+    return rows * [goal.sign for goal in known.goals]
 
 
-def _pieces(R: np.ndarray) -> list[np.ndarray]:
+def truth(reference: Points, known: Front | None = None) -> np.ndarray:
+    """Minimised objectives (k, m) of a reference, without dominated points, in the order of the first objective."""
+    R = minimised(reference, known, "the reference")
+    if not len(R):
+        raise ValueError("the reference has no points")
+    R = R[nondominated(R)]
+    return R[np.lexsort(R.T[::-1])]
+
+
+def _pair(front: Points, reference: Points, normalise: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Minimised objectives of both, (n, m) and (k, m)."""
+    known = next((points for points in (front, reference) if isinstance(points, Front)), None)
+    F, R = minimised(front, known), truth(reference, known)
+    if len(F) and F.shape[1] != R.shape[1]:
+        raise ValueError(f"the front has {F.shape[1]} objectives, the reference {R.shape[1]}")
+    return normalised(F, R) if normalise and len(F) else (F, R)
+
+
+def pieces(R: np.ndarray) -> list[np.ndarray]:
     """The curves of a reference in its order; none where its points are not dense, or not of two objectives."""
     if R.shape[1] != 2:
         return []
     gaps = np.linalg.norm(np.diff(normalised(R, R)[0], axis=0), axis=1)
-    pieces = np.split(R, np.flatnonzero(gaps > JOINED) + 1)
-    return pieces if all(len(piece) > 1 for piece in pieces) else []
+    parts = np.split(R, np.flatnonzero(gaps > JOINED) + 1)
+    return parts if all(len(part) > 1 for part in parts) else []
 
 
-def _to_reference(F: np.ndarray, R: np.ndarray) -> np.ndarray:
+def _to_reference(F: np.ndarray, R: np.ndarray, curve: bool) -> np.ndarray:
     """Distance (n,) of points to a reference."""
-    pieces = _pieces(R)
-    if not pieces:
+    curves = pieces(R) if curve else []
+    if not curves:
         return np.linalg.norm(F[:, None] - R, axis=2).min(axis=1)
-    start, step = (np.vstack([part(piece) for piece in pieces]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
+    start, step = (np.vstack([part(piece) for piece in curves]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
     return _to_segments(F, start, step)
 
 
-def _evenly(R: np.ndarray) -> np.ndarray:
+def _evenly(R: np.ndarray, curve: bool) -> np.ndarray:
     """The points of a reference, or where it is dense points evenly along it."""
-    pieces = _pieces(R)
-    if not pieces:
+    curves = pieces(R) if curve else []
+    if not curves:
         return R
-    lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in pieces])
+    lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in curves])
     counts = np.maximum(2, np.round(SAMPLES * lengths / lengths.sum()).astype(int))
-    return np.vstack([_along(piece, count) for piece, count in zip(pieces, counts, strict=True)])
+    return np.vstack([_along(piece, count) for piece, count in zip(curves, counts, strict=True)])
 
 
 def _along(curve: np.ndarray, samples: int) -> np.ndarray:

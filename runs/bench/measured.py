@@ -11,6 +11,10 @@ import numpy as np
 
 from macs.tables import text_table
 
+from ..report_tables import short
+
+__all__ = ["Column", "Row", "save", "short", "table"]
+
 
 @dataclass
 class Row:
@@ -45,17 +49,6 @@ class Row:
 
 Column = tuple[str, str, Callable[[Row], str]]
 """Two lines of header, and what to write for a row."""
-
-
-def short(value: float) -> str:
-    """Three significant digits, as a person would write them."""
-    if not np.isfinite(value):
-        return "-"
-    if value == 0.0:
-        return "0"
-    if not 1e-3 <= abs(value) < 1e5:
-        return f"{value:.1e}"
-    return f"{value:.{max(0, 2 - int(np.floor(np.log10(abs(value)))))}f}"
 
 
 def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:

@@ -128,7 +128,8 @@ def test_the_search_credits_what_the_archive_keeps():
 
 def test_how_many_are_sampled_and_bred():
     assert MACS().points_to_sample(10_000) == MACS().offspring(10) == 10
-    assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100).offspring(100) == 100
+    assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100) == 100
+    assert MACS(archive=100).offspring(100) == 15
     assert MACS(archive=100).points_to_sample(500) == 25
     assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3) == 10
     assert MACS(sample=40).points_to_sample(20) == 40

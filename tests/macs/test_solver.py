@@ -37,7 +37,7 @@ def test_nothing_to_decide() -> None:
         ({"time_limit": -1}, "time_limit"),
         ({"inner": "magic"}, "magic"),
         ({"callback": 3}, "callback"),
-        ({"checkpoint": "there.nc"}, "checkpoint"),
+        ({"checkpoint": 3}, "checkpoint must be a path"),
         ({"start": np.zeros((2, 7))}, "7 entries"),
         ({"start": np.full((1, 9 + 1), np.nan)}, "start"),
         ({"start": "nonsense"}, "start"),

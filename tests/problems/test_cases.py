@@ -95,3 +95,30 @@ def test_without_thrust_the_orbit_is_a_circle():
 
     end = solve_ivp(rates, (0, 30), [v[0] for v in phase.initial], rtol=1e-10, atol=1e-12).y[:, -1]
     assert end == pytest.approx([1.1, 0, 30 * 1.1**-1.5, 1.1**-0.5], abs=1e-7)
+
+
+@pytest.mark.parametrize("tf", [goddard.shortest_time(), 110.0, 150.0, 250.0])
+def test_the_optimal_ascent_is_a_flight_of_its_control_and_ends_where_the_front_says(tf):
+    flight = goddard.optimal_flight(tf, points=20_001)
+    t, middle = flight["time"], lambda values: (values[1:] + values[:-1]) / 2
+    rates = {
+        "x": middle(flight["vx"]),
+        "vx": goddard.THRUST * middle(np.cos(flight["u"])),
+        "y": middle(flight["vy"]),
+        "vy": goddard.THRUST * middle(np.sin(flight["u"])) - goddard.GRAVITY,
+    }
+    for name, rate in rates.items():
+        # At the shortest time the control jumps within one of the steps.
+        off = np.abs(np.diff(flight[name]) - rate * np.diff(t))
+        assert np.sort(off)[-2] < 1e-7, name
+        assert flight[name][0] == pytest.approx(0.0, abs=1e-12)
+    assert flight["y"][-1] == pytest.approx(goddard.HEIGHT, abs=1e-10)
+    assert flight["vy"][-1] == pytest.approx(0.0, abs=1e-12)
+    longest = goddard.reference(points=2, longest=tf)[-1, 1] if tf > goddard.shortest_time() else 0.0
+    assert flight["vx"][-1] == pytest.approx(longest, abs=1e-12)
+
+
+def test_no_ascent_is_shorter_than_the_shortest():
+    with pytest.raises(ValueError, match="the shortest one takes"):
+        goddard.optimal_flight(100.0)
+    assert goddard.optimal_flight(goddard.shortest_time() * (1 - 1e-4))["time"][-1] == goddard.shortest_time()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from problems import orbit_rise
@@ -37,3 +38,23 @@ def test_reference_is_a_front() -> None:
     assert reference.shape == (241, 2)
     assert (np.diff(reference, axis=0) > 0).all()
     np.testing.assert_allclose(-reference[[0, -1], 1], [0.28345965587, -0.05344446957], atol=1e-10)
+
+
+def test_the_optimal_flight_is_a_flight_of_its_control_and_ends_where_the_front_says() -> None:
+    for tf in (20.0, 33.3, 80.0):
+        flight = orbit_rise.optimal_flight(tf, points=4001)
+        t = flight["time"]
+
+        def rates(time: float, x: np.ndarray, t=t, flight=flight) -> list[float]:
+            (r, vr, _, vt), u = x, np.interp(time, t, flight["u"])
+            return [vr, vt**2 / r - 1 / r**2 + A * np.cos(u), vt / r, -vt * vr / r + A * np.sin(u)]
+
+        flown = solve_ivp(rates, (0.0, tf), [orbit_rise.START_RADIUS, 0.0, 0.0, orbit_rise.START_RADIUS**-0.5], rtol=1e-9, atol=1e-10)
+        r, vr, theta, vt = flown.y[:, -1]
+        np.testing.assert_allclose([r, vr, theta, vt], [flight[name][-1] for name in ("r", "vr", "theta", "vt")], atol=1e-6)
+        reference = orbit_rise.reference()
+        near = np.argsort(np.abs(reference[:, 0] - tf))[:4]
+        expected = np.polynomial.Polynomial.fit(*reference[near].T, 3)(tf)
+        assert abs((vr**2 + vt**2) / 2 - 1 / r - expected) < 1e-6
+    with pytest.raises(ValueError, match="from 20 to 80"):
+        orbit_rise.optimal_flight(81.0)

@@ -175,4 +175,4 @@ def test_spreads_are_short():
     for value in (3.0, 3.0, 100.0):
         row.add(x=value)
     assert row.spread("x") == "3.00 [3.00, 3.00]"
-    assert [short(v) for v in (0.0, 12.345, 1234.5, 0.05, 1e-7, np.nan, np.inf)] == ["0", "12.3", "1234", "0.0500", "1.0e-07", "-", "-"]
+    assert [short(v) for v in (0.0, 12.345, 1234.5, 0.05, 1e-7, np.nan, np.inf)] == ["0", "12.3", "1234", "0.0500", "1.00e-07", "-", "inf"]

@@ -152,6 +152,9 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--out", "."], ["it is a folder"]),
         (["solve", "goddard", "--plot", "nowhere/front.png"], ["nowhere/front.png", "there is no folder"]),
         (["solve", "goddard", "--plot", "front.docx"], ["front.docx", ".png"]),
+        (["solve", "goddard", "--checkpoint", "nowhere/run.ckpt"], ["nowhere/run.ckpt", "there is no folder"]),
+        (["solve", "goddard", "--checkpoint", "glide.py"], ["glide.py does not hold a checkpoint", "something else", "left as it is"]),
+        (["solve", "goddard", "--checkpoint", "a.nc", "--out", "./a.nc"], ["--checkpoint a.nc would be overwritten"]),
         (["solve", "missing.py:build"], ["no file 'missing.py'"]),
         (["solve", "glide.py:missing"], ["no function 'missing'"]),
         (["solve", "glide.py:broken"], ["NameError", "undefined_name"]),
@@ -190,6 +193,29 @@ def test_ctrl_c_keeps_what_was_found(here):
     assert process.returncode == 0
     assert "ended early (interrupted)" in out and "front saved in front.nc" in out
     assert Front.load("front.nc").stats["stopped"] == "interrupted"
+
+
+def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, monkeypatch):
+    call = ["solve", "glide.py:build", "--evaluations", "150", "--seed", "1"]
+    assert main([*call, "--out", "whole.nc"]) == 0
+    whole = Front.load("whole.nc")
+    advance = macs.MACS.advance
+
+    def dies(self, state, evaluator, budget):
+        if state.iteration == 2:
+            raise KeyboardInterrupt
+        advance(self, state, evaluator, budget)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(macs.MACS, "advance", dies)
+        assert main([*call, "--checkpoint", "run.ckpt", "--out", "part.nc"]) == 130
+    assert Path("run.ckpt").exists() and not Path("part.nc").exists()
+    capsys.readouterr()
+    assert "seed is 1 there, 2 here" in wrong(capsys, *call[:-1], "2", "--checkpoint", "run.ckpt")
+    assert main([*call, "--checkpoint", "run.ckpt", "--out", "rest.nc"]) == 0
+    rest = Front.load("rest.nc")
+    assert rest.F.tobytes() == whole.F.tobytes() and rest.decision.tobytes() == whole.decision.tobytes()
+    assert rest.stats["evaluations"] == whole.stats["evaluations"]
 
 
 # Looking at what was saved

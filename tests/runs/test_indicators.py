@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 import runs
-from macs import MACS
+from macs import MACS, Front
 from problems import goddard, load, orbit_rise
+from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
 from runs.indicators import distance_to_curve, inverted_distance
+from runs.references import foreign
 from transcription import DFET
 
 LINE = np.column_stack([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
@@ -37,6 +39,91 @@ def test_as_moocore_has_them(m):
     assert gd(F, R, normalise=False) == pytest.approx(moocore.igd(R, ref=F), rel=1e-12)
     assert hypervolume(F, R) == pytest.approx(moocore.hypervolume(F_, ref=[1.1] * m), rel=1e-12)
     assert hypervolume(F, R, normalise=False) == pytest.approx(hypervolume(F, R) * np.ptp(R, axis=0).prod(), rel=1e-9)
+
+
+@pytest.mark.parametrize("m", [2, 3])
+def test_average_hausdorff_is_the_larger_of_both_distances(m):
+    F, R = fronts(m, 9, 2), reference(m)
+    both = max(gd(F, R, normalise=False), igd(F, R, normalise=False))
+    assert both == pytest.approx(moocore.avg_hausdorff_dist(F, ref=R, p=1), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["zdt1", "zdt2", "zdt3", "zdt4", "dtlz1", "dtlz2"])
+def test_as_pymoo_has_them_on_its_own_fronts(name):
+    from pymoo.indicators.gd import GD
+    from pymoo.indicators.hv import HV
+    from pymoo.indicators.igd import IGD
+    from pymoo.indicators.igd_plus import IGDPlus
+    from pymoo.problems import get_problem
+
+    truth = get_problem(name).pareto_front()
+    rng = np.random.default_rng(0)
+    # Every fifth point, too sparse for a curve; and a front somewhat above, some of it at the border of the volume.
+    R = truth[::5] if truth.shape[1] == 2 else truth
+    ideal, nadir = R.min(axis=0), R.max(axis=0)
+    F = truth[rng.choice(len(truth), 15, replace=False)] + 0.3 * rng.random((15, truth.shape[1])) * (nadir - ideal)
+    scale = {"zero_to_one": True, "ideal": ideal, "nadir": nadir}
+    for ours, theirs in ((gd, GD), (igd, IGD), (igd_plus, IGDPlus)):
+        assert ours(F, R) == pytest.approx(theirs(R, **scale)(F), rel=1e-10)
+        assert ours(F, R, normalise=False) == pytest.approx(theirs(R)(F), rel=1e-10)
+    assert hypervolume(F, R) == pytest.approx(HV(ref_point=np.full(truth.shape[1], 1.1))((F - ideal) / (nadir - ideal)), rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["zdt1", "zdt2", "zdt4"])
+def test_to_a_curve_is_nearer_than_to_its_points(name):
+    """The difference by definition: at most half the spacing of the points."""
+    from pymoo.indicators.gd import GD
+    from pymoo.indicators.igd import IGD
+    from pymoo.problems import get_problem
+
+    truth = get_problem(name).pareto_front()
+    for ours, theirs in ((gd, GD), (igd, IGD)):
+        assert ours(truth * 1.05, truth, normalise=False, curve=False) == pytest.approx(theirs(truth)(truth * 1.05), rel=1e-10)
+    spacing = np.linalg.norm(np.diff(truth, axis=0), axis=1).max()
+    F = truth[5::10] * [1.0, 1.02]
+    assert gd(F, truth) <= GD(truth)(F) + 1e-12 <= gd(F, truth) + spacing / 2 + 1e-9
+    # The mean along the curve and over its points differ by how unevenly these lie.
+    assert igd(F, truth) == pytest.approx(IGD(truth)(F), rel=0.3)
+
+
+def test_what_did_not_converge_is_no_point():
+    goals = (Objective("cost"), Objective("gain", sense="maximize"))
+    front = Front(
+        F=[[0.0, -1.0], [0.5, 0.5], [-9.0, -9.0], [np.nan, np.nan]],
+        decision=[[]] * 4,
+        violation=[0, 0, 1, np.inf],
+        status=["converged", "converged", "infeasible", "failed"],
+        goals=goals,
+    )
+    good = np.array([[0.0, 1.0], [0.5, -0.5]])
+    truth = np.array([[0.0, 2.0], [1.0, 3.0], [0.2, 2.2]])
+    for indicator in (gd, igd, igd_plus, additive_epsilon, hypervolume):
+        assert indicator(front, truth) == indicator(good * [1, -1], truth * [1, -1])
+    with pytest.raises(ValueError, match="row 1 of the front is not finite"):
+        gd(np.array([[0.0, 1.0], [np.nan, 1.0]]), LINE)
+    with pytest.raises(ValueError, match="row 0 of the reference is not finite"):
+        gd(LINE, np.array([[np.inf, 1.0]]))
+
+
+def test_the_scale_says_what_was_done():
+    from runs.scale import Scale
+
+    goals = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
+    front = foreign(np.array([[110.0, 0.5]]), goals)
+    truth = np.array([[100.0, 0.0], [200.0, 1.0], [150.0, 0.8], [300.0, 0.9]])
+    scale = Scale.of(truth, like=front, what="the closed form")
+    assert scale.ideal == (100.0, 1.0) and scale.nadir == (200.0, 0.0) and scale.count == 3
+    assert scale.corner == pytest.approx((210.0, -0.1))
+    words = scale.describe()
+    assert "nadir (flight time 200 s, speed 0 km/s) of the closed form (3 points)" in words
+    assert "up to 1.1 in each objective (flight time 210 s, speed -0.1 km/s)" in words
+    assert "(2001 points, the curve through them)" in Scale.of(goddard.reference(), like=front).describe()
+    assert "(2001 points)" in Scale.of(goddard.reference(), like=front, curve=False).describe()
+    # What the volume is measured in: the box from the front's point to the corner, in ranges.
+    assert hypervolume(front, truth) == pytest.approx(np.prod((np.array(scale.corner) - [110, 0.5]) / [100, -1]))
+    plain = Scale.of(truth, like=front, normalise=False).describe()
+    assert plain.startswith("Objectives in their own units") and "210 s" in plain
+    assert Scale.of(truth * [1, -1]).names == ("objective 1", "objective 2")
 
 
 def test_a_dense_reference_is_a_curve():

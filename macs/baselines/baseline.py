@@ -1,0 +1,254 @@
+"""What the baselines share: a pymoo algorithm is made anew for each iteration from the state, asked, told, and read back into the state.
+
+So the state is plain data, and the algorithm goes on as if it had never been away: it draws from the state's generator, and every random
+draw, comparison and sum is pymoo's own. pymoo never evaluates anything, and knows of no termination.
+"""
+
+from __future__ import annotations
+
+import warnings
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..archive import Archive, least_violated
+from ..evaluation import Evaluator
+from ..inputs import check_count
+from ..search import box_of
+from ..solver import Solver
+from . import handling as handlings
+from .members import Members, evaluate, full_vectors, shown
+
+
+@dataclass
+class State:
+    """What every baseline knows between two iterations; each adds what is its own.
+
+    Attributes
+    ----------
+    members : Members
+        The population.
+    archive : Archive
+        What the algorithm would return now: see `Baseline`.
+    closest : Archive
+        The least violated point seen, one row, as long as the archive is empty; no row afterwards.
+    iteration : int
+        Generations done.
+    rng : numpy.random.Generator
+    """
+
+    members: Members
+    archive: Archive
+    closest: Archive
+    iteration: int
+    rng: np.random.Generator
+
+
+class Baseline(Solver):
+    """A solver that drives an algorithm of pymoo's.
+
+    On an unconstrained problem, the same seed and as many evaluations as are a whole number of generations, its points are those of
+    `pymoo.optimize.minimize` to the last bit. Beyond that:
+
+    - The front is what the algorithm returns, without the infeasible points and without repetitions: the non-dominated ones of its
+      population, its niches or its archive. Where constraints are a penalty or an objective, that may hold nothing feasible any more: then
+      it is what it last was.
+    - Of a last generation for which the budget is too small, the first offspring are evaluated, and compete as usual.
+    - A failed evaluation counts as infeasible, behind all others.
+    - Where the evaluator moves candidates, the population takes the points that come back. Their next neighbours start from there.
+    - `start` takes the first places of the population: of too many, evenly spaced ones.
+    - Periodic variables are plain intervals to it.
+
+    An implementation is a frozen dataclass of settings, with `handling` and `penalty` among them, and the hooks below.
+    """
+
+    handling: str
+    penalty: float
+    _knows_constraints = True
+
+    # The hooks
+
+    @abstractmethod
+    def _size(self, m: int | None) -> int | None:
+        """How many individuals there are; None as long as the number of objectives is not known but has to be."""
+
+    @abstractmethod
+    def _algorithm(self, m: int) -> Any:
+        """A new pymoo algorithm, for m objectives as it is told them."""
+
+    @abstractmethod
+    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> State:
+        """The state of the first population, before the algorithm has seen it; `common` are the fields that all states have."""
+
+    @abstractmethod
+    def _restore(self, algorithm: Any, state: Any, people: Any) -> None:
+        """Give the algorithm what it knew; `people` are pymoo's individuals of `_table(state)`."""
+
+    @abstractmethod
+    def _keep(self, algorithm: Any, state: Any, table: Members) -> None:
+        """Take over into the state what is its own, for points whose rows in `table` their individuals know."""
+
+    def _table(self, state: Any) -> Members:
+        """All points of the state that have to become individuals, the population first."""
+        return state.members
+
+    def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
+        """`count` candidates (count, d), drawn as pymoo draws them."""
+        return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))
+
+    def _place(self, members: Members, evaluator: Evaluator) -> Members:
+        """The first population, of which some were given, each in a place that suits it."""
+        return members
+
+    def _cut(self, algorithm: Any, count: int) -> None:
+        """Prepare the algorithm for being told of only the first `count` of those that it has asked for."""
+
+    def _told(self, points: Members, tolerance: float) -> handlings.Told:
+        """What the algorithm is told of points."""
+        return handlings.told(self.handling, self.penalty, points.F, points.violation, tolerance)
+
+    # The contract
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        """See `Solver.makes_state`."""
+        return self._first
+
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """Evaluate a first population; see `Solver.begin`."""
+        if budget <= evaluator.counts.evaluations:
+            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        given = np.empty((0, 0)) if start is None else start[np.sort(np.unique(start, axis=0, return_index=True)[1])]
+        m, members = evaluator.m_known, None
+        if m is not None:
+            self.check_objectives(m)
+        size = self._size(m)
+        if size is None:  # one point tells how many objectives there are
+            members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng))
+            self.check_objectives(members.F.shape[1])
+            size = self._size(members.F.shape[1])
+        assert size is not None
+        done = 0 if members is None else 1
+        if len(given) > size:
+            given = given[np.linspace(0, len(given) - 1, size).round().astype(int)]
+        Z = self._candidates(evaluator, given[done:], size - done, rng)[: budget - evaluator.counts.evaluations]
+        if len(Z):
+            members = evaluate(evaluator, Z) if members is None else members.join(evaluate(evaluator, Z))
+        assert members is not None
+        self.check_objectives(members.F.shape[1])
+        if len(given):
+            members = self._place(members, evaluator)
+        nobody = members.take(np.arange(0))
+        none = Archive(nobody.Z, nobody.F, nobody.violation)
+        common = {"members": members, "archive": none, "closest": none, "iteration": 0, "rng": rng}
+        state = self._first(members, common, evaluator)
+        algorithm, table = self._set_up(evaluator, members.F.shape[1], rng), self._table(state)
+        people = self._people(table, evaluator)
+        self._restore(algorithm, state, people)
+        with warnings.catch_warnings():  # pymoo changes the filters
+            algorithm.tell(infills=people[: len(members)])
+        self._remember(algorithm, state, table, members, evaluator)
+        return state
+
+    def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
+        """One generation, within the budget of evaluations; changes `state`."""
+        left = budget - evaluator.counts.evaluations
+        if left <= 0:
+            return
+        table = self._table(state)
+        algorithm = self._set_up(evaluator, table.F.shape[1], state.rng)
+        self._restore(algorithm, state, self._people(table, evaluator))
+        algorithm.is_initialized, algorithm.n_iter, algorithm.opt = True, state.iteration + 1, ()
+        while algorithm.n_iter == state.iteration + 1 and left > 0:  # some ask for one candidate at a time
+            asked = algorithm.ask()
+            if asked is None:  # nothing could be bred that is not there already
+                break
+            alone = not hasattr(asked, "__len__")
+            offspring = [asked] if alone else asked[:left]
+            if len(offspring) == left:
+                self._cut(algorithm, left)
+            X = np.array([one.X for one in offspring])
+            bred = evaluate(evaluator, full_vectors(evaluator, state.members, X))
+            left = budget - evaluator.counts.evaluations
+            self._tell(offspring, bred, len(table), evaluator)
+            table = table.join(bred)
+            with warnings.catch_warnings():
+                algorithm.tell(infills=asked if alone else offspring)
+            self._remember(algorithm, state, table, bred, evaluator)
+        state.iteration += 1
+
+    # Between the two
+
+    def _candidates(self, evaluator: Evaluator, given: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Full vectors (count, D): the given ones, and drawn ones in the places that are left."""
+        Z = evaluator.first_guess(self._draw(evaluator, count, rng))
+        if len(given):
+            Z[: len(given)] = given
+        Z[:, evaluator.free] = box_of(evaluator).confine(Z[:, evaluator.free])
+        return Z
+
+    def _set_up(self, evaluator: Evaluator, m: int, rng: np.random.Generator) -> Any:
+        """The algorithm, ready for use on the evaluator's variables and for m objectives; it draws from `rng` from now on."""
+        from pymoo.config import Config
+        from pymoo.core.evaluator import VoidEvaluator
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
+        Config.warnings["not_compiled"] = False  # it would print
+        m += self.handling == "objective"
+        algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._knows_constraints)
+        problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
+        algorithm.setup(problem, termination=NoTermination(), evaluator=VoidEvaluator(value=None), seed=0)
+        algorithm.random_state = rng
+        return algorithm
+
+    def _people(self, points: Members, evaluator: Evaluator) -> Any:
+        """A pymoo Population of points."""
+        from pymoo.core.population import Population
+
+        people = Population.empty(len(points))
+        self._tell(people, points, 0, evaluator)
+        return people
+
+    def _tell(self, people: Any, points: Members, row: int, evaluator: Evaluator) -> None:
+        """Write points into pymoo's individuals, who learn their rows, from `row` on, in the table of all points."""
+        X = box_of(evaluator).confine(points.Z[:, evaluator.free])
+        F, cv = self._told(points, evaluator.tolerance)
+        for i, one in enumerate(people):
+            one.X, one.F, one.CV = X[i].copy(), F[i].copy(), cv[i : i + 1].copy()
+            one.set("row", row + i)
+
+    def _remember(self, algorithm: Any, state: Any, table: Members, seen: Members, evaluator: Evaluator) -> None:
+        """Read the algorithm back into the state."""
+        state.members = table.take(rows_of(algorithm.pop))
+        self._keep(algorithm, state, table)
+        found = shown(evaluator.tolerance, table.take(rows_of(algorithm.opt)), state.members)
+        if found is None and not len(state.archive):
+            found = shown(evaluator.tolerance, seen)
+        if found is not None:
+            state.archive, state.closest = found, state.closest.take(np.arange(0))
+        elif not len(state.archive):
+            state.closest = least_violated(state.closest, seen.Z, seen.F, seen.violation)
+
+    def _check(self, counts: dict[str, int], ranges: dict[str, tuple[float, float]]) -> None:
+        """Raise ValueError for settings that make no sense: `counts` gives the least of each, `ranges` the closed interval."""
+        name = type(self).__name__
+        for setting, least in counts.items():
+            if getattr(self, setting) is not None or getattr(type(self), setting) is not None:  # None only where that is the default
+                check_count(f"{name}: {setting}", getattr(self, setting), least)
+        for setting, (low, high) in {**ranges, "penalty": (0.0, np.inf)}.items():
+            value = getattr(self, setting)
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value <= high or np.isinf(value):
+                wanted = f"in [{low:g}, {high:g}]" if np.isfinite(high) else f"a number of at least {low:g}"
+                raise ValueError(f"{name}: {setting} must be {wanted}, not {value!r}")
+        if self.handling not in handlings.HANDLINGS:
+            known = ", ".join(f"'{handling}'" for handling in handlings.HANDLINGS)
+            raise ValueError(f"{name}: handling must be one of {known}, not {self.handling!r}")
+
+
+def rows_of(people: Any) -> np.ndarray:
+    """The rows (n,), in the table of all points, of pymoo's individuals."""
+    return np.array([one.data["row"] for one in people], dtype=int)

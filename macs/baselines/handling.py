@@ -1,0 +1,68 @@
+"""What an algorithm is told of points that violate constraints: three ways, each a pure function, and one for those that only compare F.
+
+Only here, at the border, does a violation or a failure ever become part of an objective; what is kept and shown has its own numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+HANDLINGS = ("feasible-first", "penalty", "objective")
+HUGE = 1e30
+"""Larger than any objective; its square is still a number."""
+
+Told = tuple[np.ndarray, np.ndarray]
+"""Objectives (n, m) that are numbers, and violations (n,): 0 where a point counts as feasible, infinite where the evaluation failed."""
+
+
+def excess(F: np.ndarray, violation: np.ndarray, tolerance: float) -> np.ndarray:
+    """The violation (n,) that counts: none up to the tolerance, infinite where the evaluation failed."""
+    failed = ~np.isfinite(F).all(axis=1) | ~np.isfinite(violation)
+    return np.where(failed, np.inf, np.where(violation <= tolerance, 0.0, violation))
+
+
+def feasible_first(F: np.ndarray, cv: np.ndarray) -> Told:
+    """Superiority of feasible solutions (Deb 2000): objectives decide among the feasible, the violation among the others.
+
+    Parameters
+    ----------
+    F : array (n, m)
+        Objectives; NaN where the evaluation failed.
+    cv : array (n,)
+        See `excess`.
+    """
+    return _numbers(F, cv), cv
+
+
+def penalty(F: np.ndarray, cv: np.ndarray, factor: float) -> Told:
+    """Penalty function: `factor` times the violation is added to every objective. Arguments as for `feasible_first`."""
+    finite = np.isfinite(cv)
+    return _numbers(F + factor * np.where(finite, cv, 0.0)[:, None], cv), np.where(finite, 0.0, cv)
+
+
+def objective(F: np.ndarray, cv: np.ndarray) -> Told:
+    """Constraint as an objective: the violation is one more, the last. Arguments as for `feasible_first`."""
+    return _numbers(np.hstack([F, cv[:, None]]), cv), np.where(np.isfinite(cv), 0.0, cv)
+
+
+def told(handling: str, factor: float, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Told:
+    """What an algorithm is told of points with these objectives and violations."""
+    cv = excess(F, violation, tolerance)
+    if handling == "penalty":
+        return penalty(F, cv, factor)
+    return objective(F, cv) if handling == "objective" else feasible_first(F, cv)
+
+
+def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
+    """Objectives (n, m) that say all, for algorithms that know of nothing else: feasible-first by plain comparison.
+
+    Every objective of an infeasible point is beyond any feasible one, by as much as its violation ranks it: less violated points dominate
+    more violated ones, and are better in any Tchebycheff or boundary-intersection scalarisation.
+    """
+    share = np.divide(cv, 1.0 + cv, out=np.ones_like(cv), where=np.isfinite(cv))
+    return np.where((cv > 0.0)[:, None], HUGE * (1.0 + share)[:, None], F)
+
+
+def _numbers(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
+    """F with a number, that nobody is to look at, where the evaluation failed."""
+    return np.where(np.isfinite(cv)[:, None], F, HUGE)

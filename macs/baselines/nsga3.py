@@ -1,0 +1,117 @@
+"""NSGA-III: non-dominated sorting and niches along reference directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..evaluation import Evaluator
+from .baseline import Baseline, State
+from .members import Members
+from .reference import check_directions, population_size, reference_directions
+
+
+@dataclass
+class NormalisedState(State):
+    """With what objectives are normalised by, as the algorithm is told them.
+
+    Attributes
+    ----------
+    ideal, worst : arrays (m,)
+        The best and the worst value of each objective that ever competed; infinite before there are any.
+    extreme_points : array (m, m) or (0, m)
+        The points that span the hyperplane; none before there are any.
+    """
+
+    ideal: np.ndarray
+    worst: np.ndarray
+    extreme_points: np.ndarray
+
+
+@dataclass(frozen=True)
+class NSGA3(Baseline):
+    """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), that of pymoo; see `Baseline`. For two objectives or more.
+
+    The front are the non-dominated points nearest to the reference directions. Where two infeasible candidates tie, the winner is drawn
+    from the run's own generator; pymoo's draws from one that no seed governs.
+
+    Parameters
+    ----------
+    population : int, optional
+        Number of individuals, and of offspring in a generation. Without `divisions`, also the number of reference directions: any, at least
+        as many as objectives; those of a simplex lattice where one has so many, evenly spread otherwise. Default: as many as directions.
+    divisions : int, optional
+        Of the simplex lattice (Das and Dennis 1998) that gives the reference directions. With `population`, these may be fewer than the
+        individuals, by half at most. Default: of the finest lattice with no more than 100 directions (2 objectives: 100, 3: 91).
+    crossover : float, default 1
+        Probability of simulated binary crossover.
+    crossover_eta, mutation_eta : float, default 30 and 20
+        Distribution indices of crossover and of polynomial mutation, in [1, 100]: the higher, the nearer are children to their parents.
+    handling, penalty
+        As for `NSGA2`. With "objective", directions are of one more objective.
+
+    Raises
+    ------
+    ValueError
+        Where a setting is out of its range, and, once the number of objectives is known, where population and directions do not match.
+    """
+
+    population: int | None = None
+    divisions: int | None = None
+    crossover: float = 1.0
+    crossover_eta: float = 30.0
+    mutation_eta: float = 20.0
+    handling: str = "feasible-first"
+    penalty: float = 1000.0
+
+    def __post_init__(self) -> None:
+        counts = {"population": 2, "divisions": 1}
+        self._check(counts, {"crossover": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})
+
+    def check_objectives(self, m: int) -> None:
+        """Refuse one objective, and directions that do not match the population."""
+        check_directions("NSGA3", m + (self.handling == "objective"), self.population, self.divisions)
+
+    def _size(self, m: int | None) -> int | None:
+        return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
+
+    def _algorithm(self, m: int) -> Any:
+        from pymoo.algorithms.moo import nsga3
+        from pymoo.operators.crossover.sbx import SBX
+        from pymoo.operators.mutation.pm import PM
+        from pymoo.operators.selection.tournament import TournamentSelection
+
+        return nsga3.NSGA3(
+            ref_dirs=reference_directions(m, self.population, self.divisions),
+            pop_size=population_size(m, self.population, self.divisions),
+            selection=TournamentSelection(func_comp=less_violated),
+            crossover=SBX(eta=self.crossover_eta, prob=self.crossover),
+            mutation=PM(eta=self.mutation_eta),
+        )
+
+    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:
+        m = members.F.shape[1] + (self.handling == "objective")
+        return NormalisedState(**common, ideal=np.full(m, np.inf), worst=np.full(m, -np.inf), extreme_points=np.empty((0, m)))
+
+    def _restore(self, algorithm: Any, state: NormalisedState, people: Any) -> None:
+        algorithm.pop = people
+        norm = algorithm.survival.norm
+        norm.ideal_point, norm.worst_point = state.ideal, state.worst
+        norm.extreme_points = state.extreme_points if len(state.extreme_points) else None
+
+    def _keep(self, algorithm: Any, state: NormalisedState, table: Members) -> None:
+        norm = algorithm.survival.norm
+        state.ideal, state.worst = norm.ideal_point, norm.worst_point
+        if norm.extreme_points is not None:
+            state.extreme_points = norm.extreme_points
+
+
+def less_violated(pop: Any, P: np.ndarray, random_state: np.random.Generator, **kwargs: Any) -> np.ndarray:
+    """Winners (n, 1) of tournaments between the pairs P (n, 2): the less violated, any of two that are equal."""
+    winners = np.empty((len(P), 1), dtype=int)
+    for i, (a, b) in enumerate(P):
+        of_a, of_b = pop[a].CV[0], pop[b].CV[0]
+        winners[i] = random_state.choice([a, b]) if of_a == of_b else a if of_a < of_b else b
+    return winners

@@ -1,0 +1,147 @@
+"""Empirical attainment surfaces: what many runs of one solver attain, and how many of them (Fonseca and others; exact, by moocore).
+
+A point is attained by a run if a point of that run's front is nowhere worse. The surface of k of n runs is the border of what at least k of
+them attain: k = 1 the best surface, k = n the worst, half of them the median. A run whose front is empty attains nothing, and counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import moocore
+import numpy as np
+
+from macs.front import Front
+
+from .indicators import Points, extent, minimised, truth
+
+
+@dataclass(frozen=True, eq=False)
+class Attainment:
+    """The surfaces of n runs.
+
+    Attributes
+    ----------
+    runs : int
+        How many, those with empty fronts included.
+    levels : k -> array (p, m)
+        The non-dominated corners of the surface that at least k runs attain, minimised, in the order of the first objective; k = 1, ..., n.
+        Empty where fewer than k runs have points.
+    signs : array (m,)
+        +1 or -1: times this, a corner is in the user's units and senses.
+    """
+
+    runs: int
+    levels: Mapping[int, np.ndarray]
+    signs: np.ndarray
+
+    def of(self, k: int) -> np.ndarray:
+        """Corners (p, m), in the user's units and senses, of what at least k of the runs attain."""
+        if not 1 <= k <= self.runs:
+            raise ValueError(f"surfaces are of 1 to {self.runs} runs, not of {k}")
+        return self.levels[k] * self.signs
+
+    def percent(self, share: float) -> np.ndarray:
+        """Corners (p, m) of what at least `share` per cent of the runs attain, 0 < share <= 100."""
+        return self.of(self.count(share))
+
+    def count(self, share: float) -> int:
+        """How many runs `share` per cent are: the next whole number of them."""
+        if not 0 < share <= 100:
+            raise ValueError(f"a share of the runs is more than 0 and at most 100 per cent, not {share}")
+        return max(1, int(np.ceil(share * self.runs / 100 - 1e-9)))
+
+    @property
+    def best(self) -> np.ndarray:
+        """What any run attains."""
+        return self.of(1)
+
+    @property
+    def median(self) -> np.ndarray:
+        """What half of the runs attain."""
+        return self.percent(50)
+
+    @property
+    def worst(self) -> np.ndarray:
+        """What all runs attain."""
+        return self.of(self.runs)
+
+    def volumes(self, reference: Points, *, known: Front | None = None, point: float = 1.1) -> np.ndarray:
+        """Hypervolume (n,) of each surface, from 1 to n runs, normalised as `runs.hypervolume` has it; 0 of an empty one.
+
+        `known` says the senses of a reference that is an array; without it all columns are minimised.
+        """
+        ideal, unit = extent(truth(reference, known))
+        corner = np.full(len(unit), point)
+        surfaces = [np.ascontiguousarray((self.levels[k] - ideal) / unit) for k in range(1, self.runs + 1)]
+        return np.array([moocore.hypervolume(surface, ref=corner) if len(surface) else 0.0 for surface in surfaces])
+
+
+def attainment(fronts: Sequence[Points]) -> Attainment:
+    """The attainment surfaces of several runs.
+
+    Parameters
+    ----------
+    fronts : n Fronts, or arrays (p, m) of objectives, one for each run
+        Of two or three objectives. Arrays beside a Front are in the user's units and senses; of arrays alone all columns are minimised.
+        Points that did not converge attain nothing.
+
+    Raises
+    ------
+    ValueError
+        If there is no run, none with a point, or they differ in objectives or have other than two or three.
+    """
+    known = next((front for front in fronts if isinstance(front, Front)), None)
+    rows = [minimised(front, known, f"front {i}") for i, front in enumerate(fronts)]
+    filled = [part for part in rows if part.size]
+    if not rows:
+        raise ValueError("there is no run to take attainment surfaces of")
+    for i, front in enumerate(fronts):
+        if isinstance(front, Front) and known is not None and front.goals != known.goals:
+            raise ValueError(f"front {i} has other objectives ({', '.join(front.names)}) than the first ({', '.join(known.names)})")
+    widths = {part.shape[1] for part in filled} | ({len(known.goals)} if known is not None else set())
+    if not widths:
+        raise ValueError("no run has a point: without one, the number of objectives is not known")
+    if len(widths) > 1 or not widths <= {2, 3}:
+        raise ValueError(f"attainment surfaces are of two or three objectives, the same of all runs, not of {sorted(widths)}")
+    m = widths.pop()
+    return Attainment(
+        runs=len(rows),
+        levels=_surfaces(filled, len(rows), m),
+        signs=np.array([goal.sign for goal in known.goals]) if known is not None else np.ones(m),
+    )
+
+
+def _surfaces(filled: Sequence[np.ndarray], runs: int, m: int) -> dict[int, np.ndarray]:
+    """All surfaces of runs that have points, and empty ones for as many runs as have none."""
+    levels = {k: np.empty((0, m)) for k in range(1, runs + 1)}
+    if filled:
+        # moocore 0.3.2 loses points unless the numbers of the sets increase from row to row.
+        sets = np.repeat(np.arange(len(filled)), [len(part) for part in filled])
+        table = moocore.eaf(np.vstack(filled), sets)
+        attained = np.rint(table[:, m] * len(filled) / 100).astype(int)
+        for k in range(1, len(filled) + 1):
+            corners = table[attained == k, :m]
+            levels[k] = corners[np.lexsort(corners.T[::-1])]
+    return levels
+
+
+def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """The border (q, 2) of what the corners (p, 2) of a surface dominate, for drawing.
+
+    Parameters
+    ----------
+    corners : array (p, 2)
+        In the user's units and senses.
+    signs : array (2,)
+        As of the `Attainment`.
+    ends : array (2,)
+        Where the two open ends of the staircase go: values that are worse than all corners.
+    """
+    F = corners * signs
+    F = F[np.lexsort(F.T[::-1])]
+    worst = np.asarray(ends) * signs
+    xs = np.concatenate([np.repeat(F[:, 0], 2), [max(worst[0], F[-1, 0])]])
+    ys = np.concatenate([[max(worst[1], F[0, 1])], np.repeat(F[:, 1], 2)])
+    return np.column_stack([xs, ys]) * signs

@@ -1,0 +1,157 @@
+"""What a front is measured against: a file, the closed form of a case, or the non-dominated union of fronts."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from macs.dominance import nondominated
+from macs.evaluation import CONVERGED
+from macs.front import Front
+from macs.plotting import label
+from problems.catalogue import CASES
+from problems.compiled import Objective
+
+from .indicators import Points, minimised
+
+
+def union(fronts: Sequence[Points]) -> Points:
+    """The non-dominated points of several fronts: the reference of those who have no truth.
+
+    Parameters
+    ----------
+    fronts : Fronts of one problem, arrays (n, m) of objectives, or both
+        Arrays beside a Front are in the user's units and senses; among arrays alone all columns are minimised. Empty ones add nothing.
+
+    Returns
+    -------
+    Front or array
+        Of Fronts, `Front.merge`: its points keep their trajectories. Of both, a Front of objectives alone. Of arrays, an array.
+
+    Raises
+    ------
+    ValueError
+        If there is none, if they differ in problem or objectives, or if an array holds NaN or infinite values.
+    """
+    if not len(fronts):
+        raise ValueError("there is no front to take the union of")
+    known = next((front for front in fronts if isinstance(front, Front)), None)
+    own = [front for front in fronts if isinstance(front, Front)]
+    if len(own) == len(fronts):
+        return Front.merge(own)
+    rows = [minimised(front, known, f"front {i}") for i, front in enumerate(fronts)]
+    widths = {part.shape[1] for part in rows if part.size}
+    if len(widths) > 1:
+        raise ValueError(f"the fronts differ in the number of their objectives: {sorted(widths)}")
+    F = np.vstack([part for part in rows if part.size] or [rows[0]])
+    F = F[nondominated(F)]
+    return F if known is None else foreign(F * [goal.sign for goal in known.goals], known.goals)
+
+
+def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "foreign") -> Front:
+    """A Front of objectives (n, m) alone, in the user's units and senses: points of another program, taken at their word."""
+    values = minimised(objectives, None)
+    n = len(values)
+    return Front(
+        F=values.reshape(n, len(goals)) * [goal.sign for goal in goals],
+        decision=[np.empty(0)] * n,
+        violation=np.zeros(n),
+        status=[CONVERGED] * n,
+        goals=goals,
+        solver={"name": name, "settings": {}},
+        message="" if n else "There is no point.",
+    )
+
+
+def closed_form(case: str) -> np.ndarray:
+    """The true front (k, m) of a case, in the user's units and senses: what `reference()` beside its `problem()` returns.
+
+    Parameters
+    ----------
+    case : str
+        A name of the catalogue, or "package.module:function".
+
+    Raises
+    ------
+    ValueError
+        If there is no such case, or it has no known front.
+    """
+    place = (CASES[case][0] if case in CASES else case).rpartition(":")[0]
+    try:
+        module = importlib.import_module(place)
+    except (ModuleNotFoundError, ValueError) as error:
+        raise ValueError(f"there is no problem '{case}' to take the true front of; there are {', '.join(CASES)}") from error
+    if not hasattr(module, "reference"):
+        raise ValueError(f"no true front of '{case}' is known: '{place}' has no function 'reference'; measure against a file or the union")
+    return np.asarray(module.reference(), dtype=float)
+
+
+def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
+    """A front from a file: a saved one (.nc), or a table of objectives (.csv), such as `Front.to_csv` or another program writes.
+
+    Parameters
+    ----------
+    path : path
+    goals : m Objectives
+        Of the problem that the table is of. Its columns are found by their headers, "flight time [s]" or "flight time"; without a header
+        the first m columns are the objectives in their order. Rows that say in a column "status" that they did not converge are left out.
+        Values are in the user's units and senses. Not needed for .nc.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such table, has not the objectives, or has an entry that is not a finite number.
+    FileNotFoundError
+        If there is no such file.
+    """
+    if Path(path).suffix.lower() == ".nc":
+        front = Front.load(path)
+        if goals and front.goals != tuple(goals):
+            raise ValueError(f"'{path}' has the objectives {_words(front.goals)}, not {_words(goals)}")
+        return front
+    if not goals:
+        raise ValueError(f"'{path}' is a table: to read it, say which objectives it is of")
+    with Path(path).open(newline="", encoding="utf-8-sig") as file:
+        lines = [(i, [cell.strip() for cell in row]) for i, row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row)]
+    if not lines:
+        raise ValueError(f"'{path}' is empty")
+    headed = not _is_number(lines[0][1][0])
+    columns, status = _columns(lines[0][1], goals, path) if headed else (list(range(len(goals))), None)
+    rows = []
+    for number, row in lines[headed:]:
+        if len(row) <= max(columns):
+            raise ValueError(f"'{path}', line {number}: {len(row)} columns, at least {max(columns) + 1} are needed")
+        if status is not None and row[status] != CONVERGED:
+            continue
+        cells = [row[i] for i in columns]
+        if not all(map(_is_number, cells)):
+            raise ValueError(f"'{path}', line {number}: {', '.join(map(repr, cells))} should be {len(goals)} finite numbers")
+        rows.append([float(cell) for cell in cells])
+    return foreign(np.array(rows).reshape(len(rows), len(goals)), goals, name=Path(path).stem)
+
+
+def _columns(header: Sequence[str], goals: Sequence[Objective], path: str | PathLike[str]) -> tuple[list[int], int | None]:
+    """Where the objectives are, and the status, if it is there."""
+    found = []
+    for goal in goals:
+        at = [i for i, cell in enumerate(header) if cell in (goal.name, label(goal.name, goal.unit))]
+        if not at:
+            raise ValueError(f"'{path}' has no column '{label(goal.name, goal.unit)}'; it has {', '.join(header)}")
+        found.append(at[0])
+    return found, header.index("status") if "status" in header else None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return bool(np.isfinite(float(cell)))
+    except ValueError:
+        return False
+
+
+def _words(goals: Sequence[Objective]) -> str:
+    return ", ".join(f"{goal.sense} {label(goal.name, goal.unit)}" for goal in goals)

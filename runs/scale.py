@@ -1,0 +1,110 @@
+"""In what indicators were measured, in words: whoever reads a table must see what was normalised by what, and where volumes end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from macs.front import Front
+
+from .indicators import Points, extent, pieces, truth
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The normalisation of a reference, in the user's units and senses.
+
+    Attributes
+    ----------
+    ideal, nadir : tuple of m floats
+        Best and worst value of each objective on the reference, dominated points left out.
+    corner : tuple of m floats
+        The reference point of the hypervolume.
+    point : float
+        The same in ranges of the reference from its ideal, as `hypervolume` has it.
+    names, units : tuples of m str
+    what : str
+        What the reference is: "the closed form", "the union of 60 runs".
+    count : int
+        How many points it has.
+    normalise : bool
+        Whether indicators are in these ranges, or in the objectives' own units.
+    curve : bool
+        Whether the points of the reference are taken as the curve through them; see `runs.indicators.gd`.
+    """
+
+    ideal: tuple[float, ...]
+    nadir: tuple[float, ...]
+    corner: tuple[float, ...]
+    point: float
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    what: str
+    count: int
+    normalise: bool = True
+    curve: bool = False
+
+    @staticmethod
+    def of(
+        reference: Points,
+        *,
+        like: Front | None = None,
+        what: str = "the reference",
+        point: float = 1.1,
+        normalise: bool = True,
+        curve: bool = True,
+    ) -> Scale:
+        """What the indicators of `runs.indicators` do with a reference.
+
+        Parameters
+        ----------
+        reference : Front or array (k, m)
+        like : Front, optional
+            One of the fronts that are measured against it: says names, units and senses where the reference is an array. Without it all
+            columns are minimised.
+        what : str
+            What the reference is, for captions.
+        point, normalise, curve
+            As the indicators were given them.
+        """
+        known = reference if isinstance(reference, Front) else like
+        R = truth(reference, known)
+        m = R.shape[1]
+        sign = np.array([goal.sign for goal in known.goals]) if known is not None else np.ones(m)
+        ideal, unit = extent(R)
+
+        def shown(values: np.ndarray) -> tuple[float, ...]:
+            return tuple((sign * values + 0.0).tolist())
+
+        return Scale(
+            ideal=shown(ideal),
+            nadir=shown(R.max(axis=0)),
+            corner=shown(ideal + point * unit),
+            point=point,
+            names=known.names if known is not None else tuple(f"objective {i + 1}" for i in range(m)),
+            units=known.units if known is not None else ("",) * m,
+            what=what,
+            count=len(R),
+            normalise=normalise,
+            curve=curve and bool(pieces(R)),
+        )
+
+    def describe(self) -> str:
+        """Two sentences for a caption."""
+        how = ", the curve through them" if self.curve else ""
+        points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
+        if self.normalise:
+            ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
+            volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
+            return f"Objectives normalised to {ends} of {points}. {volume}"
+        return f"Objectives in their own units, against {points}. Hypervolume up to {self._all(self.corner)}."
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, for a file beside the numbers."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+
+    def _all(self, values: tuple[float, ...]) -> str:
+        cells = zip(self.names, values, self.units, strict=True)
+        return ", ".join(f"{name} {value:.6g}{f' {unit}' if unit else ''}" for name, value, unit in cells)

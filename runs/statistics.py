@@ -1,0 +1,249 @@
+"""Statistics of batches: what an indicator was over many runs, and whether solvers differ in it. Pure functions of samples.
+
+A value that is NaN or infinite is a *failed* run: an empty front has no distance. Failed runs are never dropped: they rank below all
+others, all alike. Mean and variance, which cannot say that, are those of the runs that did not fail, and how many did stands beside them.
+Every test is of ranks, two-sided. Smaller values are better, unless `larger` says that larger ones are (hypervolume).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+SMALL, MEDIUM, LARGE = 0.56, 0.64, 0.71
+"""From which A12 an effect is called so (Vargha and Delaney 2000)."""
+ALPHA = 0.05
+"""The level below which samples are told to be too few to ever reach it."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A sample in numbers.
+
+    Attributes
+    ----------
+    count, failures : int
+        Runs, and how many of them failed.
+    mean, variance, deviation : float
+        Of the runs that did not fail; variance and standard deviation with divisor n - `ddof`. NaN where there are too few.
+    median, lower, upper : float
+        Median and quartiles (linear between values) of all runs, failed ones last: infinite where a failed one stands there.
+    best, worst : float
+        The worst is infinite if any run failed.
+    ddof : int
+    """
+
+    count: int
+    failures: int
+    mean: float
+    variance: float
+    deviation: float
+    median: float
+    lower: float
+    upper: float
+    best: float
+    worst: float
+    ddof: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two solvers on one indicator.
+
+    Attributes
+    ----------
+    first, second, test : str
+    statistic, p, p_holm : float
+        Of the test, and p after Holm's correction for all pairs that were compared.
+    a12 : float
+        Probability that a run of the first is better than one of the second, a tie being half.
+    effect : str
+        "negligible", "small", "medium" or "large".
+    note : str
+        That there are too few runs for any p below 0.05; mostly nothing.
+    """
+
+    first: str
+    second: str
+    test: str
+    statistic: float
+    p: float
+    p_holm: float
+    a12: float
+    effect: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Overall:
+    """Several solvers on one indicator: whether any differs, and their average ranks, 1 being the best."""
+
+    test: str
+    statistic: float
+    p: float
+    ranks: Mapping[str, float]
+
+
+def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False, ddof: int = 1) -> Summary:
+    """The numbers of a sample (n,), n >= 1; see `Summary`. One run has a mean, but no variance with `ddof=1`."""
+    costs = _costs(values, larger, "the sample")
+    sign = -1.0 if larger else 1.0
+    good = sign * costs[np.isfinite(costs)]
+    variance = float(good.var(ddof=ddof)) if len(good) > ddof else np.nan
+    quartiles = sorted(sign * _quantile(costs, share) for share in (0.25, 0.75))
+    return Summary(
+        count=len(costs),
+        failures=len(costs) - len(good),
+        mean=float(good.mean()) if len(good) else np.nan,
+        variance=variance,
+        deviation=float(np.sqrt(variance)),
+        median=sign * _quantile(costs, 0.5),
+        lower=quartiles[0],
+        upper=quartiles[1],
+        best=sign * float(costs.min()),
+        worst=sign * float(costs.max()),
+        ddof=ddof,
+    )
+
+
+def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> list[Comparison]:
+    """Every pair of solvers: Mann-Whitney U, or with `paired` Wilcoxon's signed ranks, with Holm's correction and A12.
+
+    Parameters
+    ----------
+    samples : name -> (n,) values
+        Of independent runs any n; with `paired` run i of all has something in common (the seed of its population, the problem).
+    paired, larger : bool
+
+    Returns
+    -------
+    list of Comparison
+        In the order of the names. Of samples that are all alike, p is 1. A12 takes no heed of pairs.
+
+    Notes
+    -----
+    p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties. Of two runs that both failed, the
+    paired difference is 0; where one failed, it is larger than all others.
+    """
+    costs = _all_costs(samples, larger, paired, at_least=2)
+    found = []
+    for one, other in combinations(costs, 2):
+        a, b = costs[one], costs[other]
+        statistic, p, least = _wilcoxon(a, b) if paired else _mann_whitney(a, b)
+        note = f"too few runs: p cannot be below {least:.2g}" if least > ALPHA else ""
+        found.append((one, other, statistic, p, _a12(a, b), note))
+    corrected = holm([p for _, _, _, p, _, _ in found])
+    test = "Wilcoxon signed-rank" if paired else "Mann-Whitney U"
+    return [
+        Comparison(one, other, test, statistic, p, float(p_holm), a, effect(a), note)
+        for (one, other, statistic, p, a, note), p_holm in zip(found, corrected, strict=True)
+    ]
+
+
+def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> Overall:
+    """Whether any of several solvers differs: Kruskal-Wallis, or with `paired` Friedman (three solvers at least), with average ranks.
+
+    Ranks of Kruskal-Wallis are those among all runs together; of Friedman, from 1 to the number of solvers, those within each run. p is the
+    chi-squared approximation, which of fewer than about five runs a solver is rough. Of samples that are all alike, p is 1.
+    """
+    from scipy.stats import friedmanchisquare, kruskal, rankdata
+
+    costs = _all_costs(samples, larger, paired, at_least=3 if paired else 2)
+    names, columns = list(costs), list(costs.values())
+    if paired:
+        ranks = [*rankdata(np.column_stack(columns), axis=1).T]
+        alike = all(np.ptp(row) == 0 for row in np.column_stack(ranks))
+        result = None if alike else friedmanchisquare(*ranks)
+    else:
+        ends = np.cumsum([len(column) for column in columns])[:-1]
+        ranks = np.split(rankdata(np.concatenate(columns)), ends)
+        alike = np.ptp(np.concatenate(ranks)) == 0
+        result = None if alike else kruskal(*ranks)
+    return Overall(
+        test="Friedman" if paired else "Kruskal-Wallis",
+        statistic=0.0 if result is None else float(result.statistic),
+        p=1.0 if result is None else float(result.pvalue),
+        ranks={name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)},
+    )
+
+
+def a12(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, *, larger: bool = False) -> float:
+    """Probability that a value of `a` is better than one of `b`, a tie being half (Vargha and Delaney 2000)."""
+    return _a12(_costs(a, larger, "the first sample"), _costs(b, larger, "the second sample"))
+
+
+def effect(a12: float) -> str:
+    """The usual word for an effect of this size, in either direction."""
+    # As far from one half, whatever the side; rounding must not take the name from a value on the border.
+    size = max(a12, 1.0 - a12) + 1e-12
+    return "large" if size >= LARGE else "medium" if size >= MEDIUM else "small" if size >= SMALL else "negligible"
+
+
+def holm(p: Sequence[float] | np.ndarray) -> np.ndarray:
+    """p-values (k,) corrected for being k, by Holm's step-down method (1979), in the order given."""
+    p = np.asarray(p, dtype=float)
+    if not np.all((p >= 0) & (p <= 1)):
+        raise ValueError(f"p-values lie between 0 and 1: {p.tolist()}")
+    order = np.argsort(p, kind="stable")
+    corrected = np.empty(len(p))
+    corrected[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)))
+    return corrected
+
+
+def _costs(values: Sequence[float] | np.ndarray, larger: bool, what: str) -> np.ndarray:
+    """Values (n,) of which smaller is better; infinite for failed runs."""
+    values = np.asarray(values, dtype=float)
+    if values.ndim != 1 or not len(values):
+        raise ValueError(f"{what} must be a list of at least one number, not an array of shape {values.shape}")
+    return np.where(np.isfinite(values), -values if larger else values, np.inf)
+
+
+def _all_costs(samples: Mapping[str, Sequence[float] | np.ndarray], larger: bool, paired: bool, at_least: int) -> dict[str, np.ndarray]:
+    if len(samples) < at_least:
+        raise ValueError(f"to compare, it takes the samples of at least {at_least} solvers; there are {', '.join(samples) or 'none'}")
+    costs = {name: _costs(values, larger, f"the sample of '{name}'") for name, values in samples.items()}
+    counts = {name: len(sample) for name, sample in costs.items()}
+    if paired and len(set(counts.values())) > 1:
+        raise ValueError(f"pairs need as many runs of each: {', '.join(f'{name} has {n}' for name, n in counts.items())}")
+    return costs
+
+
+def _quantile(costs: np.ndarray, share: float) -> float:
+    """Linear between the sorted values; infinite as soon as a failed run has a share in it. (numpy's would make NaN of two infinities.)"""
+    ordered = np.sort(costs)
+    at = share * (len(ordered) - 1)
+    low = int(at)
+    part = at - low
+    if part == 0:
+        return float(ordered[low])
+    return float(ordered[low] + part * (ordered[low + 1] - ordered[low])) if np.isfinite(ordered[low + 1]) else np.inf
+
+
+def _mann_whitney(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    """U of the first, p, and the least p that so many runs can have. Of ranks, because infinities have no differences."""
+    from scipy.stats import mannwhitneyu, rankdata
+
+    ranks = rankdata(np.concatenate([a, b]))
+    result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
+    return float(result.statistic), float(result.pvalue), min(1.0, 2.0 / comb(len(a) + len(b), len(a)))
+
+
+def _wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    from scipy.stats import rankdata, wilcoxon
+
+    with np.errstate(invalid="ignore"):
+        difference = np.where(a == b, 0.0, a - b)
+    least = min(1.0, 2.0 ** (1 - len(difference)))
+    if not difference.any():
+        return 0.0, 1.0, least
+    result = wilcoxon(np.sign(difference) * rankdata(np.abs(difference)), alternative="two-sided", method="auto")
+    return float(result.statistic), float(result.pvalue), least
+
+
+def _a12(a: np.ndarray, b: np.ndarray) -> float:
+    better, worse = (a[:, None] < b).sum(), (a[:, None] > b).sum()
+    return float(0.5 + 0.5 * (int(better) - int(worse)) / (len(a) * len(b)))

@@ -1,0 +1,427 @@
+"""The baselines: pymoo's own bits, states that are data, exact budgets, failures, constraints, moved points, starts."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from dataclasses import fields, is_dataclass
+from functools import partial
+from typing import Any, get_type_hints
+
+import numpy as np
+import pytest
+from ascent import Ascent
+from fronts import distance_to_curve
+from plain import dtlz
+
+from macs import MOEAD, MOPSOCD, NSGA2, NSGA3
+from macs.baselines.reference import reference_directions
+from macs.blackbox import BlackBox
+from macs.dominance import nondominated
+from macs.evaluation import Counts, Evaluation, Evaluator
+from problems import load
+from problems.goddard import reference
+from transcription import DFET
+
+SMALL = [
+    NSGA2(population=12),
+    NSGA3(divisions=11),
+    MOEAD(divisions=11, neighbors=5),
+    MOEAD(divisions=11, batch=True),
+    MOPSOCD(particles=12),
+]
+HANDLED = [type(s)(**{**s.__dict__, "handling": h}) for s in SMALL for h in ("feasible-first", "penalty", "objective")]
+
+
+def named(settings: Any) -> str:
+    return f"{type(settings).__name__}-{settings.handling}" + ("-batch" if getattr(settings, "batch", False) else "")
+
+
+def run(settings: Any, box: Evaluator, budget: int, seed: int = 1, start: np.ndarray | None = None, between: Any = None) -> Any:
+    state = settings.begin(box, budget, np.random.default_rng(seed), start)
+    for _ in range(100 * budget):
+        if box.counts.evaluations >= budget:
+            return state
+        state = state if between is None else between(state)
+        settings.advance(state, box, budget)
+    raise AssertionError("the search does not come to its end")
+
+
+def schaffer(X: np.ndarray) -> np.ndarray:
+    return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
+
+
+# pymoo's own
+
+
+def theirs(settings: Any, m: int) -> Any:
+    """The algorithm of pymoo that the settings are to equal."""
+    from pymoo.algorithms.moo import moead, mopso_cd, nsga2, nsga3
+    from pymoo.util.ref_dirs import get_reference_directions
+
+    if isinstance(settings, NSGA2):
+        return nsga2.NSGA2(pop_size=settings.population)
+    if isinstance(settings, MOPSOCD):
+        return mopso_cd.MOPSO_CD(pop_size=settings.particles, archive_size=settings.archive)
+    directions = get_reference_directions("das-dennis", m, n_partitions=settings.divisions or (99 if m == 2 else 12))
+    if isinstance(settings, NSGA3):
+        return nsga3.NSGA3(directions, pop_size=settings.population)
+    algorithm = moead.ParallelMOEAD if settings.batch else moead.MOEAD
+    return algorithm(directions, n_neighbors=settings.neighbors)
+
+
+CASES = [
+    *((settings, name) for settings in (NSGA2(), NSGA3(), MOPSOCD(archive=500)) for name in ("zdt4", "dtlz2")),
+    *((MOEAD(divisions=divisions, batch=batch), n) for batch in (False, True) for divisions, n in ((19, "zdt1"), (4, "dtlz2"))),
+    (NSGA2(population=30), "zdt1"),
+    (NSGA3(population=20, divisions=4), "dtlz7"),
+]
+
+
+@pytest.mark.parametrize(("settings", "name"), CASES, ids=lambda value: value if isinstance(value, str) else named(value))
+def test_they_are_pymoo_s_own_to_the_last_bit(settings: Any, name: str) -> None:
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+
+    problem, generations = get_problem(name), 5
+    with warnings.catch_warnings():
+        truth = minimize(problem, theirs(settings, problem.n_obj), ("n_gen", generations), seed=5)
+    state = run(settings, BlackBox(problem), generations * len(truth.pop), seed=5)
+    assert np.array_equal(state.members.F, truth.pop.get("F"))
+    assert np.array_equal(state.members.Z, truth.pop.get("X"))
+    kept = np.unique(truth.F, axis=0)
+    assert np.array_equal(np.unique(state.archive.F, axis=0), kept[nondominated(kept)])
+
+
+def test_so_are_fronts() -> None:
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+
+    problem = get_problem("zdt1")
+    truth = minimize(problem, theirs(NSGA2(), 2), ("n_eval", 500), seed=5)
+    front = NSGA2().minimize(problem, evaluations=500, seed=5)
+    assert np.array_equal(front.F, np.unique(truth.F, axis=0))
+    assert front.stats["evaluations"] == 500 == truth.algorithm.evaluator.n_eval
+    assert front.stats["stopped"] == "budget"
+    assert front.stats["reproducible"]
+
+
+def test_with_one_constraint_nsga2_is_still_pymoo_s_own() -> None:
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
+    class Ring(Problem):
+        def __init__(self) -> None:
+            super().__init__(n_var=4, n_obj=2, n_ieq_constr=1, xl=-2.0, xu=2.0)
+
+        def _evaluate(self, X: np.ndarray, out: dict, *args: Any, **kwargs: Any) -> None:
+            out["F"], out["G"] = schaffer(X), (0.81 - ((X - 0.5) ** 2).sum(axis=1))[:, None] * (X[:, :1] < 1.5)
+
+    truth = minimize(Ring(), theirs(NSGA2(population=40), 2), ("n_gen", 15), seed=2)
+    state = run(NSGA2(population=40), BlackBox(Ring(), tolerance=0.0), 600, seed=2)
+    assert np.array_equal(state.members.F, truth.pop.get("F"))
+
+
+def test_the_particles_that_pymoo_throws_away_are_not_evaluated() -> None:
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+
+    truth = minimize(get_problem("zdt1"), theirs(MOPSOCD(), 2), ("n_gen", 3), seed=1)
+    assert truth.algorithm.evaluator.n_eval == 400
+    assert MOPSOCD().minimize(get_problem("zdt1"), evaluations=300, seed=1).stats["evaluations"] == 300
+
+
+@pytest.mark.parametrize(("m", "divisions"), [(2, 99), (3, 12), (4, 7), (5, 3)])
+def test_directions_by_divisions_are_those_of_pymoo(m: int, divisions: int) -> None:
+    from pymoo.util.ref_dirs import get_reference_directions
+
+    directions = get_reference_directions("das-dennis", m, n_partitions=divisions)
+    assert np.array_equal(reference_directions(m, None, divisions), directions)
+    assert np.array_equal(reference_directions(m, len(directions), None), directions)
+
+
+@pytest.mark.parametrize(("m", "count"), [(2, 37), (3, 3), (3, 100), (4, 50), (5, 6)])
+def test_any_number_of_directions_spreads_over_the_simplex(m: int, count: int) -> None:
+    directions = reference_directions(m, count, None)
+    assert directions.shape == (count, m)
+    assert np.allclose(directions.sum(axis=1), 1)
+    assert (directions >= 0).all()
+    assert (directions.max(axis=0) == 1).all()
+    apart = np.linalg.norm(directions[:, None] - directions, axis=2) + 2 * np.eye(count)
+    assert apart.min() >= 0.5 * np.median(apart.min(axis=1))
+
+
+# Runs
+
+
+def test_importing_the_package_imports_no_pymoo() -> None:
+    code = "import sys; from macs import NSGA2, NSGA3, MOEAD, MOPSOCD; NSGA3(divisions=4); sys.exit('pymoo' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def plain(value: Any) -> Any:
+    """The value as nothing but numbers, strings, arrays and containers of these."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, np.random.Generator):
+        return value.bit_generator.state
+    assert isinstance(value, np.ndarray | int | float | bool | str), type(value)
+    assert not isinstance(value, np.ndarray) or value.dtype != object
+    return np.array(value.tolist(), dtype=value.dtype).reshape(value.shape) if isinstance(value, np.ndarray) else value
+
+
+def rebuilt(kind: type, data: Any) -> Any:
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{name: rebuilt(hints[name], value) for name, value in data.items()})
+    if kind is np.random.Generator:
+        rng = np.random.default_rng(0)
+        rng.bit_generator.state = data
+        return rng
+    return data
+
+
+def constrained(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feasible in a ring that few first candidates are in."""
+    return schaffer(X), np.abs(((X - 0.5) ** 2).sum(axis=1, keepdims=True) - 1) - 0.1
+
+
+@pytest.mark.parametrize(
+    ("settings", "function"),
+    [*((settings, schaffer) for settings in SMALL), *((settings, constrained) for settings in HANDLED)],
+    ids=lambda value: named(value) if is_dataclass(value) else value.__name__,
+)
+def test_a_state_that_was_data_for_a_while_goes_on_with_the_same_bits(settings: Any, function: Any) -> None:
+    box = partial(BlackBox, function, [(-2, 2)] * 3)
+    straight = run(settings, box(), 80)
+    broken = run(settings, box(), 80, between=lambda state: rebuilt(type(state), plain(state)))
+    for name, value in plain(straight).items():
+        np.testing.assert_equal(plain(broken)[name], value)
+
+
+@pytest.mark.parametrize("settings", [NSGA2(population=20), NSGA3(divisions=3), MOPSOCD(particles=20, archive=500)], ids=named)
+def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
+    from pymoo.optimize import minimize
+    from pymoo.problems import get_problem
+
+    truth = minimize(get_problem("dtlz2"), theirs(settings, 3), ("n_gen", 9), seed=4)
+    state = run(settings, BlackBox(get_problem("dtlz2")), 9 * len(truth.pop), seed=4, between=lambda s: rebuilt(type(s), plain(s)))
+    assert np.array_equal(state.members.F, truth.pop.get("F"))
+
+
+@pytest.mark.parametrize(
+    "settings", [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12)], ids=named
+)
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others(settings: Any) -> None:
+    def go(seed: int) -> Any:
+        return settings.minimize(constrained, [(-2, 2)] * 3, evaluations=150, seed=seed).decision
+
+    assert np.array_equal(go(1), go(1))
+    assert not np.array_equal(go(1), go(2))
+
+
+@pytest.mark.parametrize("budget", [1, 2, 5, 11, 12, 13, 24, 57])
+@pytest.mark.parametrize("settings", SMALL, ids=named)
+def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
+    rows = []
+
+    def function(X: np.ndarray) -> np.ndarray:
+        rows.append(len(X))
+        return schaffer(X)
+
+    front = settings.minimize(function, [(-2, 2)] * 3, evaluations=budget, seed=1)
+    assert sum(rows) == budget == front.stats["evaluations"]
+    assert len(front)
+    assert nondominated(front.F).all()
+
+
+@pytest.mark.parametrize("settings", HANDLED, ids=named)
+def test_failures_and_constraints_stop_nobody(settings: Any) -> None:
+    def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        F, G = constrained(X)
+        F[X[:, 0] > 0.8] = np.nan
+        return F, G
+
+    front = settings.minimize(function, [(-2, 2)] * 3, evaluations=250, seed=3)
+    assert len(front) >= (1 if settings.handling == "objective" else 3)  # there the population is spread over the infeasible ones too
+    assert (front.violation <= 1e-6).all()
+    assert (front.decision[:, 0] <= 0.8).all()
+    assert front.stats["failures"]["failed"] > 0
+    assert nondominated(front.F).all()
+    assert set(front.status) == {"converged"}
+
+
+@pytest.mark.parametrize("settings", HANDLED, ids=named)
+@pytest.mark.parametrize("what", ["infeasible", "failed"])
+def test_where_nothing_is_feasible_the_nearest_is_told(settings: Any, what: str) -> None:
+    seen: list[float] = []
+
+    def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        G = 1 + (X**2).sum(axis=1, keepdims=True)
+        seen.extend(G[:, 0])
+        return schaffer(X) if what == "infeasible" else np.full((len(X), 2), np.nan), G
+
+    front = settings.minimize(function, [(-2, 2)] * 3, evaluations=120, seed=3)
+    assert len(front) == 0
+    assert front.message.startswith("nothing feasible in 120 evaluations")
+    assert front.closest is not None
+    if what == "infeasible":
+        assert front.closest.violation == min(seen)
+        if settings.handling == "feasible-first":
+            assert min(seen) < 1.5  # it went for the least violation
+
+
+@pytest.mark.parametrize("settings", SMALL, ids=named)
+def test_feasible_points_come_before_infeasible_ones_at_any_size_of_numbers(settings: Any) -> None:
+    def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return 1e9 * schaffer(X), 1e-4 * (np.abs(X - 1.4).sum(axis=1, keepdims=True) - 1.2)
+
+    front = settings.minimize(function, [(-2, 2)] * 3, evaluations=250, seed=2, tolerance=1e-12)
+    assert len(front)
+    assert (np.abs(front.decision - 1.4).sum(axis=1) <= 1.2 + 1e-7).all()
+    assert front.F[:, 1].min() <= 0.6e9  # 0, at x = (1, 1, 1)
+
+
+def test_a_single_objective() -> None:
+    for settings in (NSGA2(population=20), MOPSOCD(particles=20)):
+        front = settings.minimize(lambda X: (X**2).sum(axis=1, keepdims=True), [(-2, 2)] * 3, evaluations=300, seed=1)
+        assert len(front) == 1
+        assert front.F[0, 0] < 0.5
+
+
+# Starts, moved points, trajectories
+
+
+@pytest.mark.parametrize("settings", SMALL, ids=named)
+@pytest.mark.parametrize("count", [1, 12, 30])
+def test_a_start_is_evaluated_first_and_is_of_use(settings: Any, count: int) -> None:
+    asked: list[np.ndarray] = []
+
+    def function(X: np.ndarray) -> np.ndarray:
+        asked.append(X.copy())
+        return schaffer(X)
+
+    start = np.linspace(0, 1, count)[:, None] * np.ones(3)
+    front = settings.minimize(function, [(-2, 2)] * 3, evaluations=24, seed=1, start=np.vstack([start, start[:1]]))
+    first = np.vstack(asked)[: min(count, 12)]
+    wanted = start[np.linspace(0, count - 1, min(count, 12)).round().astype(int)]
+    assert np.array_equal(first, wanted)
+    assert (front.decision[0] == start[0]).all()
+
+
+class Moved(Evaluator):
+    """Candidates come back on the sphere about the middle, and remember, in an entry that is not free, how often they were moved."""
+
+    def __init__(self) -> None:
+        self.free, self.lower, self.upper, self.period = np.arange(3), np.full(3, -2.0), np.full(3, 2.0), np.array([0.0, 0.0, 4.0])
+        self.tolerance, self.counts, self.sent = 1e-9, Counts(), []
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        return np.hstack([candidates, np.zeros((len(candidates), 1))])
+
+    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        self.sent.append(Z.copy())
+        Z = Z.copy()
+        Z[:, :3] /= np.linalg.norm(Z[:, :3], axis=1, keepdims=True)
+        Z[:, 3] += 1
+        return Evaluation(Z, schaffer(Z[:, :3]), np.zeros(len(Z)), np.full(len(Z), "converged")), 0
+
+
+@pytest.mark.parametrize("settings", SMALL, ids=named)
+def test_the_population_goes_where_the_evaluator_moves_it_and_starts_from_there(settings: Any) -> None:
+    box = Moved()
+    state = run(settings, box, 100)
+    assert np.allclose(np.linalg.norm(state.members.Z[:, :3], axis=1), 1)
+    assert np.array_equal(state.members.F, schaffer(state.members.Z[:, :3]))
+    assert (np.vstack(box.sent[-1:])[:, 3] >= 1).all()
+    assert state.members.Z[:, 3].max() >= 3
+    assert np.abs(np.vstack(box.sent)[:, :3]).max() <= 2
+
+
+def test_on_the_lunar_ascent_in_numpy() -> None:
+    state = run(NSGA2(population=40), Ascent(), 600)
+    assert (state.archive.violation <= 1e-9).all()
+    assert distance_to_curve(state.archive.F, reference() * [1, -1]).mean() < 0.2
+
+
+@pytest.mark.parametrize("settings", [SMALL[1], SMALL[2]], ids=named)
+def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
+    problem, mesh = load("goddard"), DFET(2, 4)
+    front = settings.solve(problem, mesh, evaluations=30, seed=1)
+    assert front.stats["evaluations"] == 30
+    assert front.solver["name"] == type(settings).__name__
+    assert len(front)
+    assert front[0].trajectory is not None
+    assert (front.violation <= 1e-6).all()
+    again = settings.solve(problem, mesh, evaluations=15, seed=2, start=front)
+    assert again.F[:, 0].min() <= front.F[:, 0].min() + 1e-6
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: NSGA2(population=1), "NSGA2: population must be a whole number of at least 2, not 1"),
+        (lambda: NSGA2(population=None), "NSGA2: population must be a whole number of at least 2, not None"),  # type: ignore[arg-type]
+        (lambda: NSGA2(handling="death"), "NSGA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
+        (lambda: NSGA2(crossover=1.5), r"NSGA2: crossover must be in \[0, 1\], not 1.5"),
+        (lambda: NSGA2(penalty=-1.0), "NSGA2: penalty must be a number of at least 0"),
+        (lambda: NSGA3(divisions=0), "NSGA3: divisions"),
+        (lambda: NSGA3(mutation_eta="x"), "NSGA3: mutation_eta"),  # type: ignore[arg-type]
+        (lambda: MOEAD(neighbors=1), "MOEAD: neighbors"),
+        (lambda: MOEAD(decomposition="sum"), "MOEAD: decomposition"),
+        (lambda: MOEAD(batch=2), "MOEAD: batch"),  # type: ignore[arg-type]
+        (lambda: MOPSOCD(particles=2.5), "MOPSOCD: particles"),  # type: ignore[arg-type]
+        (lambda: MOPSOCD(max_velocity=0.0), "MOPSOCD: max_velocity"),
+    ],
+)
+def test_settings_that_make_no_sense(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("settings", "m", "message"),
+    [
+        (NSGA3(), 1, "NSGA3 needs at least two objectives, not 1"),
+        (MOEAD(), 1, "MOEAD needs at least two objectives, not 1"),
+        (NSGA3(population=2), 3, "NSGA3: population=2 is too few: 3 objectives"),
+        (NSGA3(population=50, divisions=12), 3, "makes 91 reference directions with 3 objectives, more than population=50"),
+        (NSGA3(population=120, divisions=3), 4, "makes 20 .* too few for population=120; divisions=7 makes 120"),
+        (NSGA3(divisions=12, population=91, handling="objective"), 3, "makes 455 reference directions with 4 objectives"),
+        (MOEAD(population=92, divisions=12), 3, "MOEAD: divisions=12 makes 91 reference directions with 3 objectives, and population=92"),
+    ],
+)
+def test_directions_that_do_not_fit(settings: Any, m: int, message: str) -> None:
+    def function(X: np.ndarray) -> np.ndarray:
+        raise AssertionError("evaluated before the settings were refused")
+
+    with pytest.raises(ValueError, match=message):
+        settings.minimize(function, [(0, 1)] * 4, evaluations=500, names=[f"f{k}" for k in range(m)])
+
+
+def test_objectives_that_only_an_evaluation_tells_are_checked_then() -> None:
+    for settings, message in ((NSGA3(), "at least two objectives"), (MOEAD(population=5), "at least two objectives")):
+        with pytest.raises(ValueError, match=message):
+            settings.minimize(lambda X: X.sum(axis=1), [(0, 1)] * 4, evaluations=50)
+
+
+def test_numbers_of_individuals_that_depend_on_objectives_nobody_told() -> None:
+    function, bounds, _ = dtlz(2, 3)
+    rows = []
+
+    def counted(X: np.ndarray) -> np.ndarray:
+        rows.append(len(X))
+        return function(X)
+
+    NSGA3(divisions=4).minimize(counted, bounds, evaluations=30, seed=1)
+    assert rows == [1, 14, 15]  # the first of the fifteen tells how many there are to be
+
+
+def test_pymoo_s_changes_of_warnings_do_not_stay() -> None:
+    before = list(warnings.filters)
+    NSGA3().minimize(schaffer, [(-2, 2)] * 3, evaluations=300, seed=1)
+    assert warnings.filters == before

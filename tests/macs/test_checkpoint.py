@@ -1,0 +1,496 @@
+"""Runs that end before their time and go on from a checkpoint: they end with the bits of runs that never stopped."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import pickle
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from macs import MACS, MOEAD, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, refinement
+from macs.solver import Solver
+from problems import load
+from transcription import DFET
+from transcription.inner import Ipopt
+
+MESH = DFET(3, 2)
+BOX = [(0.0, 1.0)] * 5
+SMALL = MACS(agents=4, archive=6)
+POLISHED = MACS(agents=4, archive=6, polish_every=4)
+
+
+def function(X: np.ndarray) -> np.ndarray:
+    g = 1 + X[:, 1:].sum(axis=1)
+    return np.stack([X[:, 0], g * (1 - np.sqrt(X[:, 0] / g))], axis=1)
+
+
+def minimize(solver: Solver = SMALL, box: Any = BOX, f: Any = function, evaluations: int = 400, seed: int | None = 1, **more: Any) -> Front:
+    return solver.minimize(f, box, evaluations=evaluations, seed=seed, **more)
+
+
+def solve(solver: Solver = POLISHED, evaluations: int = 160, seed: int | None = 1, problem: str = "orbit_rise", **more: Any) -> Front:
+    return solver.solve(load(problem), more.pop("mesh", MESH), evaluations=evaluations, seed=seed, **more)
+
+
+uninterrupted, solved = cache(minimize), cache(solve)
+
+
+def after(iterations: int) -> Any:
+    """A callback that ends the run after so many iterations."""
+    left = iter(range(iterations))
+    return lambda progress: next(left, None) is None
+
+
+def assert_same(front: Front, other: Front) -> None:
+    assert front.F.tobytes() == other.F.tobytes() and front.F.shape == other.F.shape
+    assert front.decision.tobytes() == other.decision.tobytes()
+    assert [point.optimality for point in front] == [point.optimality for point in other]
+    assert {**front.stats, "wall_time": 0} == {**other.stats, "wall_time": 0}
+
+
+class Counted:
+    """A function that counts its rows, and may fail in the middle."""
+
+    def __init__(self, fails_after: float = np.inf) -> None:
+        self.rows, self.fails_after = 0, fails_after
+
+    def __call__(self, X: np.ndarray) -> np.ndarray:
+        self.rows += len(X)
+        if self.rows > self.fails_after:
+            raise RuntimeError("the licence server is down")
+        return function(X)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "run.ckpt"
+
+
+# Going on
+
+
+@pytest.mark.parametrize("iterations", [0, 1, 5])
+def test_a_black_box_goes_on_to_the_same_bits(file, iterations) -> None:
+    part = minimize(checkpoint=file, callback=after(iterations))
+    assert part.stats["stopped"] == "callback" and part.stats["evaluations"] < 400
+    counted = Counted()
+    rest = minimize(checkpoint=file, f=counted)
+    assert counted.rows == 400 - part.stats["evaluations"]
+    assert_same(rest, uninterrupted())
+    assert rest.stats["wall_time"] > part.stats["wall_time"]
+
+
+BASELINES = [NSGA2(population=12), NSGA3(divisions=11), MOEAD(divisions=11), MOEAD(divisions=11, batch=True), MOPSOCD(particles=12)]
+
+
+@pytest.mark.parametrize("solver", BASELINES, ids=str)
+@pytest.mark.parametrize("constraints", [None, lambda X: 0.5 - X[:, :1]], ids=["free", "constrained"])
+def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
+    given = {"evaluations": 150, "constraints": constraints}
+    for iterations in (0, 2):
+        counted = Counted()
+        stopped = minimize(solver, f=counted, checkpoint=file, callback=after(iterations), **given)
+        assert stopped.stats["stopped"] == "callback"
+        resumed = Counted()
+        assert_same(minimize(solver, f=resumed, checkpoint=file, **given), minimize(solver, **given))
+        assert counted.rows + resumed.rows == 150
+        file.unlink()
+
+
+@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6)], ids=str)
+def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
+    solve(solver, 30, checkpoint=file, callback=after(1))
+    assert_same(solve(solver, 30, checkpoint=file), solve(solver, 30))
+
+
+def test_several_interruptions_in_a_row(file) -> None:
+    for _ in range(4):
+        assert minimize(checkpoint=file, callback=after(1)).stats["stopped"] == "callback"
+    assert_same(minimize(checkpoint=file), uninterrupted())
+
+
+@pytest.mark.parametrize("refine", [True, False])
+def test_a_trajectory_problem_goes_on_to_the_same_bits(file, refine) -> None:
+    solver = MACS(agents=4, archive=6, refine=refine, refine_every=25)
+    part = solve(solver, checkpoint=file, callback=after(4))
+    assert part.stats["stopped"] == "callback" and bool(part.stats["gradient_solves"]) == refine
+    assert_same(solve(solver, checkpoint=file), solve(solver))
+
+
+def test_a_checkpoint_changes_no_bit(file, monkeypatch) -> None:
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    assert_same(minimize(checkpoint=file), uninterrupted())
+
+
+def test_a_finished_run_returns_its_front_without_evaluations(file) -> None:
+    first, counted = minimize(checkpoint=file), Counted()
+    again = minimize(checkpoint=file, f=counted)
+    assert counted.rows == 0
+    assert_same(again, first)
+    assert again.stats["wall_time"] == pytest.approx(first.stats["wall_time"], abs=0.5)
+
+
+def test_a_finished_search_is_not_polished_twice(file, monkeypatch) -> None:
+    solve(checkpoint=file)
+    whole = solved()
+    monkeypatch.setattr(refinement, "polish", lambda *_, **__: pytest.fail("polished again"))
+    assert_same(solve(checkpoint=file), whole)
+
+
+def test_killed_in_the_polish(file, monkeypatch) -> None:
+    def dies(*_: Any) -> bool:
+        raise MemoryError("killed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(refinement, "_learn_from_neighbours", dies)
+        with pytest.raises(MemoryError):
+            solve(checkpoint=file)
+    assert_same(solve(checkpoint=file), solved())
+
+
+def test_interrupted_in_the_polish(file, monkeypatch) -> None:
+    learn = refinement._learn_from_neighbours
+
+    def press(*arguments: Any) -> bool:
+        os.kill(os.getpid(), signal.SIGINT)
+        return learn(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(refinement, "_learn_from_neighbours", press)
+        assert solve(checkpoint=file).stats["stopped"] == "interrupted"
+    assert_same(solve(checkpoint=file), solved())
+
+
+def test_what_an_interrupt_cut_short_is_done_again(file, monkeypatch) -> None:
+    """Ctrl-C within a batch of IPOPT's solves leaves some of them undone; they must not be taken for failures when the run goes on."""
+    settings = {"problem": "goddard", "evaluations": 60, "inner": "ipopt", "solver": MACS(agents=4, archive=6, refine=False)}
+    inside, calls = Ipopt._solve_all, []
+
+    def press(self, nlp, start, guess, tolerance):
+        calls.append(len(start))
+        if len(calls) == 6:
+            os.kill(os.getpid(), signal.SIGINT)
+        return inside(self, nlp, start, guess, tolerance)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Ipopt, "_solve_all", press)
+        part = solve(**settings, checkpoint=file)
+    assert part.stats["stopped"] == "interrupted" and part.stats["failures"].get("timeout")
+    rest = solve(**settings, checkpoint=file)
+    assert rest.stats["reproducible"]
+    assert_same(rest, solve(**settings))
+
+
+def test_a_first_population_that_was_cut_short_is_not_kept(file) -> None:
+    solve(problem="goddard", inner="ipopt", checkpoint=file, time_limit=1e-9)
+    assert not file.exists()
+
+
+def test_a_time_limit_counts_from_each_call(file) -> None:
+    for _ in range(2):
+        assert minimize(evaluations=10**6, checkpoint=file, time_limit=0.3).stats["stopped"] == "time limit"
+    assert minimize(evaluations=10**6, checkpoint=file, callback=after(0)).stats["wall_time"] > 0.6
+
+
+def test_an_error_in_the_users_function_loses_nothing(file) -> None:
+    with pytest.raises(RuntimeError, match="licence server"):
+        minimize(checkpoint=file, f=Counted(fails_after=250))
+    counted = Counted()
+    assert_same(minimize(checkpoint=file, f=counted), uninterrupted())
+    assert counted.rows < 250
+
+
+@dataclass(frozen=True)
+class Stuck(MACS):
+    """Has nothing left to try after the third iteration."""
+
+    def advance(self, state, evaluator, budget) -> None:
+        if state.iteration < 3:
+            super().advance(state, evaluator, budget)
+
+
+def test_idle_iterations_are_counted_on(file) -> None:
+    part = minimize(Stuck(agents=4, archive=6), checkpoint=file, callback=after(50))
+    assert part.stats["stopped"] == "callback"
+    left = []
+    rest = minimize(Stuck(agents=4, archive=6), checkpoint=file, callback=left.append)
+    assert rest.stats["stopped"] == "idle" and len(left) == 100 + 3 - 51
+    assert_same(rest, minimize(Stuck(agents=4, archive=6)))
+
+
+def test_a_drawn_seed_is_taken_over(file) -> None:
+    part = minimize(seed=None, checkpoint=file, callback=after(3))
+    rest = minimize(seed=None, checkpoint=file)
+    assert rest.stats["seed"] == part.stats["seed"]
+    assert_same(rest, minimize(seed=part.stats["seed"]))
+
+
+def test_a_start_goes_on_too(file) -> None:
+    start = minimize(seed=2, evaluations=100)
+    minimize(start=start, checkpoint=file, callback=after(2))
+    assert_same(minimize(start=start, checkpoint=file), minimize(start=start))
+    with pytest.raises(ValueError, match="start is"):
+        minimize(checkpoint=file)
+
+
+SCRIPT = """
+import sys, time
+import numpy as np
+from macs import MACS, checkpoint
+
+checkpoint.SECONDS = checkpoint.SHARE = 0.0
+
+def function(X):
+    with open("log", "a") as log:
+        log.write("x" * len(X))
+    time.sleep(0.002)
+    g = 1 + X[:, 1:].sum(axis=1)
+    return np.stack([X[:, 0], g * (1 - np.sqrt(X[:, 0] / g))], axis=1)
+
+front = MACS(agents=4, archive=6).minimize(function, [(0.0, 1.0)] * 5, evaluations=400, checkpoint="run.ckpt", seed=1)
+front.save("front.nc")
+"""
+
+
+def test_kill_9(tmp_path) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+    log = tmp_path / "log"
+    call = [sys.executable, "script.py"]
+    run = subprocess.Popen(call, cwd=tmp_path)
+    ends = time.monotonic() + 60
+    while (log.stat().st_size if log.exists() else 0) < 200:
+        assert run.poll() is None and time.monotonic() < ends
+        time.sleep(0.005)
+    run.kill()
+    assert run.wait() == -signal.SIGKILL
+    assert not (tmp_path / "front.nc").exists()
+    done = log.stat().st_size
+    subprocess.run(call, cwd=tmp_path, check=True, timeout=60)
+    again = log.stat().st_size - done
+    assert 400 - done <= again < 400 - done + 120 < 400  # what one or two iterations had evaluated since the last write
+    assert_same(Front.load(tmp_path / "front.nc"), uninterrupted())
+    assert {path.name for path in tmp_path.iterdir() if ".part" not in path.name} == {"script.py", "log", "run.ckpt", "front.nc"}
+
+
+# Whom it belongs to
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ({"seed": 2}, "seed is 1 there, 2 here"),
+        ({"evaluations": 500}, r"evaluations is 400 there, 500 here \(a larger budget is another search"),
+        ({"solver": MACS(agents=5, archive=6)}, r"solver.settings.agents is 4 there, 5 here"),
+        ({"solver": Stuck(agents=4, archive=6)}, "solver.name is 'MACS' there, 'Stuck' here"),
+        ({"tolerance": 1e-3}, "tolerance is 1e-06 there, 0.001 here"),
+        ({"box": [(0.0, 1.0)] * 4}, r"bounds.x5 is \[0.0, 1.0\] there, nothing here"),
+        ({"box": [(0.0, 1.0)] * 4 + [(0.0, 2.0)]}, r"bounds.x5 is \[0.0, 1.0\] there, \[0.0, 2.0\] here"),
+        ({"names": ("cost", "risk")}, "objectives.names is nothing there"),
+        ({"constraints": lambda X: X[:, :1] - 2}, "constraints is False there, True here"),
+    ],
+)
+def test_another_black_box_is_refused(file, other, message) -> None:
+    minimize(checkpoint=file, callback=after(2))
+    content, counted = file.read_bytes(), Counted()
+    with pytest.raises(ValueError, match=f"run.ckpt belongs to another run: .*{message}.*delete this one"):
+        minimize(**{"f": counted, **other}, checkpoint=file)
+    assert counted.rows == 0 and file.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ({"problem": "goddard"}, r"problem.name is 'orbit_rise' there, 'goddard' here; problem.fingerprint .*bounds, equations"),
+        ({"mesh": DFET(3, 3)}, "transcription.settings.order is 2 there, 3 here"),
+        ({"inner": "march"}, "inner is 'auto' there, 'march' here"),
+        ({"solver": MACS(agents=4, archive=6, refine=False), "seed": 7}, "solver.settings.refine is True there, False here; seed"),
+    ],
+)
+def test_another_problem_is_refused(file, other, message) -> None:
+    solve(evaluations=30, checkpoint=file, callback=after(0))
+    content = file.read_bytes()
+    with pytest.raises(ValueError, match=message.replace("; seed", "; .*seed")):
+        solve(**{"evaluations": 30, **other}, checkpoint=file)
+    assert file.read_bytes() == content
+
+
+def test_a_function_of_other_objectives_is_refused(file) -> None:
+    minimize(checkpoint=file, callback=after(2))
+    with pytest.raises(ValueError, match="function returned 3, 2 expected"):
+        minimize(checkpoint=file, f=lambda X: X[:, :3])
+
+
+def test_other_versions_are_told(file, monkeypatch, caplog) -> None:
+    minimize(checkpoint=file, callback=after(2))
+    monkeypatch.setattr(checkpoint, "versions", lambda: {"numpy": "99"})
+    with caplog.at_level(logging.WARNING):
+        minimize(checkpoint=file, callback=after(2))
+        assert not minimize(checkpoint=file).stats["reproducible"]
+    assert "other versions" in caplog.text
+
+
+# Files that are none
+
+
+DAMAGED = {
+    "empty": (lambda content: b"", "it is empty"),
+    "text": (lambda content: b"to do: buy milk", "something else"),
+    "cut short": (lambda content: content[:-200], "cut short or damaged"),
+    "half": (lambda content: content[: len(content) // 2], "cut short or damaged"),
+    "noise": (lambda content: content[:900] + bytes(np.random.default_rng(0).bytes(300)) + content[1200:], "damaged|cannot be read"),
+    "another format": (lambda content: checkpoint._to_bytes({"format": "cake"}, []), "something else"),
+    "newer": (
+        lambda content: checkpoint._to_bytes({"format": "MACS checkpoint", "version": 2}, []),
+        "version 2, this MACS reads version 1",
+    ),
+    "pickle": (lambda content: pickle.dumps({"format": "MACS checkpoint"}), "something else"),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_a_damaged_or_foreign_file_is_refused_and_left_alone(file, kind) -> None:
+    change, message = DAMAGED[kind]
+    minimize(checkpoint=file, callback=after(2))
+    file.write_bytes(change(file.read_bytes()))
+    content, counted = file.read_bytes(), Counted()
+    with pytest.raises(ValueError, match=f"run.ckpt does not hold a checkpoint that can be read: .*({message})"):
+        minimize(checkpoint=file, f=counted)
+    assert counted.rows == 0 and file.read_bytes() == content
+
+
+class Mine:
+    def __reduce__(self):
+        return pytest.fail, ("a checkpoint was unpickled",)
+
+
+def test_pickles_are_never_opened(file) -> None:
+    np.savez(file.with_suffix(".npz"), document=np.array([Mine()], dtype=object))
+    with pytest.raises(ValueError, match="does not hold a checkpoint"):
+        minimize(checkpoint=file.with_suffix(".npz"))
+
+
+def test_no_flipped_byte_goes_unnoticed(file) -> None:
+    minimize(checkpoint=file, callback=after(2))
+    content = file.read_bytes()
+    good = checkpoint._from_bytes(content)
+    for place in np.random.default_rng(0).integers(0, len(content), 300):
+        broken = bytearray(content)
+        broken[place] ^= 1 << int(place % 8)
+        try:
+            header, arrays = checkpoint._from_bytes(bytes(broken))
+        except Exception:
+            continue
+        # What is flipped then is a date, say, that nobody reads.
+        assert header == good[0] and [a.tobytes() for a in arrays] == [a.tobytes() for a in good[1]]
+
+
+def test_a_state_of_another_version_is_refused(file, monkeypatch) -> None:
+    minimize(checkpoint=file, callback=after(2))
+    header, arrays = checkpoint._from_bytes(file.read_bytes())
+    del header["state"]["credit"]
+    file.write_bytes(checkpoint._to_bytes(header, arrays))
+    with pytest.raises(ValueError, match=r"run.ckpt is of another SearchState: state.credit is missing; it was left"):
+        minimize(checkpoint=file)
+
+
+@pytest.mark.parametrize(
+    ("where", "error", "message"),
+    [
+        ("", IsADirectoryError, "it is a folder"),
+        ("missing/run.ckpt", FileNotFoundError, "there is no folder"),
+        ("run.ckpt/more", FileNotFoundError, "there is no folder"),
+    ],
+)
+def test_places_that_cannot_be_written(tmp_path, where, error, message) -> None:
+    (tmp_path / "run.ckpt").touch()
+    counted = Counted()
+    with pytest.raises(error, match=message):
+        minimize(checkpoint=tmp_path / where, f=counted)
+    with pytest.raises(error, match=message):
+        solve(checkpoint=str(tmp_path / where))
+    assert counted.rows == 0
+
+
+@pytest.mark.parametrize("wrong", [3, "", True])
+def test_what_is_no_path(wrong) -> None:
+    with pytest.raises(ValueError, match="checkpoint must be a path"):
+        minimize(checkpoint=wrong)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission(tmp_path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError, match="is not writable"):
+        minimize(checkpoint=tmp_path / "run.ckpt")
+
+
+def test_a_full_disk_loses_neither_the_search_nor_the_last_checkpoint(file, monkeypatch, caplog) -> None:
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    write, written = checkpoint.write_whole, []
+
+    def full(path, content) -> None:
+        written.append(len(content))
+        if len(written) > 5:
+            raise OSError(errno.ENOSPC, f"cannot write '{path}': No space left on device")
+        write(path, content)
+
+    with monkeypatch.context() as patch, caplog.at_level(logging.WARNING):
+        patch.setattr(checkpoint, "write_whole", full)
+        front = minimize(checkpoint=file)
+    assert re.search("No space left on device.*behind", front.stats.pop("checkpoint"))
+    assert_same(front, uninterrupted())
+    assert len([record for record in caplog.records if "goes on without" in record.message]) == 1 and len(written) > 7
+    counted = Counted()
+    assert_same(minimize(checkpoint=file, f=counted), uninterrupted())
+    assert 0 < counted.rows < 400
+
+
+def test_a_disk_that_was_full_for_a_while(file, monkeypatch) -> None:
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    write, tried = checkpoint.write_whole, iter(range(10**6))
+
+    def full(path, content) -> None:
+        if next(tried) in (1, 2):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(path, content)
+
+    monkeypatch.setattr(checkpoint, "write_whole", full)
+    assert_same(minimize(checkpoint=file), uninterrupted())
+
+
+def test_writes_are_rare(file, monkeypatch) -> None:
+    written = []
+    monkeypatch.setattr(checkpoint, "write_whole", lambda path, content: (written.append(len(content)), time.sleep(0.02)))
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    front = minimize(checkpoint=file, f=lambda X: (time.sleep(0.002), function(X))[1], evaluations=800)
+    assert 1 < len(written) <= 2 + front.stats["wall_time"] / (20 * 0.02)
+
+
+# Other solvers
+
+
+@dataclass(frozen=True)
+class Untold(MACS):
+    def begin(self, evaluator, budget, rng, start=None):
+        return super().begin(evaluator, budget, rng, start)
+
+
+def test_a_solver_that_does_not_say_what_its_state_is(file) -> None:
+    with pytest.raises(ValueError, match=r"Untold.begin is not annotated with the class of the state"):
+        minimize(Untold(agents=4, archive=6), checkpoint=file)
+    assert len(minimize(Untold(agents=4, archive=6))) > 0

@@ -1,0 +1,93 @@
+"""Attainment surfaces: by hand, against moocore, and against their definition."""
+
+from __future__ import annotations
+
+import moocore
+import numpy as np
+import pytest
+
+from macs.dominance import nondominated
+from problems.compiled import Objective
+from runs import hypervolume
+from runs.attainment import attainment, staircase
+from runs.references import foreign
+
+A = np.array([[1.0, 3.0], [3.0, 1.0]])
+B = np.array([[2.0, 2.0]])
+EMPTY = np.empty((0, 2))
+GOALS = (Objective("cost"), Objective("gain", "m", "maximize"))
+
+
+def test_two_runs_by_hand():
+    for runs in ([A, B], [B, A]):
+        found = attainment(runs)
+        assert found.best.tolist() == [[1, 3], [2, 2], [3, 1]]
+        assert found.worst.tolist() == [[2, 3], [3, 2]]
+        assert found.median.tolist() == found.best.tolist() and found.percent(51).tolist() == found.worst.tolist()
+
+
+def test_an_empty_front_attains_nothing():
+    found = attainment([A, EMPTY, B])
+    assert found.runs == 3 and found.of(2).tolist() == [[2, 3], [3, 2]] and found.worst.shape == (0, 2)
+    assert found.median.tolist() == [[2, 3], [3, 2]]
+    reference = np.array([[0.0, 4.0], [4.0, 0.0]])
+    volumes = found.volumes(reference)
+    assert volumes[2] == 0.0 and volumes[0] == hypervolume(found.best, reference) > volumes[1] > 0
+    nothing = attainment([foreign(EMPTY, GOALS)] * 2)
+    assert nothing.best.shape == (0, 2) and nothing.volumes(reference).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(("m", "runs"), [(2, 7), (3, 5)])
+def test_as_moocore_and_the_definition_have_them(m, runs):
+    rng = np.random.default_rng(m)
+    fronts = [rng.random((rng.integers(1, 7), m)) for _ in range(runs)]
+    found = attainment(fronts)
+    sets = np.repeat(np.arange(runs), [len(front) for front in fronts])
+    anywhere = rng.random((300, m))
+    attained = sum((front[:, None] <= anywhere).all(axis=2).any(axis=0).astype(int) for front in fronts)
+    for k in range(1, runs + 1):
+        theirs = moocore.eaf(np.vstack(fronts), sets, percentiles=[100 * k / runs])[:, :m]
+        assert sorted(found.of(k).tolist()) == sorted(theirs.tolist())
+        assert nondominated(found.of(k)).all()
+        assert ((found.of(k)[:, None] <= anywhere).all(axis=2).any(axis=0) == (attained >= k)).all()
+    assert np.all(np.diff(found.volumes(np.vstack([np.zeros(m), np.ones(m)]) if m == 1 else np.eye(m))) <= 0)
+
+
+def test_senses_and_what_did_not_converge():
+    runs = [foreign(front * [1, -1], GOALS) for front in (A, B)]
+    found, plain = attainment(runs), attainment([A, B])
+    for k in (1, 2):
+        assert (found.of(k) * [1, -1]).tolist() == plain.of(k).tolist()
+    mixed = attainment([runs[0], B * [1, -1]])
+    assert mixed.worst.tolist() == found.worst.tolist()
+    truth = np.array([[0.0, -4.0], [4.0, 0.0]])
+    assert found.volumes(truth, known=runs[0]).tolist() == plain.volumes(truth * [1, -1]).tolist()
+
+
+def test_shares_are_whole_runs():
+    found = attainment([A] * 30)
+    assert [found.count(share) for share in (1, 10, 50, 50.1, 90, 100)] == [1, 3, 15, 16, 27, 30]
+    with pytest.raises(ValueError, match="1 to 30 runs, not of 31"):
+        found.of(31)
+    with pytest.raises(ValueError, match="at most 100 per cent, not 0"):
+        found.percent(0)
+
+
+def test_what_has_no_surfaces():
+    with pytest.raises(ValueError, match="no run"):
+        attainment([])
+    with pytest.raises(ValueError, match="not known"):
+        attainment([EMPTY])
+    with pytest.raises(ValueError, match=r"two or three objectives, the same of all runs, not of \[4\]"):
+        attainment([np.ones((1, 4))])
+    with pytest.raises(ValueError, match=r"not of \[2, 3\]"):
+        attainment([A, np.ones((1, 3))])
+    with pytest.raises(ValueError, match="front 1 has other objectives"):
+        attainment([foreign(A, GOALS), foreign(A, GOALS[::-1])])
+
+
+def test_a_staircase_bounds_what_is_dominated():
+    plain = staircase(A, np.ones(2), np.array([5.0, 6.0]))
+    assert plain.tolist() == [[1, 6], [1, 3], [3, 3], [3, 1], [5, 1]]
+    turned = staircase(A * [1, -1], np.array([1, -1]), np.array([5.0, -6.0]))
+    assert (turned * [1, -1]).tolist() == plain.tolist()

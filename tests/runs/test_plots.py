@@ -1,0 +1,145 @@
+"""Figures of studies show what they were given. How they look was looked at."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from synthetic_fronts import flights
+
+from problems.compiled import Objective
+from runs.attainment import attainment
+from runs.flight_plots import flights_figure, paths_figure, representatives
+from runs.plots import attainment_figure, convergence_figure, front_figure
+from runs.references import foreign
+
+GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
+A = np.array([[1.0, 1.0], [3.0, 3.0]])
+B = np.array([[2.0, 2.5]])
+EMPTY = np.empty((0, 2))
+TRUTH = np.column_stack([np.linspace(1, 3, 201), np.linspace(1.5, 3.5, 201)])
+
+
+def test_nothing_heavy_is_imported_before_it_is_used():
+    code = (
+        "import sys, runs.plots, runs.flight_plots, runs.statistics_tables, runs.references, runs.scale\n"
+        "heavy = [m for m in ('matplotlib', 'scipy.stats', 'xarray', 'pymoo') if m in sys.modules]\n"
+        "sys.exit(str(heavy) if heavy else 0)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+
+
+def lines(ax):
+    return {line.get_label(): np.column_stack(line.get_data()) for line in ax.get_lines()}
+
+
+def words(figure):
+    return [legend_text.get_text() for ax in figure.axes if ax.get_legend() for legend_text in ax.get_legend().get_texts()]
+
+
+def test_all_points_of_all_runs_and_the_truth(tmp_path):
+    fronts = {"ours": [foreign(A, GOALS), foreign(B, GOALS), foreign(EMPTY, GOALS)], "theirs": [A - [0, 0.5]]}
+    figure = front_figure(fronts, reference=TRUTH, marked=B)
+    (ax,) = figure.axes
+    drawn = lines(ax)
+    assert drawn["ours, 3 runs (1 empty)"].tolist() == [[1, 1], [3, 3], [2, 2.5]]
+    assert drawn["theirs, 1 run"].tolist() == (A - [0, 0.5]).tolist()
+    assert drawn["truth"] == pytest.approx(TRUTH)
+    assert ax.get_xlabel() == "← flight time [s]" and ax.get_ylabel() == "speed [km/s] →"
+    assert [text.get_text() for text in ax.texts] == ["1"]
+    figure.savefig(tmp_path / "fronts.pdf")
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_arrays_without_a_shape_of_their_own_are_empty_runs():
+    figure = front_figure({"ours": [foreign(A, GOALS), np.empty((0, 0))]})
+    assert words(figure) == ["ours, 2 runs (1 empty)"]
+
+
+def test_a_truth_of_few_points_is_no_line():
+    figure = front_figure({"ours": [A]}, reference=TRUTH[::50], goals=GOALS)
+    assert [line.get_linestyle() for line in figure.axes[0].get_lines()] == ["None", "None"]
+
+
+def test_more_objectives_are_drawn_in_pairs():
+    figure = front_figure({"ours": [np.eye(4)]}, reference=np.eye(4))
+    assert len(figure.axes) == 6 and figure.axes[5].get_xlabel() == "← objective 3"
+    with pytest.raises(ValueError, match="two or more objectives"):
+        front_figure({"ours": []})
+
+
+def test_surfaces_are_staircases():
+    figure = attainment_figure(
+        {"ours": attainment([foreign(A, GOALS), foreign(B, GOALS)]), "theirs": attainment([A * [1, -1]])}, goals=GOALS
+    )
+    first, second = figure.axes
+    drawn = lines(first)
+    assert set(drawn) == {"best", "median", "worst"}
+    assert {tuple(corner) for corner in [(1, 1), (2, 2.5), (3, 3)]} <= {tuple(corner) for corner in drawn["best"].tolist()}
+    assert drawn["median"].tolist() == drawn["best"].tolist() and [3.0, 2.5] in drawn["worst"].tolist()
+    steps = np.diff(drawn["worst"], axis=0)
+    assert np.all((steps == 0).any(axis=1)), "up or across, never both"
+    assert second.get_title(loc="left") == "theirs, 1 run" and second.get_xlim() == first.get_xlim()
+    empty = attainment_figure({"ours": attainment([foreign(A, GOALS), foreign(EMPTY, GOALS)])}, goals=GOALS, reference=TRUTH)
+    assert "worst: not attained" in words(empty)
+    with pytest.raises(ValueError, match="two objectives, not of 3"):
+        attainment_figure({"ours": attainment([np.eye(3)])})
+
+
+@pytest.mark.parametrize("log", [True, False])
+def test_medians_over_what_was_spent(log, tmp_path):
+    x = np.array([10.0, 20.0, 30.0])
+    ours = [(x, np.array([np.inf, 2.0, 1.0])), (x, np.array([np.nan, 4.0, 2.0])), (x, np.array([3.0, 3.0, 0.5]))]
+    figure = convergence_figure({"ours": ours, "theirs": [(x * 2, np.array([5.0, 4.0, 3.0]))]}, xlabel="evaluations", ylabel="IGD", log=log)
+    (ax,) = figure.axes
+    drawn = lines(ax)
+    assert np.isnan(drawn["ours, 3 runs"][0, 1]) and drawn["ours, 3 runs"][1:].tolist() == [[20, 3], [30, 1], [60, 1]]
+    assert ax.get_yscale() == ("log" if log else "linear") and ax.get_xlabel() == "evaluations" and ax.get_xlim() == (0, 60)
+    low, high = ax.get_ylim()
+    assert low < 0.75 and 5 < high < 10
+    figure.savefig(tmp_path / "convergence.png")
+
+
+def test_flights_side_by_side_and_the_law(tmp_path):
+    front = flights(5)
+    chosen = representatives(front, 3)
+    assert len(chosen) == 3 and {int(np.argmin(front.F[:, 0])), int(np.argmin(front.F[:, 1]))} <= set(chosen)
+    assert representatives(front, 9) == list(range(5))
+    law = {"time": np.array([0.0, 5.0]), "h": np.array([1.0, 2.0])}
+    figure = flights_figure([front[i] for i in chosen], laws=[law, None, law], solver="ours")
+    names = [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
+    assert names == ["h [km]", "v [km/s]", "u [km/s²]"] and len(figure.axes) == 9
+    assert figure.axes[0].get_lines()[-1].get_ydata().tolist() == [1.0, 2.0]
+    assert len(figure.axes[0].get_lines()) == 3 and len(figure.axes[1].get_lines()) == 2, "two phases, and the law where there is one"
+    assert figure.axes[0].get_title(loc="left").startswith("point 1\ntime ")
+    figure.savefig(tmp_path / "flights.png")
+    assert len(flights_figure([front[0]], names=["load"]).axes) == 1
+
+
+def test_paths_in_one_picture():
+    front = flights(3)
+    law = {"time": np.array([0.0, 1.0]), "h": np.array([1.0, 2.0])}
+    figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws=[None, law])
+    (ax,) = figure.axes
+    drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
+    assert len(drawn) == 8, "two phases and an end each, a law and its entry in the legend"
+    assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
+    assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
+    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws=[{}]).axes[0].get_lines()) == 3
+    with pytest.raises(ValueError, match="no 'w' to draw"):
+        paths_figure([front[0]], "h", "w")
+
+
+def test_flights_that_cannot_be_drawn():
+    front = flights(2)
+    with pytest.raises(ValueError, match="no 'w' to draw; there are h, v, u, load"):
+        flights_figure([front[0]], names=["w"])
+    with pytest.raises(ValueError, match="1 laws do not stand beside 2 points"):
+        flights_figure([front[0], front[1]], laws=[None])
+    with pytest.raises(ValueError, match="of one to six points, not of 0"):
+        flights_figure([])
+    with pytest.raises(ValueError, match="point 1 of those to draw has no trajectory"):
+        flights_figure([foreign(A, GOALS)[0]])

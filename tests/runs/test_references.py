@@ -1,0 +1,103 @@
+"""Where references come from: files, closed forms, unions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import Front
+from problems import goddard
+from problems.compiled import Objective
+from runs import gd, hypervolume
+from runs.references import closed_form, foreign, read, union
+
+GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
+A = np.array([[1.0, 1.0], [3.0, 3.0]])
+B = np.array([[2.0, 2.5], [4.0, 3.0], [1.0, 0.5]])
+BOTH = [[1.0, 1.0], [2.0, 2.5], [3.0, 3.0]]
+
+
+def black_box(objectives: np.ndarray) -> Front:
+    F = np.asarray(objectives) * [1, -1]
+    return Front(F=F, decision=[[]] * len(F), violation=np.zeros(len(F)), status=["converged"] * len(F), goals=GOALS)
+
+
+def test_the_union_is_of_fronts_and_arrays():
+    for parts in ([black_box(A), black_box(B)], [black_box(A), B], [A, black_box(B)], [A, black_box(B), np.empty((0, 2))]):
+        merged = union(parts)
+        assert isinstance(merged, Front) and merged.objectives.tolist() == BOTH and merged.goals == GOALS
+    plain = union([A * [1, -1], B * [1, -1]])
+    assert sorted(plain.tolist()) == (np.array(BOTH) * [1, -1]).tolist()
+    assert hypervolume(black_box(A), union([black_box(A), B])) == hypervolume(A * [1, -1], plain)
+    assert len(union([np.empty((0, 2))])) == 0
+
+
+def test_unions_that_make_no_sense():
+    with pytest.raises(ValueError, match="no front"):
+        union([])
+    with pytest.raises(ValueError, match="row 0 of front 1 is not finite"):
+        union([A, np.array([[np.nan, 1.0]])])
+    with pytest.raises(ValueError, match="front 1 has 3 objectives, the other 2: flight time, speed"):
+        union([black_box(A), np.ones((1, 3))])
+    with pytest.raises(ValueError, match="number of their objectives"):
+        union([A, np.ones((1, 3))])
+
+
+def test_what_was_written_is_read(tmp_path):
+    front = black_box(A)
+    front.save(tmp_path / "a.nc")
+    front.to_csv(tmp_path / "a.csv")
+    for path in ("a.nc", "a.csv"):
+        again = read(tmp_path / path, GOALS)
+        assert again.objectives.tolist() == front.objectives.tolist() and again.goals == GOALS
+    with pytest.raises(ValueError, match=r"objectives minimize flight time \[s\]"):
+        read(tmp_path / "a.nc", GOALS[::-1])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "speed, x, flight time [s]\n1.0, 7, 1.0\n3, 7, 3\n",
+        "1.0,1.0\n\n3.0,3.0\n",
+        "\ufeffflight time,speed [km/s],status\r\n1,1,converged\r\n0,nan,failed\r\n3,3,converged\r\n",
+    ],
+)
+def test_tables_of_other_programs(tmp_path, text):
+    path = tmp_path / "theirs.csv"
+    path.write_text(text, encoding="utf-8")
+    front = read(path, GOALS)
+    assert front.objectives.tolist() == A.tolist() and front.solver["name"] == "theirs"
+    assert gd(front, closed_form("goddard")) > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("time,speed\n1,2\n", r"no column 'flight time \[s\]'; it has time, speed"),
+        ("1,2\n1\n", "line 2: 1 columns, at least 2"),
+        ("1,2\n1,nan\n", "line 2: '1', 'nan' should be 2 finite numbers"),
+        ("1,2\n\n1,two\n", "line 3"),
+    ],
+)
+def test_tables_that_are_none(tmp_path, text, words):
+    path = tmp_path / "theirs.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=words):
+        read(path, GOALS)
+    with pytest.raises(ValueError, match="say which objectives"):
+        read(path)
+
+
+def test_closed_forms():
+    assert closed_form("goddard").tolist() == goddard.reference().tolist()
+    assert closed_form("orbit_rise_full").shape == (241, 2)
+    assert closed_form("problems.goddard:problem").shape == (2001, 2)
+    with pytest.raises(ValueError, match="there is no problem 'godard'"):
+        closed_form("godard")
+    with pytest.raises(ValueError, match=r"no true front of 'problems\.sanity:"):
+        closed_form("problems.sanity:problem")
+
+
+def test_a_foreign_front_may_be_empty():
+    assert len(foreign(np.empty((0, 2)), GOALS)) == 0
