@@ -7,6 +7,8 @@ the states are those of its authors' published implementation.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
@@ -102,6 +104,11 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
         "vy": THRUST * k * (first - root) - GRAVITY * t,
         "u": np.arctan(z),
     }
+
+
+def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Where a flight goes: height over distance."""
+    return {"x [km]": values["x"], "y [km]": values["y"]}
 
 
 def _speed(tf: float) -> float:

@@ -181,6 +181,11 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
     status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
     status.add_argument("folder", metavar="DIR")
+    report = _add(actions, "report", "tables, statistics and figures of what there is, in DIR/report")
+    report.add_argument("folder", metavar="DIR")
+    report.add_argument(
+        "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
+    )
 
 
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:

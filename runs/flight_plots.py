@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from textwrap import wrap
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,11 @@ Law = Mapping[str, np.ndarray]
 
 Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
 
-LAW_DASHES = (0, (4, 2))
+Laws = Mapping[str, Sequence[Law | None]]
+"""What such flights are called -> one for each point, None where there is none."""
+
+DASHES: Sequence[Any] = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+"""Of the first laws, the second, ..."""
 
 
 def representatives(front: Front, count: int = 4) -> list[int]:
@@ -41,9 +46,8 @@ def representatives(front: Front, count: int = 4) -> list[int]:
 def flights_figure(
     points: Sequence[Point],
     *,
-    laws: Sequence[Law | None] = (),
+    laws: Laws = MappingProxyType({}),
     names: Sequence[str] = (),
-    law_name: str = "analytic law",
     solver: str = "",
 ) -> Figure:
     """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
@@ -52,11 +56,11 @@ def flights_figure(
     ----------
     points : Points of one problem, of one to six
         With trajectories.
-    laws : as many {name: values}, or None
-        What to draw beside each point, dashed; names that a law does not hold are left out.
+    laws : {name: as many flights, or None}
+        What to draw beside each point, dashed; quantities that a flight does not hold are left out.
     names : sequence of str, optional
         Which states, controls and path constraints to draw, in that order; all states and controls by default.
-    law_name, solver : str
+    solver : str
         For the legend.
 
     Raises
@@ -83,9 +87,9 @@ def flights_figure(
                 for k, phase in enumerate(flight.phases):
                     if name in phase.names:
                         ax.plot(*along(phase, name), color=COLORS[k % len(COLORS)], lw=1.3)
-                law = laws[column] if column < len(laws) else None
-                if law is not None and name in law:
-                    ax.plot(law["time"], law[name], color="black", lw=0.9, ls=LAW_DASHES, zorder=3)
+                for dashes, beside in zip(DASHES, laws.values(), strict=False):
+                    if (law := beside[column]) is not None and name in law:
+                        ax.plot(law["time"], law[name], color="black", lw=0.9, ls=dashes, zorder=3)
                 ax.margins(x=0.0)
             grid[0, column].set_title(_title(column + 1, point, round(75 / len(points)) + 10), loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
@@ -96,7 +100,7 @@ def flights_figure(
         figure.align_ylabels(grid[:, 0])
         unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
         figure.supxlabel(label("time", unit), fontsize=8)
-        _legend(figure, flights[0], any(law is not None for law in laws), law_name, solver)
+        _legend(figure, flights[0], [name for name, beside in laws.items() if any(law is not None for law in beside)], solver)
     return figure
 
 
@@ -107,15 +111,14 @@ def paths_figure(
     *,
     xlabel: str = "",
     ylabel: str = "",
-    laws: Sequence[Law | None] = (),
-    law_name: str = "analytic law",
+    laws: Laws = MappingProxyType({}),
     equal: bool = False,
 ) -> Figure:
     """The paths of a few points in one picture: a quantity of the flight over another, a colour each.
 
     Parameters
     ----------
-    points, laws, law_name
+    points, laws
         As of `flights_figure`.
     across, up : name of a state or control, or a function of all of them
         The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. Where a law holds not all that it
@@ -129,7 +132,6 @@ def paths_figure(
     with style():
         figure = new_figure(COLUMN, 2.7)
         ax = figure.subplots()
-        drawn_law = False
         for i, point in enumerate(points):
             phases = point.trajectory.phases if point.trajectory is not None else ()
             for k, phase in enumerate(phases):
@@ -142,17 +144,16 @@ def paths_figure(
                 if k == len(phases) - 1:
                     end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
                     ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
-            law = laws[i] if laws else None
-            if law is not None and _holds(law, across) and _holds(law, up):
-                ax.plot(_of(law, across), _of(law, up), color="black", lw=0.9, ls=LAW_DASHES, zorder=4)
-                drawn_law = True
         units = _units(points[0])
         ax.set_xlabel(xlabel or label(str(across), units.get(str(across), "")))
         ax.set_ylabel(ylabel or label(str(up), units.get(str(up), "")))
         if equal:
             ax.set_aspect("equal", adjustable="datalim")
-        if drawn_law:
-            ax.plot([], [], color="black", lw=0.9, ls=LAW_DASHES, label=law_name)
+        for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
+            drawn = [law for law in beside if law is not None and _holds(law, across) and _holds(law, up)]
+            for i, law in enumerate(drawn):
+                line = _of(law, across), _of(law, up)
+                ax.plot(*line, color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
         ax.legend(frameon=False, loc="best")
     return figure
 
@@ -182,14 +183,17 @@ def _units(point: Point) -> dict[str, str]:
     return {v.name: v.unit for phase in phases for v in (*phase.state_variables, *phase.control_variables)}
 
 
-def _check(points: Sequence[Point], laws: Sequence[Law | None]) -> None:
+def _check(points: Sequence[Point], laws: Laws) -> None:
     if not 1 <= len(points) <= 6:
         raise ValueError(f"flights are drawn side by side of one to six points, not of {len(points)}")
     for number, point in enumerate(points, 1):
         if point.trajectory is None:
             raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
-    if len(laws) not in (0, len(points)):
-        raise ValueError(f"{len(laws)} laws do not stand beside {len(points)} points; give None where there is none")
+    if len(laws) > len(DASHES):
+        raise ValueError(f"at most {len(DASHES)} laws are drawn beside points, not {len(laws)}")
+    for name, beside in laws.items():
+        if len(beside) != len(points):
+            raise ValueError(f"{name}: {len(beside)} laws do not stand beside {len(points)} points; give None where there is none")
 
 
 def _title(number: int, point: Point, width: int) -> str:
@@ -200,13 +204,12 @@ def _title(number: int, point: Point, width: int) -> str:
     return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
 
 
-def _legend(figure: Any, flight: Any, with_law: bool, law_name: str, solver: str) -> None:
-    """Phases if there are several; else the solver, if it is named; and the law."""
+def _legend(figure: Any, flight: Any, laws: Sequence[str], solver: str) -> None:
+    """Phases if there are several; else the solver, if it is named; and the laws."""
     from matplotlib.lines import Line2D
 
-    named = list(flight) if len(flight) > 1 else [solver] if solver or with_law else []
+    named = list(flight) if len(flight) > 1 else [solver] if solver or laws else []
     handles = [Line2D([], [], color=COLORS[k % len(COLORS)], lw=1.3, label=name or "found") for k, name in enumerate(named)]
-    if with_law:
-        handles.append(Line2D([], [], color="black", lw=0.9, ls=LAW_DASHES, label=law_name))
+    handles += [Line2D([], [], color="black", lw=0.9, ls=dashes, label=law) for dashes, law in zip(DASHES, laws, strict=False)]
     if handles:
         figure.legend(handles=handles, loc="outside upper right", ncols=len(handles), frameon=False)

@@ -7,6 +7,7 @@ import importlib
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -68,8 +69,12 @@ def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "for
     )
 
 
-def closed_form(case: str) -> np.ndarray:
-    """The true front (k, m) of a case, in the user's units and senses: what `reference()` beside its `problem()` returns.
+def room(case: str) -> ModuleType:
+    """The module that a problem comes from, in which there may also be
+
+    - `reference() -> array (k, m)`: its true front, in the user's units and senses;
+    - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration;
+    - `track(values) -> {label: values, label: values}`: where a flight goes, across and up, from its states by name.
 
     Parameters
     ----------
@@ -79,15 +84,22 @@ def closed_form(case: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        If there is no such case, or it has no known front.
+        If there is no such case.
     """
     place = (CASES[case][0] if case in CASES else case).rpartition(":")[0]
     try:
-        module = importlib.import_module(place)
-    except (ModuleNotFoundError, ValueError) as error:
+        return importlib.import_module(place)
+    except (ModuleNotFoundError, ValueError, TypeError) as error:
         raise ValueError(f"there is no problem '{case}' to take the true front of; there are {', '.join(CASES)}") from error
+
+
+def closed_form(case: str) -> np.ndarray:
+    """The true front (k, m) of a case, see `room`. Raises ValueError if there is no such case, or its front is not known."""
+    module = room(case)
     if not hasattr(module, "reference"):
-        raise ValueError(f"no true front of '{case}' is known: '{place}' has no function 'reference'; measure against a file or the union")
+        raise ValueError(
+            f"no true front of '{case}' is known: '{module.__name__}' has no function 'reference'; measure against a file or the union"
+        )
     return np.asarray(module.reference(), dtype=float)
 
 

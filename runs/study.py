@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import KW_ONLY, dataclass, field, replace
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from macs.inputs import check_count, check_positive, unknown
 from transcription.inner import NAMED
 
 from . import combining, studyfile
 from .cell import Cell
+from .published import check as check_paper
 from .store import Store, Summary
+
+if TYPE_CHECKING:
+    from .report import Report
 from .work import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS = 2, 500
@@ -150,6 +154,15 @@ class Study:
         store.check(self.definition())
         return store.summary(self.runs)
 
+    def report(
+        self, out: str | PathLike[str], *, foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None, progress: bool = False
+    ) -> Report:
+        """Tables and figures of the runs that `out` has; see `runs.report.report`. Raises ValueError if it holds another study, or none."""
+        from .report import report
+
+        Store.open(out).check(self.definition())
+        return report(out, foreign=foreign, progress=progress)
+
     def quick(self) -> Study:
         """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
         budgets = {cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells}
@@ -180,5 +193,6 @@ class Study:
             raise ValueError(unknown("inner level", self.inner, NAMED))
         if not isinstance(self.paper, Mapping):
             raise ValueError(f"paper must be a table, not {self.paper!r}")
+        check_paper(self.paper)
         if not isinstance(self.description, str):
             raise ValueError(f"description must be a line of text, not {self.description!r}")

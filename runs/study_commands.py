@@ -13,8 +13,8 @@ from .wrong import WrongCall, refused
 
 
 def study(arguments: Namespace) -> int:
-    """Run a study, or tell how one stands."""
-    return {"run": run, "status": status}[arguments.action](arguments)
+    """Run a study, tell how one stands, or report on it."""
+    return {"run": run, "status": status, "report": report}[arguments.action](arguments)
 
 
 def run(arguments: Namespace) -> int:
@@ -54,3 +54,28 @@ def status(arguments: Namespace) -> int:
         summary = Store.open(arguments.folder).summary()
     print(summary)
     return DONE if summary.finished == len(summary.runs) else NO
+
+
+def report(arguments: Namespace) -> int:
+    """Tables on the terminal, and with the figures in the study's folder."""
+    from macs.monitor import Stopped
+
+    from .report import FOLDER
+    from .report import report as write
+
+    foreign: dict[str, list[str]] = {}
+    for word in arguments.join or []:
+        name, equals, path = word.partition("=")
+        if not (name and equals and path):
+            raise WrongCall(f"--join {word}: write NAME=FILE")
+        foreign.setdefault(name, []).append(path)
+    try:
+        with refused():
+            found = write(arguments.folder, foreign=foreign, progress=True)
+    except Stopped:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except OSError as error:
+        raise WrongCall(str(error)) from error
+    print(f"{found}\n\n{len(found.files)} files in {Path(arguments.folder) / FOLDER}")
+    return DONE

@@ -109,7 +109,7 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     assert len(chosen) == 3 and {int(np.argmin(front.F[:, 0])), int(np.argmin(front.F[:, 1]))} <= set(chosen)
     assert representatives(front, 9) == list(range(5))
     law = {"time": np.array([0.0, 5.0]), "h": np.array([1.0, 2.0])}
-    figure = flights_figure([front[i] for i in chosen], laws=[law, None, law], solver="ours")
+    figure = flights_figure([front[i] for i in chosen], laws={"analytic law": [law, None, law]}, solver="ours")
     names = [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
     assert names == ["h [km]", "v [km/s]", "u [km/s²]"] and len(figure.axes) == 9
     assert figure.axes[0].get_lines()[-1].get_ydata().tolist() == [1.0, 2.0]
@@ -122,13 +122,13 @@ def test_flights_side_by_side_and_the_law(tmp_path):
 def test_paths_in_one_picture():
     front = flights(3)
     law = {"time": np.array([0.0, 1.0]), "h": np.array([1.0, 2.0])}
-    figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws=[None, law])
+    figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws={"analytic law": [None, law]})
     (ax,) = figure.axes
     drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
     assert len(drawn) == 8, "two phases and an end each, a law and its entry in the legend"
     assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
     assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
-    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws=[{}]).axes[0].get_lines()) == 3
+    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws={"analytic law": [{}]}).axes[0].get_lines()) == 3
     with pytest.raises(ValueError, match="no 'w' to draw"):
         paths_figure([front[0]], "h", "w")
 
@@ -138,7 +138,7 @@ def test_flights_that_cannot_be_drawn():
     with pytest.raises(ValueError, match="no 'w' to draw; there are h, v, u, load"):
         flights_figure([front[0]], names=["w"])
     with pytest.raises(ValueError, match="1 laws do not stand beside 2 points"):
-        flights_figure([front[0], front[1]], laws=[None])
+        flights_figure([front[0], front[1]], laws={"analytic law": [None]})
     with pytest.raises(ValueError, match="of one to six points, not of 0"):
         flights_figure([])
     with pytest.raises(ValueError, match="point 1 of those to draw has no trajectory"):

@@ -1,0 +1,171 @@
+"""The flights that stand for a front, beside what is known of the best: analytic laws, and each objective optimised alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from macs.drawing import along
+from macs.evaluation import CONVERGED
+from macs.front import Front
+from macs.gradient import payoff
+from macs.plotting import label
+from macs.point import Point
+from transcription import from_dict
+
+from .flight_plots import Law, flights_figure, paths_figure, representatives
+from .ground import Ground, Reference
+from .indicators import pieces, truth
+from .plots import front_figure
+from .references import room
+from .report_tables import Cell, Column, Table, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LAW, ALONE = "analytic law", "single objective"
+
+
+@dataclass(frozen=True, eq=False)
+class Flights:
+    """Attributes
+    ----------
+    ground : Ground
+    reference : Reference
+    solver : str
+        Whose front they are of: that of the first solver that found any, all its runs together.
+    points : tuple of Point
+    room : module or None
+        Where the problem comes from, see `references.room`.
+    laws : name -> as many flights, None where there is none
+    ends : Front
+        The best of each objective alone, by gradients on the same transcription; empty where there is none.
+    note : str
+        Why there are no ends; mostly nothing.
+    """
+
+    ground: Ground
+    reference: Reference
+    solver: str
+    points: tuple[Point, ...]
+    room: ModuleType | None
+    laws: Mapping[str, Sequence[Law | None]]
+    ends: Front
+    note: str
+
+    @classmethod
+    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
+        """Those of a ground; None where nobody found any."""
+        for solver, runs in ground.runs.items():
+            fronts = [run.front for run in runs if len(run.front)]
+            if fronts and fronts[0][0].trajectory is not None:
+                front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
+                points = tuple(front[i] for i in representatives(front, 4))
+                source = front.source
+                place = room(source.address) if source is not None and ":" not in source.address and source.address else None
+                ends, note = _ends(front)
+                laws = {LAW: _laws(place, points), ALONE: _alone(points, ends)}
+                return cls(ground, reference, solver, points, place, laws, ends, note)
+        return None
+
+    def table(self) -> Table:
+        """Their objectives; with two of them, the best of the second that is known for the first; and each objective alone."""
+        goals = self.ground.known.goals
+        curve = self._curve()
+        heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
+        heads += (
+            [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
+            if curve is not None
+            else []
+        )
+        rows: list[list[Cell]] = []
+        for number, point in enumerate(self.points, 1):
+            rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
+        for goal, end in zip(goals, self.ends, strict=False):
+            rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
+        told = [f"Of {self.solver}, all runs together. Alone: one objective optimised by gradients on {self.ground.transcription}."]
+        return table(heads, rows, f"{self.ground.name}: solutions that stand for the front.", [*told, *([self.note] if self.note else [])])
+
+    def figures(self) -> dict[str, Figure]:
+        """Name of a file -> figure."""
+        found = {
+            "representatives": front_figure(
+                {self.solver: [run.front for run in self.ground.runs[self.solver]]},
+                reference=self.reference.front,
+                marked=np.array([list(point.objectives.values()) for point in self.points]),
+                truth_name=self._truth,
+            ),
+            "flights": flights_figure(self.points, laws=self.laws, solver=self.solver),
+        }
+        track = getattr(self.room, "track", None)
+        if track is not None:
+            across, up = track(flown(self.points[0]))
+            laws = {LAW: self.laws[LAW]}
+            found["paths"] = paths_figure(
+                self.points, lambda v: track(v)[across], lambda v: track(v)[up], xlabel=across, ylabel=up, laws=laws
+            )
+        return found
+
+    @property
+    def _truth(self) -> str:
+        return "truth" if self.reference.true else "reference"
+
+    def _curve(self) -> np.ndarray | None:
+        """The reference, minimised, where it is one curve of two objectives."""
+        R = truth(self.reference.front, self.ground.known)
+        return R if len(pieces(R)) == 1 else None
+
+    def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:
+        """The second objective of the reference at the first of a point, and how much worse the point is, in ranges."""
+        if curve is None:
+            return []
+        signs = [goal.sign for goal in self.ground.known.goals]
+        first, second = (sign * value for sign, value in zip(signs, point.objectives.values(), strict=True))
+        known = float(np.interp(first, *curve.T))
+        return [signs[1] * known, (second - known) / float(np.ptp(curve[:, 1]))]
+
+
+def flown(point: Point) -> dict[str, np.ndarray]:
+    """States and controls of a point by name, and "time", from end to end; NaN between elements, and in phases that do not have them."""
+    phases = point.trajectory.phases if point.trajectory is not None else ()
+    names = list(dict.fromkeys(v.name for phase in phases for v in (*phase.state_variables, *phase.control_variables)))
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in ("time", *names)}
+    for phase in phases:
+        own = [v.name for v in (*phase.state_variables, *phase.control_variables)]
+        times = along(phase, own[0])[0]
+        parts["time"].append(times)
+        for name in names:
+            parts[name].append(along(phase, name)[1] if name in own else np.full(len(times), np.nan))
+    return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def _ends(front: Front) -> tuple[Front, str]:
+    """Each objective optimised alone, on the transcription of a front; or why not."""
+    try:
+        problem = front.compiled()
+    except ValueError as error:
+        return front[:0], f"Objectives were not optimised alone: {error}."
+    found = payoff(problem, from_dict(front[0].transcription or {}))
+    failed = [goal.name for goal, status in zip(front.goals, found.status, strict=True) if status != CONVERGED]
+    return found, f"Alone, {', '.join(failed)} did not converge." if failed else ""
+
+
+def _laws(place: ModuleType | None, points: Sequence[Point]) -> list[Law | None]:
+    """The best flights of the same durations, where the case knows them."""
+    law: Callable[[float], Law] | None = getattr(place, "optimal_flight", None)
+    if law is None:
+        return [None] * len(points)
+    return [law(float(point.trajectory.phases[-1].time[-1])) if point.trajectory is not None else None for point in points]
+
+
+def _alone(points: Sequence[Point], ends: Front) -> list[Law | None]:
+    """Beside the best point of each objective, that objective optimised alone."""
+    found: list[Law | None] = [None] * len(points)
+    for k, end in enumerate(ends):
+        if end.status == CONVERGED:
+            found[int(np.argmin([point.F[k] for point in points]))] = flown(end)
+    return found

@@ -1,0 +1,126 @@
+"""What can be compared: all runs of a study on one problem and one transcription, by solver, and what they are measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from macs.front import Front
+
+from .references import closed_form, foreign, read, union
+from .store import Run, Store
+from .work import CRASHED, MEMORY, TIMEOUT
+
+FAILED = (CRASHED, TIMEOUT, MEMORY)
+"""What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What fronts are measured against.
+
+    Attributes
+    ----------
+    front : Front
+    what : str
+        In words: "the true front, in closed form".
+    true : bool
+        Whether it is the truth, or only the best that is known.
+    """
+
+    front: Front
+    what: str
+    true: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Attributes
+    ----------
+    problem, transcription : str
+        Labels.
+    runs : solver -> its finished runs
+    fronts : solver -> the front of each of them, and of foreign solvers those that were given
+    failures : solver -> how many of its runs failed
+    left_out : solver -> how many others have no front
+    """
+
+    problem: str
+    transcription: str
+    runs: Mapping[str, Sequence[Run]]
+    fronts: Mapping[str, Sequence[Front]]
+    failures: Mapping[str, int]
+    left_out: Mapping[str, int]
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return f"{self.problem}, {self.transcription}"
+
+    @property
+    def every(self) -> list[Front]:
+        """All fronts."""
+        return [front for fronts in self.fronts.values() for front in fronts]
+
+    @property
+    def known(self) -> Front:
+        """A front that says names, units and senses of the objectives."""
+        return self.every[0]
+
+    def union(self) -> Reference:
+        """The non-dominated points of all runs. Raises ValueError if there are none."""
+        fronts = self.every
+        together = union(fronts)
+        assert isinstance(together, Front)  # as all of them are
+        return Reference(together, f"the union of {len(fronts)} run{'' if len(fronts) == 1 else 's'}", False)
+
+    def reference(self, given: Any) -> Reference:
+        """What the study says that fronts are measured against.
+
+        Parameters
+        ----------
+        given : None, str, or mapping
+            "union"; "truth" or the address of a case with a known front; a file; or {label of a problem: one of these}. None: the truth
+            where it is known, else the union.
+
+        Raises
+        ------
+        ValueError, FileNotFoundError
+            If there is no such reference, or it cannot be read.
+        """
+        if isinstance(given, Mapping):
+            given = given.get(self.problem)
+        if given == "union":
+            return self.union()
+        if given is None or given == "truth":
+            address = self.known.source.address if self.known.source is not None else ""
+            try:
+                return Reference(foreign(closed_form(address), self.known.goals, "truth"), "the true front", True)
+            except ValueError:
+                if given is not None:
+                    raise
+                return self.union()
+        if Path(given).suffix in (".nc", ".csv"):
+            return Reference(read(given, self.known.goals), str(given), False)
+        return Reference(foreign(closed_form(given), self.known.goals, "truth"), f"the true front of {given}", True)
+
+
+def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]:
+    """The grounds of a study with at least one front; `others` are fronts of foreign solvers, on the problem whose objectives they have."""
+    cells: dict[tuple[str, str], dict[str, list[Run]]] = {}
+    for run in store.runs():
+        cells.setdefault(run.cell.labels[:2], {}).setdefault(run.cell.solver, []).append(run)
+    found = []
+    for (problem, transcription), solvers in cells.items():
+        finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}
+        fronts: dict[str, Sequence[Front]] = {solver: [run.front for run in runs] for solver, runs in finished.items()}
+        if not any(fronts.values()):
+            continue
+        goals = next(front for one in fronts.values() for front in one).goals
+        fronts |= {name: given for name, given in others.items() if all(front.goals == goals for front in given)}
+        failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
+        left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
+        found.append(Ground(problem, transcription, finished, fronts, failures, left_out))
+    return found
