@@ -183,6 +183,7 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     status.add_argument("folder", metavar="DIR")
     report = _add(actions, "report", "tables, statistics and figures of what there is, in DIR/report")
     report.add_argument("folder", metavar="DIR")
+    report.add_argument("--no-figures", action="store_true", help="tables only, which is quicker")
     report.add_argument(
         "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
     )

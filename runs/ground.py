@@ -72,7 +72,7 @@ class Ground:
     def union(self) -> Reference:
         """The non-dominated points of all runs. Raises ValueError if there are none."""
         fronts = self.every
-        together = union(fronts)
+        together = union([front if front.source is not None else front.objectives for front in fronts])  # others have no trajectories
         assert isinstance(together, Front)  # as all of them are
         return Reference(together, f"the union of {len(fronts)} run{'' if len(fronts) == 1 else 's'}", False)
 

@@ -53,7 +53,11 @@ class Report:
 
 
 def report(
-    out: str | PathLike[str], *, foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None, progress: bool = False
+    out: str | PathLike[str],
+    *,
+    foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None,
+    figures: bool = True,
+    progress: bool = False,
 ) -> Report:
     """Measure all finished runs of a study, and write tables and figures into the folder `report` in it.
 
@@ -64,6 +68,8 @@ def report(
     foreign : {name: files}, optional
         Fronts of other programs that join in, a file for each run: CSV tables of objectives, or saved fronts; on the problem whose
         objectives they have.
+    figures : bool
+        Draw, too, which takes most of the time.
     progress : bool
         Tell on the terminal how far it is.
 
@@ -86,7 +92,7 @@ def report(
     sections = [summary_text(summary)]
     paper = store.definition.get("paper") or {}
     for ground in _told(found) if progress else found:
-        sections += _section(ground, ground.reference(store.definition.get("reference")), writer)
+        sections += _section(ground, ground.reference(store.definition.get("reference")), writer, figures)
     beside = published_table(found, paper)
     if beside is not None:
         sections.append(writer.table("published", beside))
@@ -103,14 +109,14 @@ def _told(found: Sequence[Ground]) -> Iterator[Ground]:
             yield ground
 
 
-def _section(ground: Ground, reference: Reference, writer: _Writer) -> list[str]:
+def _section(ground: Ground, reference: Reference, writer: _Writer, drawn: bool) -> list[str]:
     """Write what there is of a ground; returns its tables as text."""
     told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
-    tables, figures = _tables(ground, reference), _figures(ground, reference)
+    tables, figures = _tables(ground, reference), _figures(ground, reference) if drawn else {}
     flights = Flights.of(ground, reference)
     if flights is not None:
         tables["representatives"] = flights.table()
-        figures |= flights.figures()
+        figures |= flights.figures() if drawn else {}
     told += [writer.table(f"{_stem(ground)}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():
         writer.figure(f"{_stem(ground)}-{name}", figure)

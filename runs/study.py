@@ -155,13 +155,18 @@ class Study:
         return store.summary(self.runs)
 
     def report(
-        self, out: str | PathLike[str], *, foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None, progress: bool = False
+        self,
+        out: str | PathLike[str],
+        *,
+        foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None,
+        figures: bool = True,
+        progress: bool = False,
     ) -> Report:
         """Tables and figures of the runs that `out` has; see `runs.report.report`. Raises ValueError if it holds another study, or none."""
         from .report import report
 
         Store.open(out).check(self.definition())
-        return report(out, foreign=foreign, progress=progress)
+        return report(out, foreign=foreign, figures=figures, progress=progress)
 
     def quick(self) -> Study:
         """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""

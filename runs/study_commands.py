@@ -71,7 +71,7 @@ def report(arguments: Namespace) -> int:
         foreign.setdefault(name, []).append(path)
     try:
         with refused():
-            found = write(arguments.folder, foreign=foreign, progress=True)
+            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True)
     except Stopped:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -125,7 +125,7 @@ def test_paths_in_one_picture():
     figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws={"analytic law": [None, law]})
     (ax,) = figure.axes
     drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
-    assert len(drawn) == 8, "two phases and an end each, a law and its entry in the legend"
+    assert len(drawn) == 7, "two phases and an end each, and a law"
     assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
     assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
     assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws={"analytic law": [{}]}).axes[0].get_lines()) == 3

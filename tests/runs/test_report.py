@@ -1,0 +1,129 @@
+"""Reports on study folders: what they say, what they leave out, and that one command makes all of it."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from misbehaving import Crashing, Plain, glide
+
+from macs import Front
+from runs import Study, gd, igd
+from runs.cli import main
+from runs.ground import grounds
+from runs.published import check
+from runs.report import report
+from runs.store import Store
+from runs.work import Outcome
+
+SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
+PAPER = {"source": "a paper", "note": "thirty runs", "differs": "everything", "glide": {"gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}}
+
+
+def study(**more) -> Study:
+    return Study("gliders", **{"problems": glide(), "solvers": SOLVERS, "evaluations": 60, "runs": 3, "seed": 1, "paper": PAPER} | more)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Three runs of three solvers each: one of the first is missing, a front of the second is damaged, all of the third crashed."""
+    out = tmp_path_factory.mktemp("gliders") / "out"
+    study().run(out)
+    store = Store.open(out)
+    one, other, _ = store.cells
+    store.front_path(one, 2).unlink()
+    store.record_path(one, 2).unlink()
+    store.front_path(other, 3).write_bytes(b"no front")
+    return out
+
+
+@pytest.fixture(scope="module")
+def told(folder) -> str:
+    return str(study().report(folder))
+
+
+def test_everything_is_told_and_written(folder, told):
+    assert "gliders: 4 of 9 runs finished" in told
+    assert "broken: 3 failed, which count as worse than any" in told
+    assert "one: 1 missing, killed or unreadable, which are left out" in told
+    assert "other: 1 missing, killed or unreadable, which are left out" in told
+    assert (folder / "report" / "report.txt").read_text() == told + "\n"
+    names = {path.name for path in (folder / "report").iterdir()}
+    stem = "glide-dfet-2x2"
+    for table in ("indicators", "comparisons", "overall", "spent", "representatives"):
+        assert {f"{stem}-{table}.{suffix}" for suffix in ("txt", "csv", "tex")} <= names
+    for figure in ("fronts", "attainment", "igd-over-evaluations", "hypervolume-over-time", "representatives", "flights"):
+        assert {f"{stem}-{figure}.{suffix}" for suffix in ("png", "pdf")} <= names
+        assert (folder / "report" / f"{stem}-{figure}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_its_numbers_are_those_of_the_fronts(folder, told):
+    store = Store.open(folder)
+    fronts = [run.front for run in store.runs() if run.finished]
+    union = Front.merge(fronts)
+    values = [igd(run.front, union) for run in store.runs() if run.finished and run.cell.solver == "one"]
+    with (folder / "report" / "glide-dfet-2x2-indicators.csv").open() as file:
+        rows = {(row["indicator"], row["solver"]): row for row in csv.DictReader(file)}
+    assert float(rows["IGD", "one"]["mean"]) == pytest.approx(np.mean(values), rel=1e-12)
+    assert float(rows["IGD", "one"]["variance"]) == pytest.approx(np.var(values, ddof=1), rel=1e-12)
+    assert rows["IGD", "broken"]["failed"] == "3" and rows["IGD", "broken"]["median"] == "inf"
+    with (folder / "report" / "published.csv").open() as file:
+        paper, ours, *_ = csv.reader(list(file)[1:])
+    assert paper[3] == "0.5" and paper[4] == ""
+    mean = np.mean([gd(run.front, union, curve=False) for run in store.runs() if run.finished and run.cell.solver == "one"])
+    assert float(ours[3]) == pytest.approx(mean, rel=1e-12)
+    assert "The paper: thirty runs." in told and "What differs: everything." in told
+
+
+def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
+    ground = grounds(Store.open(folder), {})[0]
+    assert ground.reference(None).what == ground.reference("union").what == "the union of 4 runs"
+    file = tmp_path / "truth.csv"
+    file.write_text("time [s],distance [km]\n1,3\n5,15\n")
+    assert ground.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
+    assert ground.reference({"glide": str(file)}).what == str(file)
+    with pytest.raises(ValueError, match="there is no problem"):
+        ground.reference("truth")
+    with pytest.raises(FileNotFoundError):
+        ground.reference("nowhere.csv")
+
+
+def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
+    file = tmp_path / "theirs.csv"
+    file.write_text("time [s],distance [km]\n1,2.5\n5,14\n")
+    assert main(["study", "report", str(folder), "--no-figures", "--join", f"theirs={file}", "--join", f"theirs={file}"]) == 0
+    said = capsys.readouterr().out
+    assert "theirs" in said and "the union of 6 runs" in said
+    for wrong, message in ((f"theirs{file}", "write NAME=FILE"), ("theirs=nowhere.csv", "nowhere.csv")):
+        assert main(["study", "report", str(folder), "--no-figures", "--join", wrong]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_nothing_to_report_on(tmp_path, capsys):
+    assert main(["study", "report", str(tmp_path)]) == 2
+    assert "holds no study" in capsys.readouterr().err
+    batch = study()
+    with Store.claim(tmp_path / "out", batch.definition()) as store:
+        store.keep(store.cells[0], 1, Outcome("crashed", "it broke"))
+    with pytest.raises(ValueError, match="nothing to report on yet"):
+        report(tmp_path / "out")
+    with pytest.raises(ValueError, match="another study"):
+        study(seed=2).report(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("paper", "message"),
+    [
+        ({"source": 3}, "source must be a text"),
+        ({"glide": 3}, "'glide' must be a table"),
+        ({"glide": {"gd": 3.0}}, "unknown key 'gd'"),
+        ({"glide": {"gd_mean": "3"}}, "gd_mean must be a number"),
+    ],
+)
+def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
+    with pytest.raises(ValueError, match=message):
+        check(paper)
+    with pytest.raises(ValueError, match=message):
+        study(paper=paper)
