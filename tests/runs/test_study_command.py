@@ -109,7 +109,9 @@ def test_a_wrong_call_is_one_line(here, capsys, call, words):
 def test_ctrl_c_says_how_to_go_on(here):
     (here / "gliders.toml").write_text(TOML.replace("60", "2_000_000"), encoding="utf-8")
     call = [sys.executable, "-m", "runs.cli", "study", "run", "gliders.toml"]
-    process = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
+    # A background job may have been told to ignore it, and its children with it.
+    heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    process = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=heeding)
     while not (here / "out/gliders/study.json").exists():
         time.sleep(0.05)
     time.sleep(0.5)
