@@ -66,7 +66,8 @@ class Flights:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points = tuple(front[i] for i in representatives(front, 4))
                 source = front.source
-                place = room(source.address) if source is not None and ":" not in source.address and source.address else None
+                named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
+                place = room(source.address) if source is not None and named else None
                 ends, note = _ends(front)
                 laws = {LAW: _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(ground, reference, solver, points, place, laws, ends, note)
