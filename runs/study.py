@@ -54,7 +54,7 @@ class Study:
     tolerance : float, default 1e-6
         As for `solve`.
     time_limit : float, optional
-        Seconds of a run, after which it is ended and recorded as a timeout. It changes no number of a run that ends before.
+        Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
         One line, for lists.
     paper : mapping
@@ -114,7 +114,7 @@ class Study:
         retry: bool = False,
         progress: bool = False,
     ) -> Summary:
-        """Make the runs that `out` does not have yet.
+        """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own.
 
         Parameters
         ----------
