@@ -26,8 +26,8 @@ from macs.storage import write_whole
 
 from .cell import Cell
 from .lock import locked
+from .making.work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 from .studyfile import same
-from .work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 
 MISSING, UNREADABLE = "missing", "unreadable"
 FORMAT = "macs study"

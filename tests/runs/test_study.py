@@ -18,8 +18,8 @@ import pytest
 from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow, glide
 
 from runs import Study
+from runs.making.work import perform
 from runs.store import Store
-from runs.work import perform
 from transcription import DFET
 
 HERE = Path(__file__).parent

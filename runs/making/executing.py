@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from macs.inputs import check_count
 
+from ..store import MISSING, UNREADABLE, Run, Store, Summary
 from .crew import Crew, Hired, Local
-from .store import MISSING, UNREADABLE, Run, Store, Summary
 from .watching import Watch
 from .work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, Task
 
 if TYPE_CHECKING:
-    from .study import Study
+    from ..study import Study
 
 AGAIN = (MISSING, UNREADABLE, KILLED, TIMEOUT, MEMORY)
 """What is made when a study is called again. A run that ended with an exception would most likely end so again."""

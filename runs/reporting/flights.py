@@ -17,12 +17,12 @@ from macs.plotting import label
 from macs.point import Point
 from transcription import from_dict
 
+from ..measures.indicators import pieces, truth
+from ..measures.references import room
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .ground import Ground, Reference
-from .indicators import pieces, truth
 from .plots import front_figure
-from .references import room
-from .report_tables import Cell, Column, Table, table
+from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
