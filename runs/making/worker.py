@@ -17,7 +17,6 @@ from typing import Any
 
 # All that a run needs is there before the first one begins: its time is its own.
 import h5netcdf  # noqa: F401
-import xarray
 
 import macs.storage  # noqa: F401
 
@@ -40,8 +39,6 @@ def main() -> None:
         pickle.dump(words, channel)
         channel.flush()
 
-    # The first Dataset looks for all that arrays may come from, which takes a second.
-    xarray.Dataset({"x": ("n", [0.0])})
     while True:
         try:
             task = tasks.get(timeout=PATIENCE)

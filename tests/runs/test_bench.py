@@ -19,8 +19,8 @@ from problems import goddard, load
 from runs.bench import command, inner, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
-from runs.steps import Steps
 from runs.cli import main
+from runs.steps import Steps
 from transcription import DFET
 
 TINY = inner.Effort(least=1, rounds=1, seconds=0.1, checked=1)
