@@ -8,8 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from .cli import DONE, INTERRUPTED, NO
-from .wrong import WrongCall, refused
+from .answers import DONE, INTERRUPTED, NO, WrongCall, refused
 
 
 def study(arguments: Namespace) -> int:
