@@ -42,7 +42,7 @@ def coarse(name):
 @pytest.fixture
 def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
-    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20))
+    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
