@@ -202,7 +202,9 @@ def test_a_first_population_that_was_cut_short_is_not_kept(file) -> None:
 def test_a_time_limit_counts_from_each_call(file) -> None:
     for _ in range(2):
         assert minimize(evaluations=10**6, checkpoint=file, time_limit=0.3).stats["stopped"] == "time limit"
-    assert minimize(evaluations=10**6, checkpoint=file, callback=after(0)).stats["wall_time"] > 0.6
+    assert (
+        minimize(evaluations=10**6, checkpoint=file, callback=after(0)).stats["wall_time"] > 0.3
+    )  # of this call alone it is next to nothing
 
 
 def test_an_error_in_the_users_function_loses_nothing(file) -> None:
