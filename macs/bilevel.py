@@ -44,7 +44,13 @@ class Bilevel(Evaluator):
 
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
-        evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks)
+
+        def itemise() -> np.ndarray:
+            return self.nlp.by_constraint(self.nlp.residuals(found.z)[1] if found.residuals is None else found.residuals)
+
+        evaluation = Evaluation(
+            found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks, itemise=itemise
+        )
         return evaluation, int(np.sum(found.iterations))
 
     def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:

@@ -54,6 +54,10 @@ class Solver(ABC):
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
         """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
 
+    def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
+        """What the state adds to the `stats` of a front, as plain data. Nothing, for most solvers."""
+        return {}
+
     @property
     def makes_state(self) -> Callable[..., Any]:
         """The method that is annotated to return the class of the state, which checkpoints have to know."""
