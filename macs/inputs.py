@@ -13,11 +13,14 @@ import numpy as np
 from problems.compiled import CompiledProblem, Variable
 from problems.problem import Problem
 from transcription.base import NLP, Transcription
+from transcription.smooth import Smooth
 
 from .front import Front
 from .point import Point
 from .storage import check_target
 
+STARTS: dict[str, Smooth | None] = {"uniform": None, "smooth": Smooth()}
+"""How first candidates are drawn, by name."""
 OTHER = "start: the points are of other variables; a start belongs to one problem"
 
 
@@ -72,6 +75,15 @@ def check_freedom(nlp: NLP) -> None:
         )
 
 
+def opening(start: Any) -> Smooth | None:
+    """How the first candidates are to be drawn, if `start` says so rather than which they are; None for evenly."""
+    if not isinstance(start, str):
+        return start if isinstance(start, Smooth) else None
+    if start not in STARTS:
+        raise ValueError(f"{unknown('start', start, STARTS)}; or give a Front, Points or an array of decisions")
+    return STARTS[start]
+
+
 def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
 
@@ -85,7 +97,7 @@ def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     points = _points(start)
     if points:
         rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
-    elif start is not None:
+    elif start is not None and not isinstance(start, str | Smooth):
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))

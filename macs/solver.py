@@ -19,7 +19,7 @@ from .bilevel import Bilevel
 from .blackbox import BlackBox
 from .evaluation import Evaluator
 from .front import Front
-from .inputs import beginning, check_freedom, check_problem, check_run, decisions
+from .inputs import beginning, check_freedom, check_problem, check_run, decisions, opening
 from .monitor import Progress
 from .results import black_box_front, trajectory_front
 from .running import ENDED, Run
@@ -107,8 +107,9 @@ class Solver(ABC):
             "auto", "march", "ipopt", "ipopt-feasibility", or one of your own.
         tolerance : float
             Largest scaled residual of a feasible point.
-        start : Front, Points or array (k, n), optional
-            Decisions to begin with: all variables, or the free ones only.
+        start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
+            Decisions to begin with: all variables, or the free ones only. Or how the first ones are drawn: each variable by itself, which
+            is the default, or smooth random profiles about the problem's guess, see `Smooth`. That guess comes first in any case.
         time_limit : float, optional
             Seconds after which the search ends with what it has; looked at, like Ctrl-C, before each batch and each solve by IPOPT. A
             safety net: a run that it ends is recorded as not reproducible.
@@ -147,7 +148,8 @@ class Solver(ABC):
         self.check_objectives(len(nlp.problem.goals))
         about = self._about()
         level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        evaluator = Bilevel(nlp, solver, float(tolerance))
+        sampling = opening(start)
+        evaluator = Bilevel(nlp, solver, float(tolerance), sampling)
         certified = self.certifies and evaluator.has_gradients
         run = Run(
             self,
@@ -161,6 +163,7 @@ class Solver(ABC):
                 "solver": about,
                 "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
                 "transcription": transcription.to_dict(),
+                "first candidates": None if sampling is None else asdict(sampling),
                 **level,
             },
         )

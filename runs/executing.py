@@ -100,6 +100,7 @@ def _task(study: Study, run: Run) -> Task:
         inner=study.inner,
         tolerance=float(study.tolerance),
         time_limit=study.time_limit,
+        start=study.sampling,
     )
 
 

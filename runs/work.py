@@ -8,7 +8,10 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from transcription import Smooth
 
 FINISHED, CRASHED, TIMEOUT, MEMORY, KILLED = "finished", "crashed", "timeout", "out of memory", "killed"
 SAMPLES = 30
@@ -31,6 +34,7 @@ class Task:
     inner: str
     tolerance: float
     time_limit: float | None
+    start: Smooth | None = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,7 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
             seed=task.seed,
             inner=task.inner,
             tolerance=task.tolerance,
+            start=task.start,
             callback=history.note,
         )
         from macs.running import ENDED

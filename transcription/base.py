@@ -46,6 +46,25 @@ def expanded(function: ca.Function) -> ca.Function:
 
 
 @dataclass(frozen=True, eq=False)
+class Profile:
+    """The free variables that are one control of one phase.
+
+    Attributes
+    ----------
+    name : str
+        "phase.control".
+    columns : array (k,) of int
+        Which of the free variables they are, in their order in time.
+    places : array (k,)
+        Where along the phase they lie: 0 at t0, 1 at tf.
+    """
+
+    name: str
+    columns: np.ndarray
+    places: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class NLP:
     """Objectives F(z) and constraints g_lower <= g(z) <= g_upper of a vector z of n variables, in the user's units.
 
@@ -66,6 +85,8 @@ class NLP:
         What the row is, in the user's names. Rows of one thing share one label.
     guess : array (d,)
         What the user guessed of the free variables; NaN where nothing.
+    profiles : tuple of Profile
+        Which of the free variables are the controls, and where in time.
     first_guess : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value.
     reduced : Reduced
@@ -89,6 +110,7 @@ class NLP:
     g_scale: np.ndarray
     g_labels: tuple[str, ...]
     guess: np.ndarray
+    profiles: tuple[Profile, ...]
     first_guess: Callable[[np.ndarray], np.ndarray]
     reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
