@@ -158,10 +158,10 @@ class MOPSO(PopulationSolver):
     def _flown(self, state: FlightState, evaluator: Evaluator, left: int, budget: int) -> Members:
         """Let the particles fly once, the first `left` of them if they are more."""
         box, rng, tolerance, free = box_of(evaluator), state.rng, evaluator.tolerance, evaluator.free
-        shape = state.velocity.shape
+        swarm, d = len(state.members), len(free)
         share = (evaluator.counts.evaluations - state.launched) / (budget - state.launched)
-        followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), shape[0], rng)
-        chance, rebound, coin = rng.random((2, *shape)), -rng.random(shape), rng.random(shape[0]) < 0.5
+        followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), swarm, rng)
+        chance, rebound, coin = rng.random((2, swarm, d)), -rng.random((swarm, d)), rng.random(swarm) < 0.5
 
         X, best, leaders = (box.to_unit(some.Z[:, free]) for some in (state.members, state.best, state.leaders.take(followed)))
         weights = inertia(share, self.inertia, self.final_inertia), self.cognitive, self.social
@@ -169,12 +169,12 @@ class MOPSO(PopulationSolver):
         X, V = flown(box, X, V, rebound)
 
         seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
-        n, rest = len(seen), np.arange(len(seen), shape[0])
-        state.members = seen.join(state.members.take(rest))
+        n = len(seen)
+        state.members = seen.join(state.members.take(np.arange(n, swarm)))
         state.velocity = np.concatenate([V[:n], state.velocity[n:]])
         better = improved(self._goals(seen, tolerance), self._goals(state.best, tolerance)[:n], coin[:n])
-        rows = np.arange(shape[0])
-        rows[:n][better] += shape[0]
+        rows = np.arange(swarm)
+        rows[np.flatnonzero(better)] += swarm
         state.best = state.best.join(seen).take(rows)
         return seen
 
