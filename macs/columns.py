@@ -1,9 +1,10 @@
-"""Named things as columns of a Dataset and back: variables with their bounds, dicts of numbers, JSON."""
+"""Labelled arrays, and named things as columns of them and back: variables with their bounds, dicts of numbers, JSON."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,55 @@ from problems.compiled import Limit, Variable
 
 if TYPE_CHECKING:
     import xarray
+
+
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """Arrays with named dimensions, as a group of a netCDF file has them: what files need of an xarray.Dataset, which takes a second or two
+    to import.
+
+    Attributes
+    ----------
+    variables : name -> (names of dimensions, array)
+        Labels of a dimension are the variable of its name.
+    attrs : mapping
+        Strings and integers.
+
+    Raises
+    ------
+    ValueError
+        If two arrays do not agree on how long a dimension is.
+    """
+
+    variables: Mapping[str, tuple[tuple[str, ...], np.ndarray]]
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths = self.sizes
+        for name, (dimensions, values) in self.variables.items():
+            if values.shape != (shape := tuple(lengths[dimension] for dimension in dimensions)):
+                raise ValueError(f"'{name}' has the shape {values.shape}, its dimensions {', '.join(dimensions)} that of {shape}")
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """How long the dimensions are."""
+        return {
+            dimension: length
+            for dimensions, values in self.variables.values()
+            for dimension, length in zip(dimensions, values.shape, strict=False)
+        }
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.variables[name][1]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.variables
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same for people."""
+        import xarray
+
+        return xarray.Dataset({name: (list(dimensions), values) for name, (dimensions, values) in self.variables.items()}, attrs=self.attrs)
 
 
 def variable_columns(variables: Sequence[Variable | Limit], dimension: str) -> dict[str, Any]:
@@ -31,16 +81,16 @@ def variable_columns(variables: Sequence[Variable | Limit], dimension: str) -> d
     return {key: ((dimension,), values) for key, values in columns.items()}
 
 
-def read_variables(data: xarray.Dataset, dimension: str) -> tuple[Variable, ...]:
+def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
     """What `variable_columns` made; limits, which have no unit, come back as variables too."""
-    names = [str(name) for name in data[dimension].values]
+    names = [str(name) for name in data[dimension]]
     if not names:
         return ()
     n = len(names)
-    columns = [data[f"{dimension}_{key}"].values.tolist() for key in ("lower", "upper")]
-    units = [str(unit) for unit in data[f"{dimension}_unit"].values] if f"{dimension}_unit" in data else [""] * n
-    periods = data[f"{dimension}_period"].values.tolist() if f"{dimension}_period" in data else [np.nan] * n
-    scales = data[f"{dimension}_scale"].values.tolist()
+    columns = [data[f"{dimension}_{key}"].tolist() for key in ("lower", "upper")]
+    units = [str(unit) for unit in data[f"{dimension}_unit"]] if f"{dimension}_unit" in data else [""] * n
+    periods = data[f"{dimension}_period"].tolist() if f"{dimension}_period" in data else [np.nan] * n
+    scales = data[f"{dimension}_scale"].tolist()
     return tuple(
         Variable(name, lower, upper, unit, scale, None if np.isnan(period) else period)
         for name, lower, upper, unit, scale, period in zip(names, *columns, units, scales, periods, strict=True)
@@ -60,10 +110,10 @@ def named_columns(rows: Sequence[Mapping[str, float] | None], name: str, dimensi
     }
 
 
-def read_named(root: xarray.Dataset, name: str, dimension: str) -> list[dict[str, float] | None]:
+def read_named(root: Labelled, name: str, dimension: str) -> list[dict[str, float] | None]:
     """What `named_columns` made."""
-    labels = [str(label) for label in root[dimension].values]
-    values, given, known = (root[key].values.tolist() for key in (name, f"{name}_given", f"{name}_known"))
+    labels = [str(label) for label in root[dimension]]
+    values, given, known = (root[key].tolist() for key in (name, f"{name}_given", f"{name}_known"))
     return [
         {label: v for label, v, there in zip(labels, row, mask, strict=True) if there} if k else None
         for row, mask, k in zip(values, given, known, strict=True)

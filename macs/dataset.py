@@ -1,8 +1,8 @@
-"""A front as labelled arrays and back: the root Dataset, and one for each phase's trajectories.
+"""A front as labelled arrays and back: the root, and a group for each phase's trajectories.
 
 Nothing here knows files. Floats go through untouched. Decisions have a column for each variable that any point has, and `place`, where in
 the point's own vector it stands, -1 if it has no such variable. Trajectories whose meshes differ in size are padded with NaN; their true
-lengths stand beside them (`node_count`, `element_count`, ...). A Dataset's attributes are strings and integers; what has structure is JSON.
+lengths stand beside them (`node_count`, `element_count`, ...). Attributes are strings and integers; what has structure is JSON.
 """
 
 from __future__ import annotations
@@ -15,13 +15,11 @@ import numpy as np
 
 from problems.compiled import Limit, Objective
 
-from .columns import document, named_columns, read_named, read_variables, variable_columns, words
+from .columns import Labelled, document, named_columns, read_named, read_variables, variable_columns, words
 from .front import Front
 from .source import Source
 
 if TYPE_CHECKING:
-    import xarray
-
     from transcription.trajectory import PhaseTrajectory, Trajectory
 
 FORMAT = "MACS front"
@@ -43,10 +41,8 @@ LENGTHS = ("node", "edge", "element", "state_function", "control_edge", "control
 """The dimensions in which points may differ; `<dimension>_count` (point) are the true lengths."""
 
 
-def root_dataset(front: Front) -> xarray.Dataset:
+def root_dataset(front: Front) -> Labelled:
     """Everything of a front but its trajectories."""
-    import xarray
-
     names = list(dict.fromkeys(name for point in front for name in point.parameters))
     parameters = [[point.parameters.get(name, np.nan) for name in names] for point in front]
     variables: dict[str, Any] = {
@@ -65,36 +61,35 @@ def root_dataset(front: Front) -> xarray.Dataset:
         **named_columns(front._violations, "violations", "constraint"),
         **named_columns(front._excursions, "excursions", "quantity"),
         **variable_columns(front.variables, "variable"),
+        "objective": (("objective",), words(front.names)),
+        "parameter": (("parameter",), words(names)),
     }
-    labels = {"objective": words(front.names), "parameter": words(names)}
-    return xarray.Dataset(variables, labels, _attributes(front))
+    return Labelled(variables, _attributes(front))
 
 
-def root_columns(root: xarray.Dataset) -> dict[str, Any]:
+def root_columns(root: Labelled) -> dict[str, Any]:
     """What `Front` is made of, but its trajectories, from `root_dataset`. Raises KeyError or ValueError where something is missing."""
-    signs = np.where(root["objective_sense"].values == "minimize", 1.0, -1.0)
-    scales = root["objective_scale"].values
+    signs = np.where(root["objective_sense"] == "minimize", 1.0, -1.0)
+    scales = root["objective_scale"]
     solver, stats = (json.loads(str(root.attrs[key])) for key in ("solver", "stats"))
     variables = read_variables(root, "variable")
-    own = [np.argsort(row)[np.count_nonzero(row < 0) :] for row in root["place"].values]
+    own = [np.argsort(row)[np.count_nonzero(row < 0) :] for row in root["place"]]
     return {
-        "F": root["objectives"].values * signs,
-        "decision": [row[columns] for row, columns in zip(root["decision"].values, own, strict=True)],
-        "violation": root["violation"].values,
-        "status": root["status"].values,
+        "F": root["objectives"] * signs,
+        "decision": [row[columns] for row, columns in zip(root["decision"], own, strict=True)],
+        "violation": root["violation"],
+        "status": root["status"],
         "goals": [
             Objective(str(name), str(unit), str(sense), None if np.isnan(scale) else float(scale))
-            for name, unit, sense, scale in zip(
-                root["objective"].values, root["objective_unit"].values, root["objective_sense"].values, scales, strict=True
-            )
+            for name, unit, sense, scale in zip(root["objective"], root["objective_unit"], root["objective_sense"], scales, strict=True)
         ],
         "variables": [[variables[column] for column in columns.tolist()] for columns in own] if own else variables,
-        "notes": [str(note) for note in root["note"].values],
+        "notes": [str(note) for note in root["note"]],
         "violations": read_named(root, "violations", "constraint"),
         "excursions": read_named(root, "excursions", "quantity"),
-        "optimality": root["optimality"].values,
+        "optimality": root["optimality"],
         "problem": _read_source(root.attrs),
-        "transcription": [json.loads(str(text)) for text in root["transcription"].values],
+        "transcription": [json.loads(str(text)) for text in root["transcription"]],
         "solver": solver,
         "stats": stats,
         "message": str(root.attrs["message"]),
@@ -107,10 +102,8 @@ def phase_names(front: Front) -> list[str]:
     return next((list(point.trajectory) for point in front if point.trajectory is not None), [])
 
 
-def phase_dataset(front: Front, name: str) -> xarray.Dataset:
+def phase_dataset(front: Front, name: str) -> Labelled:
     """The trajectories of one phase, all points. Raises KeyError if there is no such phase."""
-    import xarray
-
     phases = [None if point.trajectory is None else point.trajectory[name] for point in front]
     first = next((phase for phase in phases if phase is not None), None)
     if first is None:
@@ -125,37 +118,37 @@ def phase_dataset(front: Front, name: str) -> xarray.Dataset:
     variables |= variable_columns(first.path_limits, "path")
     variables["state_basis"] = (("point",), words(["" if phase is None else phase.state.basis for phase in phases]))
     variables["control_basis"] = (("point",), words(["" if phase is None else phase.control.basis for phase in phases]))
-    return xarray.Dataset(variables, attrs={"phase": name, "time_unit": first.time_unit})
+    return Labelled(variables, {"phase": name, "time_unit": first.time_unit})
 
 
-def trajectories(root: xarray.Dataset, phases: Sequence[xarray.Dataset]) -> list[Trajectory | None] | None:
+def trajectories(root: Labelled, phases: Sequence[Labelled]) -> list[Trajectory | None] | None:
     """The points' trajectories from `root_dataset` and `phase_dataset`; None if there are no phases."""
     from transcription.trajectory import Trajectory
 
     if not phases:
         return None
     columns = [_read_phase(phase) for phase in phases]
-    names = [str(name) for name in root["parameter"].values]
+    names = [str(name) for name in root["parameter"]]
     found: list[Trajectory | None] = []
-    for parameters, *flight in zip(root["parameters"].values.tolist(), *columns, strict=True):
+    for parameters, *flight in zip(root["parameters"].tolist(), *columns, strict=True):
         known = [phase for phase in flight if phase is not None]
         found.append(Trajectory(tuple(known), dict(zip(names, parameters, strict=True))) if known else None)
     return found
 
 
-def _read_phase(data: xarray.Dataset) -> list[PhaseTrajectory | None]:
+def _read_phase(data: Labelled) -> list[PhaseTrajectory | None]:
     from transcription.trajectory import PhaseTrajectory, PiecewisePolynomial
 
     states, controls = read_variables(data, "state"), read_variables(data, "control")
     limits = tuple(Limit(v.name, v.lower, v.upper, v.scale) for v in read_variables(data, "path"))
     found: list[PhaseTrajectory | None] = []
     for i in range(data.sizes["point"]):
-        length = {dimension: int(data[f"{dimension}_count"].values[i]) for dimension in LENGTHS}
+        length = {dimension: int(data[f"{dimension}_count"][i]) for dimension in LENGTHS}
         if not length["node"]:
             found.append(None)
             continue
         array = {
-            name: data[name].values[i][tuple(slice(length.get(dimension)) for dimension in dimensions)].copy()
+            name: data[name][i][tuple(slice(length.get(dimension)) for dimension in dimensions)].copy()
             for name, dimensions in ARRAYS.items()
         }
         phase = PhaseTrajectory(
@@ -165,8 +158,8 @@ def _read_phase(data: xarray.Dataset) -> list[PhaseTrajectory | None]:
             states=array["states"],
             controls=array["controls"],
             paths=array["paths"],
-            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data["state_basis"].values[i])),
-            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data["control_basis"].values[i])),
+            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], str(data["state_basis"][i])),
+            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], str(data["control_basis"][i])),
             state_variables=states,
             control_variables=controls,
             path_limits=limits,

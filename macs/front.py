@@ -282,7 +282,7 @@ class Front:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group."""
         from .dataset import phase_dataset, root_dataset
 
-        return root_dataset(self) if phase is None else phase_dataset(self, phase)
+        return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write objectives, violation, status and decisions, one row a point, under a header that names units."""

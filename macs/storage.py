@@ -16,17 +16,14 @@ import os
 from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
 
-from .columns import document, words
+from .columns import Labelled, document, words
 from .dataset import FORMAT, VERSION, phase_dataset, phase_names, root_columns, root_dataset, trajectories
 from .front import Front
-
-if TYPE_CHECKING:
-    import xarray
 
 CLOSEST = "_closest"
 PHASES = "phases"
@@ -52,7 +49,7 @@ def load(path: str | PathLike[str], problem: Any = None) -> Front:
     try:
         front = from_bytes(content)
     except Exception as error:
-        # Whatever a damaged or foreign file provokes in HDF5, xarray or in what follows, the user's file is what is wrong.
+        # Whatever a damaged or foreign file provokes in HDF5 or in what follows, the user's file is what is wrong.
         raise ValueError(f"{path} does not hold a front that can be read: {_reason(content, error)}") from error
     if problem is not None:
         if front.source is None:
@@ -132,10 +129,10 @@ def from_bytes(content: bytes) -> Front:
         return _read_front(file)
 
 
-def _datasets(front: Front, group: str = "") -> Iterator[tuple[str, xarray.Dataset]]:
+def _datasets(front: Front, group: str = "") -> Iterator[tuple[str, Labelled]]:
     """A front's groups by name, its root first."""
     root = root_dataset(front)
-    groups = _group_names(phase_names(front), {CLOSEST, *map(str, root.variables), *map(str, root.sizes)})
+    groups = _group_names(phase_names(front), {CLOSEST, *root.variables, *root.sizes})
     root.attrs[PHASES] = document(groups)
     root.attrs["has_closest"] = int(front._closest is not None)
     prefix = f"{group}/" if group else ""
@@ -158,17 +155,16 @@ def _group_names(phases: list[str], taken: set[str]) -> dict[str, str]:
     return groups
 
 
-def _write_group(group: Any, data: xarray.Dataset) -> None:
-    """One Dataset, as it is: no fill values, no packing, no time decoding."""
+def _write_group(group: Any, data: Labelled) -> None:
+    """One group, as it is: no fill values, no packing, no time decoding."""
     import h5py
 
-    group.dimensions = dict(data.sizes)
-    for name, variable in data.variables.items():
-        values = variable.values
+    group.dimensions = data.sizes
+    for name, (dimensions, values) in data.variables.items():
         if values.dtype.kind in "UO":
-            group.create_variable(str(name), variable.dims, dtype=h5py.string_dtype(), data=values.astype(object))
+            group.create_variable(name, dimensions, dtype=h5py.string_dtype(), data=values.astype(object))
         else:
-            group.create_variable(str(name), variable.dims, data=values)
+            group.create_variable(name, dimensions, data=values)
     for key, value in data.attrs.items():
         group.attrs[key] = value
 
@@ -180,17 +176,16 @@ def _read_front(group: Any) -> Front:
     return Front(**root_columns(root), trajectories=trajectories(root, phases), closest=closest)
 
 
-def _read_group(group: Any) -> xarray.Dataset:
+def _read_group(group: Any) -> Labelled:
     """What `_write_group` wrote, by HDF5's own names for it; several times faster than through netCDF's, for the same values."""
     import h5py
-    import xarray
 
     variables = {}
     for name, data in group.items():
         if isinstance(data, h5py.Dataset) and not str(_text(data.attrs.get("NAME", ""))).startswith(DIMENSION_ONLY):
             dimensions = (name,) if data.is_scale else tuple(dim[0].name.rsplit("/")[-1] for dim in data.dims)
             variables[name] = (dimensions, _values(data))
-    return xarray.Dataset(variables, attrs={key: _text(value) for key, value in group.attrs.items()})
+    return Labelled(variables, {key: _text(value) for key, value in group.attrs.items()})
 
 
 def _values(data: Any) -> np.ndarray:

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-DONE, NO, WRONG, INTERRUPTED = 0, 1, 2, 130
+from .answers import DONE, INTERRUPTED, WRONG, WrongCall
 
 EPILOG = """\
 examples:
@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except commands.WrongCall as error:
+    except WrongCall as error:
         return complain(str(error), arguments.parser.prog)
     except OSError as error:
         return complain(error.strerror or str(error), arguments.parser.prog)

@@ -26,8 +26,7 @@ from problems import Problem
 from transcription.inner import NAMED
 
 from . import study_commands, studyfile
-from .cli import DONE, NO
-from .wrong import WrongCall, refused
+from .answers import DONE, NO, WrongCall, refused
 
 MESHES = ("fixed", "adaptive")
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -10,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..steps import Steps
 from ..study import Study
 from .measured import Column, Row, short, table
-from .steps import Steps
 
 ONE, TWO = "one process", "two processes"
+LIMIT = "arithmetic alone"
+SPIN = "total = 0\nfor i in range({}):\n    total += i * i"
+"""Arithmetic that needs nothing but a core."""
 FASTER, BEYOND = 1.7, 0.05
 """What is asked: how many times as fast two processes are at least, and what share of its runs' time a study takes beyond it at most."""
 
@@ -26,16 +31,17 @@ class Effort:
     rounds: int = 3
     runs: int = 8
     evaluations: int = 5_000
+    spin: int = 20_000_000
 
 
-QUICK = Effort(rounds=1, runs=6, evaluations=500)
+QUICK = Effort(rounds=1, runs=6, evaluations=500, spin=5_000_000)
 
 
 def bench_study(rows: list[Row], effort: Effort) -> None:
     """Measure; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
     batch = Study("bench", problems="goddard", solvers="macs", evaluations=effort.evaluations, runs=effort.runs, seed=1)
     case = f"goddard, {effort.runs} runs of {effort.evaluations}"
-    pair = {1: Row(case, ONE), 2: Row(case, TWO)}
+    pair, limit = {1: Row(case, ONE), 2: Row(case, TWO)}, Row(LIMIT, TWO)
     with Steps("studies", 2 * effort.rounds) as steps:
         for i in range(effort.rounds):
             taken = {}
@@ -45,8 +51,9 @@ def bench_study(rows: list[Row], effort: Effort) -> None:
                 taken[jobs] = _timed(batch, jobs)
             for jobs, (seconds, work) in taken.items():
                 pair[jobs].add(speed=taken[1][0] / seconds, seconds=seconds, work=work / taken[1][1], beyond=jobs * seconds / work - 1.0)
+            limit.add(speed=_spun(effort.spin, 1) / _spun(effort.spin, 2))
             if i == 0:
-                rows += pair.values()
+                rows += [*pair.values(), limit]
 
 
 def _timed(batch: Study, jobs: int) -> tuple[float, float]:
@@ -60,15 +67,26 @@ def _timed(batch: Study, jobs: int) -> tuple[float, float]:
     return seconds, float(np.sum([run.wall_time for run in summary.runs]))
 
 
+def _spun(count: int, at_once: int) -> float:
+    """Seconds that two processes of plain arithmetic take, so many at a time."""
+    began = time.perf_counter()
+    for _ in range(2 // at_once):
+        running = [subprocess.Popen([sys.executable, "-c", SPIN.format(count)]) for _ in range(at_once)]
+        for process in running:
+            process.wait()
+    return time.perf_counter() - began
+
+
 def report(rows: Sequence[Row]) -> str:
     """What was measured, and what was asked."""
-    found = {row.who: row for row in rows}
+    found = {row.who: row for row in rows if row.case != LIMIT}
     speed, beyond = found[TWO].of("speed"), found[ONE].of("beyond")
     lines = [
         "STUDIES: a whole study with two processes against one, in turn; median, least and greatest of few rounds. Runs' time: that of all",
         "runs together, as multiples of what they take one at a time; above 1, runs that go on side by side slow each other down. Beyond:",
         "what the study takes beyond its runs' time, as a share of it: writing files, waiting for the last run, and a second or two for",
-        "each process to start once, which weighs more here than in a study of many long runs.",
+        "each process to start once, which weighs more here than in a study of many long runs. Arithmetic alone: what two processes",
+        "gain on this machine that share nothing and wait for nothing.",
         "",
         table(rows, COLUMNS),
         "",
@@ -81,7 +99,7 @@ def report(rows: Sequence[Row]) -> str:
 COLUMNS: tuple[Column, ...] = (
     ("times as", "fast", lambda row: row.spread("speed") if row.who == TWO else "1"),
     ("runs'", "time", lambda row: row.spread("work") if row.who == TWO else "1"),
-    ("beyond", "", lambda row: f"{100 * row.of('beyond'):.1f} %"),
-    ("s", "", lambda row: short(row.of("seconds"))),
+    ("beyond", "", lambda row: f"{100 * row.of('beyond'):.1f} %" if "beyond" in row.values else "-"),
+    ("s", "", lambda row: short(row.of("seconds")) if "seconds" in row.values else "-"),
     ("", "rounds", lambda row: str(len(row.values["speed"]))),
 )

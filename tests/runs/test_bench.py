@@ -19,8 +19,8 @@ from problems import goddard, load
 from runs.bench import command, inner, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
-from runs.bench.steps import Steps
 from runs.cli import main
+from runs.steps import Steps
 from transcription import DFET
 
 TINY = inner.Effort(least=1, rounds=1, seconds=0.1, checked=1)
@@ -42,7 +42,7 @@ def coarse(name):
 @pytest.fixture
 def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
-    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20))
+    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))

@@ -1,4 +1,5 @@
-"""A process that makes one run after the other, `python -m runs.worker`: tasks come in on stdin, reports and outcomes go out on stdout.
+"""A process that makes one run after the other, `python -m runs.making.worker`: tasks come in on stdin, reports and outcomes go out on
+stdout.
 
 Whatever a user's problem prints goes to stderr, so does the traceback of a crash or of a run that is taking too long. It ends when nobody
 can want anything more of it: as soon as stdin is closed, also in the middle of a run, and after a while without a task.
@@ -16,7 +17,6 @@ from typing import Any
 
 # All that a run needs is there before the first one begins: its time is its own.
 import h5netcdf  # noqa: F401
-import xarray
 
 import macs.storage  # noqa: F401
 
@@ -39,8 +39,6 @@ def main() -> None:
         pickle.dump(words, channel)
         channel.flush()
 
-    # The first Dataset looks for all that arrays may come from, which takes a second.
-    xarray.Dataset({"x": ("n", [0.0])})
     while True:
         try:
             task = tasks.get(timeout=PATIENCE)

@@ -1,8 +1,11 @@
-"""What commands answer a wrong call with."""
+"""What commands answer: exit codes, and a line for a wrong call."""
 
 from __future__ import annotations
 
 from typing import Any
+
+DONE, NO, WRONG, INTERRUPTED = 0, 1, 2, 130
+"""Exit codes: done; the answer is no; the call was wrong; Ctrl-C."""
 
 
 class WrongCall(Exception):  # noqa: N818 - whoever called is to be told, in one line
