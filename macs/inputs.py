@@ -19,8 +19,8 @@ from .front import Front
 from .point import Point
 from .storage import check_target
 
-STARTS: dict[str, Smooth | None] = {"uniform": None, "smooth": Smooth()}
-"""How first candidates are drawn, by name."""
+STARTS = ("uniform", "smooth")
+"""How first candidates are drawn."""
 OTHER = "start: the points are of other variables; a start belongs to one problem"
 
 
@@ -75,29 +75,32 @@ def check_freedom(nlp: NLP) -> None:
         )
 
 
-def opening(start: Any) -> Smooth | None:
-    """How the first candidates are to be drawn, if `start` says so rather than which they are; None for evenly."""
+def drawing(start: Any) -> Smooth | str | None:
+    """How first candidates are to be drawn, if `start` says that and not which they are: a `Smooth`, or "uniform"."""
     if not isinstance(start, str):
         return start if isinstance(start, Smooth) else None
     if start not in STARTS:
         raise ValueError(f"{unknown('start', start, STARTS)}; or give a Front, Points or an array of decisions")
-    return STARTS[start]
+    return Smooth() if start == "smooth" else start
 
 
 def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
     """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
 
+    Where the caller says how candidates are drawn, that decides about the guess: it is left out with "uniform" and as `Smooth` has it.
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
     meshes are interpolated.
     """
     rows = []
-    if np.isfinite(nlp.guess).any():
+    drawn = drawing(start)
+    wanted = drawn.guess if isinstance(drawn, Smooth) else drawn is None
+    if wanted and np.isfinite(nlp.guess).any():
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
     points = _points(start)
     if points:
         rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
-    elif start is not None and not isinstance(start, str | Smooth):
+    elif start is not None and drawn is None:
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))

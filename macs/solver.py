@@ -14,12 +14,13 @@ from problems.compiled import CompiledProblem, Objective, Variable
 from problems.problem import Problem
 from transcription.base import Transcription
 from transcription.inner import InnerSolver, inner_solver
+from transcription.smooth import Smooth
 
 from .bilevel import Bilevel
 from .blackbox import BlackBox
 from .evaluation import Evaluator
 from .front import Front
-from .inputs import beginning, check_freedom, check_problem, check_run, decisions, opening
+from .inputs import beginning, check_freedom, check_problem, check_run, decisions, drawing
 from .monitor import Progress
 from .results import black_box_front, trajectory_front
 from .running import ENDED, Run
@@ -108,8 +109,9 @@ class Solver(ABC):
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
-            Decisions to begin with: all variables, or the free ones only. Or how the first ones are drawn: each variable by itself, which
-            is the default, or smooth random profiles about the problem's guess, see `Smooth`. That guess comes first in any case.
+            Decisions to begin with: all variables, or the free ones only; after the problem's guess, if there is one. Or how candidates are
+            drawn: "uniform", each variable by itself, as all those that are missing otherwise, but without the guess; "smooth", random
+            profiles about the guess, see `transcription.Smooth`.
         time_limit : float, optional
             Seconds after which the search ends with what it has; looked at, like Ctrl-C, before each batch and each solve by IPOPT. A
             safety net: a run that it ends is recorded as not reproducible.
@@ -148,8 +150,8 @@ class Solver(ABC):
         self.check_objectives(len(nlp.problem.goals))
         about = self._about()
         level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        sampling = opening(start)
-        evaluator = Bilevel(nlp, solver, float(tolerance), sampling)
+        drawn = drawing(start)
+        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
         run = Run(
             self,
@@ -163,7 +165,7 @@ class Solver(ABC):
                 "solver": about,
                 "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
                 "transcription": transcription.to_dict(),
-                "first candidates": None if sampling is None else asdict(sampling),
+                "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
                 **level,
             },
         )

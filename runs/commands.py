@@ -50,7 +50,7 @@ def solve(arguments: Namespace) -> int:
         scheme = transcription.parse(method) if isinstance(method, str) else method
     solver = make_solver(arguments.solver, arguments.no_refine, choose(arguments.mesh, MESHES, "kind of mesh"))
     choose(arguments.inner, NAMED, "inner level")
-    start = choose(arguments.start, STARTS, "start")
+    start = arguments.start and choose(arguments.start, STARTS, "start")
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_picture(arguments.plot)

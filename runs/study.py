@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, asdict, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.inputs import check_count, check_positive, opening, unknown
+from macs.inputs import check_count, check_positive, drawing, unknown
 from transcription import Smooth
 from transcription.inner import NAMED
 
@@ -55,7 +55,8 @@ class Study:
     tolerance : float, default 1e-6
         As for `solve`.
     start : "uniform", "smooth", Smooth or mapping, optional
-        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: uniform.
+        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: each
+        variable by itself, after the problem's guess.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -174,10 +175,10 @@ class Study:
         return report(out, foreign=foreign, figures=figures, progress=progress)
 
     @property
-    def sampling(self) -> Smooth | None:
-        """How the first candidates are drawn; None for uniformly. Raises ValueError if `start` makes no sense."""
+    def sampling(self) -> Smooth | str | None:
+        """What `solve` gets as its `start`. Raises ValueError if ours makes no sense."""
         if not isinstance(self.start, Mapping):
-            return opening(self.start)
+            return drawing(self.start)
         for key in self.start:
             if key not in Smooth.__dataclass_fields__:
                 raise ValueError(unknown("setting of start", key, Smooth.__dataclass_fields__))
@@ -197,7 +198,7 @@ class Study:
             "runs": int(self.runs),
             "inner": self.inner,
             "tolerance": float(self.tolerance),
-            "start": None if self.sampling is None else asdict(self.sampling),
+            "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
             "paper": studyfile.plain(self.paper),
@@ -210,7 +211,7 @@ class Study:
         check_positive("tolerance", self.tolerance)
         if self.time_limit is not None:
             check_positive("time_limit", self.time_limit)
-        if self.sampling is None and self.start not in (None, "uniform"):
+        if self.sampling is None and self.start is not None:
             raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
         if self.inner not in NAMED:
             raise ValueError(unknown("inner level", self.inner, NAMED))

@@ -35,6 +35,8 @@ class Smooth:
     length : float, default 0.2
         Over which time values are alike, as a fraction of the phase, in (0, 10]. With less than there is between two nodes, these are
         independent.
+    guess : bool, default True
+        Whether a search also begins with the guess itself, as the first candidate.
 
     Raises
     ------
@@ -44,11 +46,14 @@ class Smooth:
 
     spread: float = 0.2
     length: float = 0.2
+    guess: bool = True
 
     def __post_init__(self) -> None:
         for name, value, most in (("spread", self.spread, 1), ("length", self.length, 10)):
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= most:
                 raise ValueError(f"Smooth: {name} must be in (0, {most}], not {value!r}")
+        if not isinstance(self.guess, bool):
+            raise ValueError(f"Smooth: guess must be True or False, not {self.guess!r}")
 
     def draw(self, problem: Problem, transcription: Transcription, count: int, rng: np.random.Generator) -> np.ndarray:
         """`count` candidates (count, d), values of the free variables: an array that `start=` takes."""

@@ -41,7 +41,7 @@ class Task:
     inner: str
     tolerance: float
     time_limit: float | None
-    start: Smooth | None = None
+    start: Smooth | str | None = None
     checkpoint: Path | None = None
 
 

@@ -390,7 +390,7 @@ def test_runs_begin_as_the_study_says(tmp_path):
         assert one.runs[0].front.stats["population"]["generations"] == 2
         return one.runs[0].front.F.tolist()
 
-    assert made("uniform") == made(None) != made("smooth") == made({"spread": 0.2})
+    assert made("uniform") == made(None) != made("smooth") == made({"spread": 0.2})  # without a guess, uniform is the default
 
 
 def test_wrong_calls_of_run(tmp_path):

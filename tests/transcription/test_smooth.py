@@ -95,9 +95,9 @@ def test_the_generator_is_the_only_source_of_chance() -> None:
     assert not np.array_equal(first, other)
 
 
-@pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}])
+@pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
 def test_settings_that_make_no_sense(settings) -> None:
-    with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be in"):
+    with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
         Smooth(**settings)
 
 
@@ -123,8 +123,21 @@ def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
         assert np.array_equal(first[0][np.isfinite(nlp.guess)], nlp.guess[np.isfinite(nlp.guess)])  # the guess itself comes first
         return float(np.abs(np.diff(first[1 : min(len(batches[0]), 6), nlp.profiles[0].columns], axis=1)).mean())
 
-    assert roughness("smooth") < 0.5 * roughness("uniform")
+    assert roughness("smooth") < 0.5 * roughness(None)
     assert roughness(Smooth(spread=0.01)) < 0.1 * roughness(None)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
+@pytest.mark.parametrize("start", ["uniform", Smooth(guess=False)], ids=str)
+def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
+    from macs.bilevel import Bilevel
+
+    nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
+    inside = Bilevel._evaluate
+    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (first.append(Z.copy()), inside(self, Z))[1])
+    solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="march")
+    throttle = nlp.profiles[0].columns
+    assert not np.isclose(np.vstack(first)[:, nlp.free][:, throttle], nlp.guess[throttle]).all(axis=1).any()
 
 
 def test_an_array_of_them_is_a_start_too() -> None:
