@@ -84,23 +84,20 @@ def drawing(start: Any) -> Smooth | str | None:
     return Smooth() if start == "smooth" else start
 
 
-def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
-    """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
+def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
+    """Full vectors to begin with: what the caller gave, after what the problem's user guessed, if that is wanted; None if there is nothing.
 
-    Where the caller says how candidates are drawn, that decides about the guess: it is left out with "uniform" and as `Smooth` has it.
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
     meshes are interpolated.
     """
     rows = []
-    drawn = drawing(start)
-    wanted = drawn.guess if isinstance(drawn, Smooth) else drawn is None
-    if wanted and np.isfinite(nlp.guess).any():
+    if guess and np.isfinite(nlp.guess).any():
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
     points = _points(start)
     if points:
         rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
-    elif start is not None and drawn is None:
+    elif start is not None:
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
             rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))

@@ -160,7 +160,7 @@ class Solver(ABC):
             make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level, certified=certified),
             budget=evaluations,
             seed=seed,
-            start=beginning(start, nlp),
+            start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
             what={
                 "solver": about,
                 "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
