@@ -61,8 +61,8 @@ class Study:
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
         One line, for lists.
-    paper : mapping
-        Published figures to print beside ours; see `report`.
+    paper : sequence of mappings
+        Published tables to print beside ours; see `reporting.published`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class Study:
     start: Any = None
     time_limit: float | None = None
     description: str = ""
-    paper: Mapping[str, Any] = field(default_factory=dict)
+    paper: Sequence[Mapping[str, Any]] = ()
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
@@ -215,8 +215,6 @@ class Study:
             raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
         if self.inner not in NAMED:
             raise ValueError(unknown("inner level", self.inner, NAMED))
-        if not isinstance(self.paper, Mapping):
-            raise ValueError(f"paper must be a table, not {self.paper!r}")
         check_paper(self.paper)
         if not isinstance(self.description, str):
             raise ValueError(f"description must be a line of text, not {self.description!r}")

@@ -11,6 +11,8 @@ the points, and `igd` and `igd_plus` weigh each piece of the curve by its length
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import moocore
 import numpy as np
 
@@ -68,6 +70,21 @@ def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normali
         return 0.0
     ideal, unit = extent(R)
     return float(moocore.hypervolume(np.ascontiguousarray(F), ref=ideal + point * unit))
+
+
+def hypervolume_at(front: Points, point: Sequence[float]) -> float:
+    """Volume that the front dominates, in the objectives' own units, up to a point (m,) in the users' units and senses. 0 if it is empty.
+
+    Raises
+    ------
+    ValueError
+        If the point has not as many numbers as there are objectives.
+    """
+    F = minimised(front, None)
+    if isinstance(front, Front) and len(point) != len(front.goals):
+        raise ValueError(f"point: {len(point)} numbers, but {len(front.goals)} objectives: {', '.join(front.names)}")
+    signs = [goal.sign for goal in front.goals] if isinstance(front, Front) else np.ones(len(point))
+    return float(moocore.hypervolume(np.ascontiguousarray(F), ref=np.multiply(point, signs))) if len(F) else 0.0
 
 
 # Plain distances, for arrays whose senses do not matter

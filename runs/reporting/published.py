@@ -1,70 +1,113 @@
-"""A published table beside ours: mean and variance of GD and IGD against the union of all runs, and the time of a run."""
+"""Published tables beside ours: what a study's `[[paper]]` sections say of them, row by row, and the same figures of our runs.
+
+A section has `of`, one of `kinds.KINDS`, and `rows`: {problem, by, figures by key}. Beside them there may be `source`, `note` (how the
+paper's figures came about), `differs` (what is not the same here), and whatever the kind needs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
+from macs.inputs import unknown
 
-from ..measures.scale import Scale
-from ..measures.statistics import summarise
 from .ground import Ground
-from .measuring import samples, spent
+from .kinds import KINDS, STATISTICS, Kind
 from .tables import Cell, Column, Table, table
 
-KEYS = ("gd_mean", "gd_variance", "igd_mean", "igd_variance", "seconds")
-"""What a study's `[paper.PROBLEM]` may hold, and the columns of the table."""
+TEXTS = ("source", "note", "differs")
+SECTION = ("of", "rows", *TEXTS)
+ROW = ("problem", "by")
 
 
-def check(paper: Mapping[str, Any]) -> None:
-    """Raise ValueError that names what a study's section `paper` holds and should not."""
-    for label, figures in paper.items():
-        if label in ("source", "note", "differs"):
-            if not isinstance(figures, str):
-                raise ValueError(f"paper: {label} must be a text, not {figures!r}")
-            continue
-        if not isinstance(figures, Mapping):
-            raise ValueError(f"paper: '{label}' must be a table of {', '.join(KEYS)}, not {figures!r}")
-        for key, value in figures.items():
-            if key not in KEYS:
-                raise ValueError(f"paper.{label}: unknown key '{key}'; there are {', '.join(KEYS)}")
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"paper.{label}: {key} must be a number, not {value!r}")
+def check(papers: Any) -> None:
+    """Raise ValueError that names what a study's `[[paper]]` sections hold and should not, or lack."""
+    if isinstance(papers, str | Mapping) or not isinstance(papers, Sequence):
+        raise ValueError(f"paper must be a list of tables, [[paper]], not {papers!r}")
+    for paper in papers:
+        if not isinstance(paper, Mapping):
+            raise ValueError(f"paper: each must be a table, not {paper!r}")
+        if paper.get("of") not in KINDS:
+            raise ValueError(f"paper: of must be one of {', '.join(KINDS)}, not {paper.get('of')!r}")
+        kind = KINDS[paper["of"]]
+        for key in paper:
+            if key not in (*SECTION, *kind.needs):
+                raise ValueError(f"paper: {unknown('key', key, (*SECTION, *kind.needs))}")
+        for key in kind.needs:
+            if key not in paper:
+                raise ValueError(f"paper: of {paper['of']} it needs {key}")
+        for key in TEXTS:
+            if not isinstance(paper.get(key, ""), str):
+                raise ValueError(f"paper: {key} must be a text, not {paper[key]!r}")
+        if not isinstance(paper.get("rows"), Sequence) or not paper["rows"]:
+            raise ValueError("paper: rows must be a list of tables")
+        for row in paper["rows"]:
+            _check_row(row, kind)
 
 
-def published_table(grounds: Sequence[Ground], paper: Mapping[str, Any]) -> Table | None:
-    """The paper's rows and ours, problem by problem; None where the paper says nothing of any.
+def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, Any]]) -> dict[str, Table]:
+    """Name of a file -> table: the paper's rows and ours, problem by problem. Those of problems that there are no runs of are left out."""
+    found: dict[str, Table] = {}
+    for number, paper in enumerate(papers, 1):
+        together = _beside(grounds, paper, KINDS[paper["of"]])
+        if together is not None:
+            found["published" if len(papers) == 1 else f"published-{number}"] = together
+    return found
 
-    GD and IGD are against the points of the union of all runs, as published tables have them, normalised by its range.
-    """
+
+def _check_row(row: Any, kind: Kind) -> None:
+    if not isinstance(row, Mapping) or not all(isinstance(row.get(key), str) for key in ROW):
+        raise ValueError(f"paper: each of rows must be a table with problem and by, not {row!r}")
+    if kind.statistics and row.get("statistic") not in STATISTICS:
+        raise ValueError(f"paper: statistic must be one of {', '.join(STATISTICS)}, not {row.get('statistic')!r}")
+    for key in _figures(row):
+        if kind.columns is not None and key not in kind.columns:
+            raise ValueError(f"paper: {unknown('key', key, tuple(kind.columns))}")
+        if isinstance(row[key], bool) or not isinstance(row[key], int | float):
+            raise ValueError(f"paper: {key} must be a number, not {row[key]!r}")
+
+
+def _figures(row: Mapping[str, Any]) -> list[str]:
+    return [key for key in row if key not in (*ROW, "statistic")]
+
+
+def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> Table | None:
+    """One published table and ours; None if there are no runs of its problems."""
+    keys = list(kind.columns or dict.fromkeys(key for row in paper["rows"] for key in _figures(row)))
     rows: list[list[Cell]] = []
-    notes = []
-    for ground in grounds:
-        figures = paper.get(ground.problem)
-        if figures is None:
+    notes: list[str] = []
+    for problem in dict.fromkeys(row["problem"] for row in paper["rows"]):
+        here = [ground for ground in grounds if ground.problem == problem]
+        theirs = [row for row in paper["rows"] if row["problem"] == problem]
+        if not here:
             continue
-        rows.append([ground.problem, "the paper", None, *(figures.get(key) for key in KEYS), None])
-        union = ground.union()
-        found, times = samples(ground, union, curve=False), spent(ground)["time [s]"]
-        for solver in ground.runs:
-            if solver not in found["GD"]:
-                continue
-            cells: list[Cell] = []
-            for name in ("GD", "IGD"):
-                summary = summarise(found[name][solver])
-                cells += [summary.mean, summary.variance]
-            seconds = float(np.mean(times[solver])) if solver in times else None
-            ratio = figures["seconds"] / seconds if seconds and "seconds" in figures else None
-            rows.append([ground.problem, f"{solver}, {ground.transcription}", len(found["GD"][solver]), *cells, seconds, ratio])
-        scale = Scale.of(union.front, like=ground.known, what=union.what).describe().split(". Hypervolume")[0]
-        notes.append(f"{ground.problem}: {scale[0].lower()}{scale[1:]}; GD and IGD to its points.")
+        seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
+        rows += [[problem, row["by"], None, *_cells(row, keys, kind, None)] for row in theirs]
+        for ground in here:
+            for solver, figures in kind.ours(ground, paper).items():
+                runs = len(ground.fronts[solver]) + ground.failures.get(solver, 0)
+                rows += [[problem, f"{solver}, {ground.transcription}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
+        notes.append(f"{problem}: {kind.note(here[0], paper)}")
     if not rows:
         return None
-    heads: list[Column | str] = [Column("problem", grouped=True), "by", "runs"]
-    heads += [Column("mean GD", digits=4), Column("variance", digits=4), Column("mean IGD", digits=4), Column("variance", digits=4)]
-    heads += [Column("time", "s", digits=4), Column("times as fast", digits=2)]
+    heads: list[Column | str] = [
+        Column("problem", grouped=True),
+        Column("by", grouped=kind.statistics),
+        Column("runs", grouped=kind.statistics),
+    ]
+    heads += ["statistic"] if kind.statistics else []
+    units = {goal.name: goal.unit for ground in grounds for goal in ground.known.goals}
+    heads += [kind.columns[key] if kind.columns else Column(key, units.get(key, ""), digits=4) for key in keys]
+    heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper['source']}" if "source" in paper else "Beside published figures"
-    told = [f"The paper: {paper['note']}."] if "note" in paper else []
-    told += [f"What differs: {paper['differs']}."] if "differs" in paper else []
-    return table(heads, rows, f"{caption}.", [*notes, *told, "Variance with divisor n - 1."])
+    told = [f"{word}: {paper[key]}." for key, word in (("note", "The paper"), ("differs", "What differs")) if key in paper]
+    return table(heads, rows, f"{caption}.", [*notes, *told])
+
+
+def _cells(figures: Mapping[str, Any], keys: Sequence[str], kind: Kind, theirs: float | None) -> list[Cell]:
+    """A row's figures; `theirs` are the seconds that the paper's took."""
+    cells: list[Cell] = [figures["statistic"]] if kind.statistics else []
+    cells += [figures.get(key) for key in keys]
+    if "seconds" in keys:
+        cells.append(theirs / figures["seconds"] if theirs and figures.get("seconds") else None)
+    return cells

@@ -24,7 +24,7 @@ from .flights import Flights
 from .ground import Ground, Reference, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
-from .published import published_table
+from .published import published_tables
 from .statistics_tables import comparison_table, overall_table, summary_table
 from .tables import Cell, Column, Table, table
 
@@ -90,12 +90,9 @@ def report(
         found = grounds(store, others)
     writer = _Writer(Path(out) / FOLDER)
     sections = [summary_text(summary)]
-    paper = store.definition.get("paper") or {}
     for ground in _told(found) if progress else found:
         sections += _section(ground, ground.reference(store.definition.get("reference")), writer, figures)
-    beside = published_table(found, paper)
-    if beside is not None:
-        sections.append(writer.table("published", beside))
+    sections += [writer.table(name, one) for name, one in published_tables(found, store.definition.get("paper") or []).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
     return Report(text, tuple(writer.files))

@@ -19,7 +19,13 @@ from runs.reporting.report import report
 from runs.store import Store
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
-PAPER = {"source": "a paper", "note": "thirty runs", "differs": "everything", "glide": {"gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}}
+WORDS = {"source": "a paper", "note": "thirty runs", "differs": "everything"}
+ROW = {"problem": "glide", "by": "the paper"}
+PAPER = [
+    {"of": "indicators", **WORDS, "rows": [{**ROW, "gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}]},
+    {"of": "hypervolume", "point": [10.0, 0.0], "rows": [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]},
+    {"of": "objectives", "rows": [{**ROW, "statistic": "greatest", "distance": 7.0}]},
+]
 
 
 def study(**more) -> Study:
@@ -69,12 +75,38 @@ def test_its_numbers_are_those_of_the_fronts(folder, told):
     assert float(rows["IGD", "one"]["mean"]) == pytest.approx(np.mean(values), rel=1e-12)
     assert float(rows["IGD", "one"]["variance"]) == pytest.approx(np.var(values, ddof=1), rel=1e-12)
     assert rows["IGD", "broken"]["failed"] == "3" and rows["IGD", "broken"]["median"] == "inf"
-    with (folder / "report" / "published.csv").open() as file:
+    with (folder / "report" / "published-1.csv").open() as file:
         paper, ours, *_ = csv.reader(list(file)[1:])
     assert paper[3] == "0.5" and paper[4] == ""
     mean = np.mean([gd(run.front, union, curve=False) for run in store.runs() if run.finished and run.cell.solver == "one"])
     assert float(ours[3]) == pytest.approx(mean, rel=1e-12)
     assert "The paper: thirty runs." in told and "What differs: everything." in told
+
+
+def test_volumes_and_objectives_beside_published_ones(folder, told):
+    store = Store.open(folder)
+    fronts = [run.front for run in store.runs() if run.finished and run.cell.solver == "one"]
+    with (folder / "report" / "published-2.csv").open() as file:
+        paper, ours, *others = csv.DictReader(file)
+    assert (paper["by"], paper["best"], paper["median"]) == ("the paper", "3.0", "")
+    volumes = [staircase(front.objectives) for front in fronts]
+    expected = [min(volumes), np.median(volumes), max(volumes)]
+    assert [float(ours[key]) for key in ("worst", "median", "best")] == pytest.approx(expected, rel=1e-12)
+    broken = next(row for row in others if row["by"].startswith("broken"))
+    assert [broken[key] for key in ("runs", "best", "worst")] == ["3", "0.0", "0.0"]
+    assert "up to time 10 s, distance 0 km" in told and "dive" not in told
+    with (folder / "report" / "published-3.csv").open() as file:
+        rows = {(row["by"], row["statistic"]): row["distance [km]"] for row in csv.DictReader(file)}
+    distances = np.concatenate([front.objectives[:, 1] for front in fronts])
+    assert float(rows["the paper", "greatest"]) == 7.0
+    for statistic, value in (("greatest", max(distances)), ("mean", np.mean(distances)), ("variance", np.var(distances, ddof=1))):
+        assert float(rows["one, dfet:2x2", statistic]) == pytest.approx(value, rel=1e-12)
+
+
+def staircase(points: np.ndarray) -> float:
+    """The area that times and distances (n, 2) dominate, up to 10 s and 0 km."""
+    times, distances = points[np.argsort(points[:, 0])].T
+    return float(np.sum(np.diff(np.append(times, 10.0)) * distances))
 
 
 def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
@@ -116,10 +148,17 @@ def test_nothing_to_report_on(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("paper", "message"),
     [
-        ({"source": 3}, "source must be a text"),
-        ({"glide": 3}, "'glide' must be a table"),
-        ({"glide": {"gd": 3.0}}, "unknown key 'gd'"),
-        ({"glide": {"gd_mean": "3"}}, "gd_mean must be a number"),
+        ({"source": 3}, "must be a list of tables"),
+        ([3], "each must be a table"),
+        ([{"rows": []}], "of must be one of indicators, hypervolume"),
+        ([{"of": "indicators", "source": 3}], "source must be a text"),
+        ([{"of": "indicators", "sauce": "3"}], "sauce"),
+        ([{"of": "hypervolume", "rows": [ROW]}], "it needs point"),
+        ([{"of": "indicators", "rows": []}], "rows must be a list of tables"),
+        ([{"of": "indicators", "rows": [{"by": "glide"}]}], "with problem and by"),
+        ([{"of": "indicators", "rows": [{**ROW, "gd": 3.0}]}], "unknown key 'gd'"),
+        ([{"of": "indicators", "rows": [{**ROW, "gd_mean": "3"}]}], "gd_mean must be a number"),
+        ([{"of": "objectives", "rows": [{**ROW, "distance": 3}]}], "statistic must be one of greatest"),
     ],
 )
 def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):

@@ -126,7 +126,8 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     for name in ("goddard-table3", "orbit-table3", "orbit-full-table3"):
         study = Study.load(name)
         assert name in said and study.name == name and study.runs == 30 and len(study.cells) == 1
-        paper = study.paper[study.cells[0].problem]
+        (paper,) = study.paper[0]["rows"]
+        assert paper["problem"] == study.cells[0].problem
         # Table III.
         published = (5.701e-3, 1.107e-5, 2.588e-2, 1.909e-5, 2456) if "goddard" in name else (7.384e-4, 4.217e-7, 5.179e-3, 5.052e-6, 41113)
         assert tuple(paper[key] for key in ("gd_mean", "gd_variance", "igd_mean", "igd_variance", "seconds")) == published
