@@ -1,6 +1,6 @@
 """Floor 3: the search over several objectives, and the fronts that it finds."""
 
-from .baselines import MOEAD, MOPSOCD, NSGA2, NSGA3
+from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from .evaluation import Evaluation, Evaluator
 from .front import Front
 from .gradient import optimize, payoff, sweep
@@ -12,6 +12,7 @@ from .solver import Solver
 __all__ = [
     "MACS",
     "MOEAD",
+    "MOPSO",
     "MOPSOCD",
     "NSGA2",
     "NSGA3",

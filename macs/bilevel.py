@@ -8,6 +8,7 @@ from problems.peaks import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
 from transcription.scalarized import scalarize
+from transcription.smooth import Smooth
 
 from .evaluation import Counts, Evaluation, Evaluator
 
@@ -24,10 +25,12 @@ class Bilevel(Evaluator):
     inner : InnerSolver
     tolerance : float
         Largest scaled residual of a feasible point.
+    start : Smooth, optional
+        How candidates look that a search begins with. Default: each variable by itself.
     """
 
-    def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float) -> None:
-        self.nlp, self.inner, self.tolerance = nlp, inner, tolerance
+    def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float, start: Smooth | None = None) -> None:
+        self.nlp, self.inner, self.tolerance, self.start = nlp, inner, tolerance, start
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
         self.m_known = len(nlp.problem.goals)
@@ -38,13 +41,23 @@ class Bilevel(Evaluator):
         except ValueError:  # a peak that is maximised, say: the search goes on without derivatives
             self.has_gradients = False
 
+    def opening(self, candidates: np.ndarray) -> np.ndarray:
+        """See `Evaluator.opening`."""
+        return candidates if self.start is None else self.start.shaped(self.nlp, candidates)
+
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """See `NLP.first_guess`."""
         return self.nlp.first_guess(candidates)
 
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
-        evaluation = Evaluation(found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks)
+
+        def itemise() -> np.ndarray:
+            return self.nlp.by_constraint(self.nlp.residuals(found.z)[1] if found.residuals is None else found.residuals)
+
+        evaluation = Evaluation(
+            found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks, itemise=itemise
+        )
         return evaluation, int(np.sum(found.iterations))
 
     def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:

@@ -125,16 +125,15 @@ class BlackBox(Evaluator):
         F = _rows("function: the objectives", F, len(Z))
         self._learn(F.shape[1], f"function returned {F.shape[1]}")
         F = F * np.where([sense == "maximize" for sense in self.senses], -1.0, 1.0)
-        residuals = [np.zeros((len(Z), 1))]
-        if G is not None:
-            residuals.append(_rows("function: the constraints", G, len(Z)))
+        columns = [] if G is None else [_rows("function: the constraints", G, len(Z))]
         if self.constraints is not None:
-            residuals.append(_rows("constraints: what it returned", self.constraints(Z.copy()), len(Z)))
-        violation = np.hstack(residuals).max(axis=1)
+            columns.append(_rows("constraints: what it returned", self.constraints(Z.copy()), len(Z)))
+        violations = np.maximum(np.hstack([np.empty((len(Z), 0)), *columns]), 0.0)
+        violation = violations.max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
         status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
-        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status), 0
+        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, itemise=lambda: violations), 0
 
     def _learn(self, count: int, source: str) -> None:
         """Take the number of objectives from `source`, or find that it contradicts what is known."""

@@ -14,6 +14,7 @@ SOLVERS: dict[str, str] = {
     "nsga2": "macs.baselines.nsga2:NSGA2",
     "nsga3": "macs.baselines.nsga3:NSGA3",
     "moead": "macs.baselines.moead:MOEAD",
+    "mopso": "macs.baselines.mopso:MOPSO",
     "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
 }
 """Where each class is, imported only when it is asked for."""

@@ -36,6 +36,8 @@ class Evaluation:
         Whether a clock ended any of the work: then the same vectors need not give the same batch again.
     fallbacks : int
         How many vectors a faster method left to a slower one.
+    itemise : callable, optional
+        Returns what `violations` are, for those who ask: most do not, and then nothing has been spent on it.
     """
 
     Z: np.ndarray
@@ -44,6 +46,12 @@ class Evaluation:
     status: np.ndarray
     clocked: bool = False
     fallbacks: int = 0
+    itemise: Callable[[], np.ndarray] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def violations(self) -> np.ndarray:
+        """Of each constraint its own largest scaled residual (k, c), at least 0; they are one (k, 1) where nobody tells them apart."""
+        return self.violation[:, None] if self.itemise is None else self.itemise()
 
 
 @dataclass
@@ -95,6 +103,13 @@ class Evaluator(ABC):
     def resume(self, counts: Counts, m: int) -> None:
         """Go on counting where another run of the same had got to, which knew the number of objectives to be m."""
         self.counts = counts
+
+    def opening(self, candidates: np.ndarray) -> np.ndarray:
+        """What a search is to begin with (k, d), from candidates (k, d) that were drawn from the box, each variable by itself.
+
+        The same, unless something is known of how candidates should look.
+        """
+        return candidates
 
     @abstractmethod
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:

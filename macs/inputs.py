@@ -13,11 +13,14 @@ import numpy as np
 from problems.compiled import CompiledProblem, Variable
 from problems.problem import Problem
 from transcription.base import NLP, Transcription
+from transcription.smooth import Smooth
 
 from .front import Front
 from .point import Point
 from .storage import check_target
 
+STARTS = ("uniform", "smooth")
+"""How first candidates are drawn."""
 OTHER = "start: the points are of other variables; a start belongs to one problem"
 
 
@@ -72,14 +75,23 @@ def check_freedom(nlp: NLP) -> None:
         )
 
 
-def beginning(start: Any, nlp: NLP) -> np.ndarray | None:
-    """Full vectors to begin with: what the caller gave, after what the problem's user guessed; None if neither did.
+def drawing(start: Any) -> Smooth | str | None:
+    """How first candidates are to be drawn, if `start` says that and not which they are: a `Smooth`, or "uniform"."""
+    if not isinstance(start, str):
+        return start if isinstance(start, Smooth) else None
+    if start not in STARTS:
+        raise ValueError(f"{unknown('start', start, STARTS)}; or give a Front, Points or an array of decisions")
+    return Smooth() if start == "smooth" else start
+
+
+def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
+    """Full vectors to begin with: what the caller gave, after what the problem's user guessed, if that is wanted; None if there is nothing.
 
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
     meshes are interpolated.
     """
     rows = []
-    if np.isfinite(nlp.guess).any():
+    if guess and np.isfinite(nlp.guess).any():
         middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
         rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
     points = _points(start)

@@ -159,6 +159,7 @@ class Run:
             "tolerance": self.evaluator.tolerance,
             "stopped": stopped,
             "reproducible": stopped in ENDED and not counts.clocked and not (self._checkpoint and self._checkpoint.mixed),
+            **({} if self._state is None else self.solver.tells(self._state, self.evaluator.tolerance)),
             **({"checkpoint": self._checkpoint.failure} if self._checkpoint and self._checkpoint.failure else {}),
         }
 

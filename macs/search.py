@@ -74,7 +74,7 @@ def begin(settings: MACS, evaluator: Evaluator, budget: int, rng: np.random.Gene
     missing = settings.points_to_sample(budget) - (0 if start is None else len(start))
     batches = [] if start is None else [np.asarray(start, dtype=float)]
     if missing > 0:
-        batches.append(evaluator.first_guess(box.to_values(box.sample(missing, rng))))
+        batches.append(evaluator.first_guess(evaluator.opening(box.to_values(box.sample(missing, rng)))))
     Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
     Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
     seen = evaluator.evaluate(Z)

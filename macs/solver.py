@@ -14,12 +14,13 @@ from problems.compiled import CompiledProblem, Objective, Variable
 from problems.problem import Problem
 from transcription.base import Transcription
 from transcription.inner import InnerSolver, inner_solver
+from transcription.smooth import Smooth
 
 from .bilevel import Bilevel
 from .blackbox import BlackBox
 from .evaluation import Evaluator
 from .front import Front
-from .inputs import beginning, check_freedom, check_problem, check_run, decisions
+from .inputs import beginning, check_freedom, check_problem, check_run, decisions, drawing
 from .monitor import Progress
 from .results import black_box_front, trajectory_front
 from .running import ENDED, Run
@@ -53,6 +54,10 @@ class Solver(ABC):
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
         """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
+
+    def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
+        """What the state adds to the `stats` of a front, as plain data. Nothing, for most solvers."""
+        return {}
 
     @property
     def makes_state(self) -> Callable[..., Any]:
@@ -103,8 +108,10 @@ class Solver(ABC):
             "auto", "march", "ipopt", "ipopt-feasibility", or one of your own.
         tolerance : float
             Largest scaled residual of a feasible point.
-        start : Front, Points or array (k, n), optional
-            Decisions to begin with: all variables, or the free ones only.
+        start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
+            Decisions to begin with: all variables, or the free ones only; after the problem's guess, if there is one. Or how candidates are
+            drawn: "uniform", each variable by itself, as all those that are missing otherwise, but without the guess; "smooth", random
+            profiles about the guess, see `transcription.Smooth`.
         time_limit : float, optional
             Seconds after which the search ends with what it has; looked at, like Ctrl-C, before each batch and each solve by IPOPT. A
             safety net: a run that it ends is recorded as not reproducible.
@@ -143,7 +150,8 @@ class Solver(ABC):
         self.check_objectives(len(nlp.problem.goals))
         about = self._about()
         level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        evaluator = Bilevel(nlp, solver, float(tolerance))
+        drawn = drawing(start)
+        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
         run = Run(
             self,
@@ -152,11 +160,12 @@ class Solver(ABC):
             make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level, certified=certified),
             budget=evaluations,
             seed=seed,
-            start=beginning(start, nlp),
+            start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
             what={
                 "solver": about,
                 "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
                 "transcription": transcription.to_dict(),
+                "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
                 **level,
             },
         )

@@ -14,7 +14,7 @@ import problems
 import transcription
 from macs.catalogue import solver_class
 from macs.front import Front
-from macs.inputs import unknown
+from macs.inputs import STARTS, unknown
 from macs.plotting import label, save_picture
 from macs.point import Point
 from macs.solver import Solver
@@ -50,6 +50,7 @@ def solve(arguments: Namespace) -> int:
         scheme = transcription.parse(method) if isinstance(method, str) else method
     solver = make_solver(arguments.solver, arguments.no_refine, choose(arguments.mesh, MESHES, "kind of mesh"))
     choose(arguments.inner, NAMED, "inner level")
+    start = arguments.start and choose(arguments.start, STARTS, "start")
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_picture(arguments.plot)
@@ -62,6 +63,7 @@ def solve(arguments: Namespace) -> int:
             evaluations=arguments.evaluations or problem.default_evaluations,
             seed=arguments.seed,
             inner=arguments.inner,
+            start=start,
             checkpoint=arguments.checkpoint,
             progress=True,
         )

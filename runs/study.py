@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, asdict, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.inputs import check_count, check_positive, unknown
+from macs.inputs import check_count, check_positive, drawing, unknown
+from transcription import Smooth
 from transcription.inner import NAMED
 
 from . import combining, studyfile
@@ -53,6 +54,9 @@ class Study:
         The inner level, by name.
     tolerance : float, default 1e-6
         As for `solve`.
+    start : "uniform", "smooth", Smooth or mapping, optional
+        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: each
+        variable by itself, after the problem's guess.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -77,6 +81,7 @@ class Study:
     reference: Any = None
     inner: str = "auto"
     tolerance: float = 1e-6
+    start: Any = None
     time_limit: float | None = None
     description: str = ""
     paper: Sequence[Mapping[str, Any]] = ()
@@ -169,6 +174,16 @@ class Study:
         Store.open(out).check(self.definition())
         return report(out, foreign=foreign, figures=figures, progress=progress)
 
+    @property
+    def sampling(self) -> Smooth | str | None:
+        """What `solve` gets as its `start`. Raises ValueError if ours makes no sense."""
+        if not isinstance(self.start, Mapping):
+            return drawing(self.start)
+        for key in self.start:
+            if key not in Smooth.__dataclass_fields__:
+                raise ValueError(unknown("setting of start", key, Smooth.__dataclass_fields__))
+        return Smooth(**self.start)
+
     def quick(self) -> Study:
         """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
         budgets = {cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells}
@@ -183,6 +198,7 @@ class Study:
             "runs": int(self.runs),
             "inner": self.inner,
             "tolerance": float(self.tolerance),
+            "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
             "paper": studyfile.plain(self.paper),
@@ -195,6 +211,8 @@ class Study:
         check_positive("tolerance", self.tolerance)
         if self.time_limit is not None:
             check_positive("time_limit", self.time_limit)
+        if self.sampling is None and self.start is not None:
+            raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
         if self.inner not in NAMED:
             raise ValueError(unknown("inner level", self.inner, NAMED))
         check_paper(self.paper)

@@ -25,6 +25,7 @@ KEYS = (
     "reference",
     "inner",
     "tolerance",
+    "start",
     "time_limit",
     "paper",
 )

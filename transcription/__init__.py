@@ -5,6 +5,7 @@ from .catalogue import from_dict, parse
 from .dfet import DFET
 from .inner import InnerResult, InnerSolver
 from .simulate import Simulation
+from .smooth import Smooth
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "PhaseTrajectory",
     "PiecewisePolynomial",
     "Simulation",
+    "Smooth",
     "Trajectory",
     "Transcription",
     "from_dict",

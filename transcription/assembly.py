@@ -14,7 +14,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
-from .base import NLP, Transcription, expanded
+from .base import NLP, Profile, Transcription, expanded
 from .batched import Batched
 from .guess import along
 from .layout import Layout
@@ -71,6 +71,7 @@ class Assembly:
             g_scale=np.concatenate(rows.scale),
             g_labels=tuple(rows.labels),
             guess=self.guess(),
+            profiles=self.profiles(),
             first_guess=self.first_guess,
             reduced=self._reduced(z, rows, largest_peaks),
             tighten=self.tighten,
@@ -96,6 +97,20 @@ class Assembly:
                     found.setdefault(int(slot), float(np.clip(given[0, 0], low, high)))
             found |= writer.guess_controls(*times)
         return np.array([found.get(slot, np.nan) for slot in self.layout.free])
+
+    def profiles(self) -> tuple[Profile, ...]:
+        """See `NLP.profiles`."""
+        column = {slot: i for i, slot in enumerate(self.layout.free)}
+        found = []
+        for i in range(len(self.problem.phases)):
+            writer = self._writers[i]
+            slots, places = writer.control_nodes()
+            for control, own in zip(writer.phase.controls, slots.T, strict=True):
+                free = np.flatnonzero(own >= 0)  # a control whose bounds coincide is no variable
+                if free.size:
+                    columns = np.array([column[int(slot)] for slot in own[free]])
+                    found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
+        return tuple(found)
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """See `NLP.first_guess`."""

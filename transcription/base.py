@@ -46,6 +46,25 @@ def expanded(function: ca.Function) -> ca.Function:
 
 
 @dataclass(frozen=True, eq=False)
+class Profile:
+    """The free variables that are one control of one phase.
+
+    Attributes
+    ----------
+    name : str
+        "phase.control".
+    columns : array (k,) of int
+        Which of the free variables they are, in their order in time.
+    places : array (k,)
+        Where along the phase they lie: 0 at t0, 1 at tf.
+    """
+
+    name: str
+    columns: np.ndarray
+    places: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class NLP:
     """Objectives F(z) and constraints g_lower <= g(z) <= g_upper of a vector z of n variables, in the user's units.
 
@@ -66,6 +85,8 @@ class NLP:
         What the row is, in the user's names. Rows of one thing share one label.
     guess : array (d,)
         What the user guessed of the free variables; NaN where nothing.
+    profiles : tuple of Profile
+        Which of the free variables are the controls, and where in time.
     first_guess : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value.
     reduced : Reduced
@@ -89,6 +110,7 @@ class NLP:
     g_scale: np.ndarray
     g_labels: tuple[str, ...]
     guess: np.ndarray
+    profiles: tuple[Profile, ...]
     first_guess: Callable[[np.ndarray], np.ndarray]
     reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
@@ -127,17 +149,24 @@ class NLP:
 
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
-        F, residuals = self._evaluate(Z)
-        violation = residuals.max(axis=1, initial=0.0)
-        return F, np.where(np.isfinite(violation), violation, np.inf)
+        F, residuals = self.residuals(Z)
+        return F, largest(residuals)
 
     def violations(self, z: np.ndarray) -> dict[str, float]:
         """The largest scaled residual of each constraint of a vector (n,), by its label; bounds are labelled by phase and variable."""
-        _, residuals = self._evaluate(z[None])
-        worst: dict[str, float] = {}
-        for label, residual in zip((*self._bound_labels, *self.g_labels), residuals[0], strict=True):
-            worst[label] = float(np.fmax(worst.get(label, 0.0), residual if np.isfinite(residual) else np.inf))
-        return worst
+        _, residuals = self.residuals(z[None])
+        return dict(zip(self.constraints, self.by_constraint(residuals)[0].tolist(), strict=True))
+
+    def by_constraint(self, residuals: np.ndarray) -> np.ndarray:
+        """Violations (k, c) of each of the `constraints`, at least 0, of what `residuals` returned: infinite where it is no number."""
+        _, order, starts = self._rows_by_label
+        worst = np.maximum.reduceat(residuals[:, order], starts, axis=1)
+        return np.where(np.isnan(worst), np.inf, np.maximum(worst, 0.0))
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Labels (c) of all that can be violated, bounds first: those of `violations`."""
+        return self._rows_by_label[0]
 
     def distance(self, Z: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Euclidean distance (k,) of the free variables of two sets of vectors (k, n), in spans of their bounds, periods taken round."""
@@ -148,8 +177,8 @@ class NLP:
         difference /= self.span[self.free]
         return np.sqrt(np.einsum("kd,kd->k", difference, difference))
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Objectives, and scaled residuals (k, n + r) of bounds and rows of g: negative inside, NaN where they are no numbers."""
+    def residuals(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Objectives (k, m), and scaled residuals (k, n + r) of bounds and rows of g: negative inside, NaN where they are no numbers."""
         (F, g), n = self._batched(Z), Z.shape[1]
         residuals = np.empty((len(Z), n + g.shape[1]))
         # Numbers that overflowed are told by what comes back, not by warnings.
@@ -168,5 +197,16 @@ class NLP:
         return Batched(self.functions)
 
     @cached_property
-    def _bound_labels(self) -> tuple[str, ...]:
-        return tuple(f"bounds of {v.name.split('[')[0]}" for v in self.variables)
+    def _rows_by_label(self) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+        """The labels (c), the residuals in their order (n + r,), and where those of each begin there (c,)."""
+        of_bounds = [f"bounds of {v.name.split('[')[0]}" for v in self.variables]
+        place: dict[str, int] = {}
+        labels = np.array([place.setdefault(label, len(place)) for label in (*of_bounds, *self.g_labels)])
+        order = np.argsort(labels, kind="stable")
+        return tuple(place), order, np.searchsorted(labels[order], np.arange(len(place)))
+
+
+def largest(residuals: np.ndarray) -> np.ndarray:
+    """Violations (k,) of what `NLP.residuals` returned (k, n + r): the largest of each row, at least 0; infinite where it is no number."""
+    violation = residuals.max(axis=1, initial=0.0)
+    return np.where(np.isfinite(violation), violation, np.inf)

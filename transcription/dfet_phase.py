@@ -70,15 +70,10 @@ class DFETPhase(PhaseWriter):
                 self._layout.write(extended, slots, np.clip(values, state.lower, state.upper))
             self._layout.write(extended, self.B[-1:, i], np.clip(extended[:, self.B[-1:, i]], *final))
 
-    def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
-        """See `PhaseWriter.guess_controls`."""
-        share = self.mesh.inside(self.tables.control_nodes)
-        found: dict[int, float] = {}
-        for i, control in enumerate(self.phase.controls):
-            if control.name in self.phase.guesses:
-                values = along(self.phase.guesses[control.name], np.array([t0]), np.array([tf]), share)[0]
-                found.update(zip(self.U[:, :, i].ravel().tolist(), np.clip(values, control.lower, control.upper).ravel(), strict=True))
-        return found
+    def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `PhaseWriter.control_nodes`."""
+        share = self.mesh.inside(self.tables.control_nodes).ravel()
+        return self.U.reshape(len(share), len(self.phase.controls)), share
 
     def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.march`."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
+from .guess import along
 from .trajectory import PhaseTrajectory
 
 
@@ -85,8 +86,18 @@ class PhaseWriter(ABC):
         """Fill in the states of extended vectors (k, ...), whose times, parameters, controls and initial states are set."""
 
     @abstractmethod
+    def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slots (k, nu) of the coefficients of the controls, in their order in time, and where they lie (k,): 0 at t0, 1 at tf."""
+
     def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
         """The user's guess of the controls, where there is one, by slot."""
+        slots, share = self.control_nodes()
+        found: dict[int, float] = {}
+        for control, places in zip(self.phase.controls, slots.T, strict=True):
+            if control.name in self.phase.guesses:
+                values = along(self.phase.guesses[control.name], np.array([t0]), np.array([tf]), share)[0]
+                found.update(zip(places.tolist(), np.clip(values, control.lower, control.upper), strict=True))
+        return found
 
     @abstractmethod
     def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:

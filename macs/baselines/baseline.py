@@ -9,45 +9,17 @@ from __future__ import annotations
 import warnings
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..archive import Archive, least_violated
 from ..evaluation import Evaluator
-from ..inputs import check_count
 from ..search import box_of
-from ..solver import Solver
-from . import handling as handlings
-from .members import Members, evaluate, full_vectors, shown
+from .members import Members, evaluate, full_vectors
+from .population import PopulationSolver, State, distinct, no_points, thinned
 
 
-@dataclass
-class State:
-    """What every baseline knows between two iterations; each adds what is its own.
-
-    Attributes
-    ----------
-    members : Members
-        The population.
-    archive : Archive
-        What the algorithm would return now: see `Baseline`.
-    closest : Archive
-        The least violated point seen, one row, as long as the archive is empty; no row afterwards.
-    iteration : int
-        Generations done.
-    rng : numpy.random.Generator
-    """
-
-    members: Members
-    archive: Archive
-    closest: Archive
-    iteration: int
-    rng: np.random.Generator
-
-
-class Baseline(Solver):
+class Baseline(PopulationSolver):
     """A solver that drives an algorithm of pymoo's.
 
     On an unconstrained problem, the same seed and as many evaluations as are a whole number of generations, its points are those of
@@ -62,11 +34,9 @@ class Baseline(Solver):
     - `start` takes the first places of the population: of too many, evenly spaced ones.
     - Periodic variables are plain intervals to it.
 
-    An implementation is a frozen dataclass of settings, with `handling` and `penalty` among them, and the hooks below.
+    An implementation is a frozen dataclass of settings, with those of a `PopulationSolver` among them, and the hooks below.
     """
 
-    handling: str
-    penalty: float
     _knows_constraints = True
 
     # The hooks
@@ -95,20 +65,12 @@ class Baseline(Solver):
         """All points of the state that have to become individuals, the population first."""
         return state.members
 
-    def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
-        """`count` candidates (count, d), drawn as pymoo draws them."""
-        return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))
-
     def _place(self, members: Members, evaluator: Evaluator) -> Members:
         """The first population, of which some were given, each in a place that suits it."""
         return members
 
     def _cut(self, algorithm: Any, count: int) -> None:
         """Prepare the algorithm for being told of only the first `count` of those that it has asked for."""
-
-    def _told(self, points: Members, tolerance: float) -> handlings.Told:
-        """What the algorithm is told of points."""
-        return handlings.told(self.handling, self.penalty, points.F, points.violation, tolerance)
 
     # The contract
 
@@ -121,29 +83,28 @@ class Baseline(Solver):
         """Evaluate a first population; see `Solver.begin`."""
         if budget <= evaluator.counts.evaluations:
             raise ValueError(f"evaluations: the budget of {budget} leaves none")
-        given = np.empty((0, 0)) if start is None else start[np.sort(np.unique(start, axis=0, return_index=True)[1])]
+        given = distinct(start)
         m, members = evaluator.m_known, None
         if m is not None:
             self.check_objectives(m)
         size = self._size(m)
         if size is None:  # one point tells how many objectives there are
-            members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng))
+            members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng), self.degree)
             self.check_objectives(members.F.shape[1])
             size = self._size(members.F.shape[1])
         assert size is not None
         done = 0 if members is None else 1
-        if len(given) > size:
-            given = given[np.linspace(0, len(given) - 1, size).round().astype(int)]
+        given = thinned(given, size)
         Z = self._candidates(evaluator, given[done:], size - done, rng)[: budget - evaluator.counts.evaluations]
         if len(Z):
-            members = evaluate(evaluator, Z) if members is None else members.join(evaluate(evaluator, Z))
+            first = evaluate(evaluator, Z, self.degree)
+            members = first if members is None else members.join(first)
         assert members is not None
         self.check_objectives(members.F.shape[1])
         if len(given):
             members = self._place(members, evaluator)
-        nobody = members.take(np.arange(0))
-        none = Archive(nobody.Z, nobody.F, nobody.violation)
-        common = {"members": members, "archive": none, "closest": none, "iteration": 0, "rng": rng}
+        none = no_points(members)
+        common = {"members": members, "archive": none, "closest": none, "iteration": 0, "first_feasible": 0, "all_feasible": 0, "rng": rng}
         state = self._first(members, common, evaluator)
         algorithm, table = self._set_up(evaluator, members.F.shape[1], rng), self._table(state)
         people = self._people(table, evaluator)
@@ -151,6 +112,7 @@ class Baseline(Solver):
         with warnings.catch_warnings():  # pymoo changes the filters
             algorithm.tell(infills=people[: len(members)])
         self._remember(algorithm, state, table, members, evaluator)
+        state.note(evaluator.tolerance)
         return state
 
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
@@ -171,7 +133,7 @@ class Baseline(Solver):
             if len(offspring) == left:
                 self._cut(algorithm, left)
             X = np.array([one.X for one in offspring])
-            bred = evaluate(evaluator, full_vectors(evaluator, state.members, X))
+            bred = evaluate(evaluator, full_vectors(evaluator, state.members, X), self.degree)
             left = budget - evaluator.counts.evaluations
             self._tell(offspring, bred, len(table), evaluator)
             table = table.join(bred)
@@ -179,16 +141,9 @@ class Baseline(Solver):
                 algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
         state.iteration += 1
+        state.note(evaluator.tolerance)
 
     # Between the two
-
-    def _candidates(self, evaluator: Evaluator, given: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Full vectors (count, D): the given ones, and drawn ones in the places that are left."""
-        Z = evaluator.first_guess(self._draw(evaluator, count, rng))
-        if len(given):
-            Z[: len(given)] = given
-        Z[:, evaluator.free] = box_of(evaluator).confine(Z[:, evaluator.free])
-        return Z
 
     def _set_up(self, evaluator: Evaluator, m: int, rng: np.random.Generator) -> Any:
         """The algorithm, ready for use on the evaluator's variables and for m objectives; it draws from `rng` from now on."""
@@ -225,28 +180,7 @@ class Baseline(Solver):
         """Read the algorithm back into the state."""
         state.members = table.take(rows_of(algorithm.pop))
         self._keep(algorithm, state, table)
-        found = shown(evaluator.tolerance, table.take(rows_of(algorithm.opt)), state.members)
-        if found is None and not len(state.archive):
-            found = shown(evaluator.tolerance, seen)
-        if found is not None:
-            state.archive, state.closest = found, state.closest.take(np.arange(0))
-        elif not len(state.archive):
-            state.closest = least_violated(state.closest, seen.Z, seen.F, seen.violation)
-
-    def _check(self, counts: dict[str, int], ranges: dict[str, tuple[float, float]]) -> None:
-        """Raise ValueError for settings that make no sense: `counts` gives the least of each, `ranges` the closed interval."""
-        name = type(self).__name__
-        for setting, least in counts.items():
-            if getattr(self, setting) is not None or getattr(type(self), setting) is not None:  # None only where that is the default
-                check_count(f"{name}: {setting}", getattr(self, setting), least)
-        for setting, (low, high) in {**ranges, "penalty": (0.0, np.inf)}.items():
-            value = getattr(self, setting)
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value <= high or np.isinf(value):
-                wanted = f"in [{low:g}, {high:g}]" if np.isfinite(high) else f"a number of at least {low:g}"
-                raise ValueError(f"{name}: {setting} must be {wanted}, not {value!r}")
-        if self.handling not in handlings.HANDLINGS:
-            known = ", ".join(f"'{handling}'" for handling in handlings.HANDLINGS)
-            raise ValueError(f"{name}: handling must be one of {known}, not {self.handling!r}")
+        state.show(evaluator.tolerance, seen, table.take(rows_of(algorithm.opt)), state.members)
 
 
 def rows_of(people: Any) -> np.ndarray:

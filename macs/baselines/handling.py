@@ -15,14 +15,28 @@ Told = tuple[np.ndarray, np.ndarray]
 """Objectives (n, m) that are numbers, and violations (n,): 0 where a point counts as feasible, infinite where the evaluation failed."""
 
 
-def excess(F: np.ndarray, violation: np.ndarray, tolerance: float) -> np.ndarray:
-    """The violation (n,) that counts: none up to the tolerance, infinite where the evaluation failed."""
+def excess(F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.ndarray | None = None) -> np.ndarray:
+    """The degree of violation (n,), by default the violation itself, that counts: none where this is within the tolerance, infinite where
+    the evaluation failed."""
     failed = ~np.isfinite(F).all(axis=1) | ~np.isfinite(violation)
-    return np.where(failed, np.inf, np.where(violation <= tolerance, 0.0, violation))
+    return np.where(failed, np.inf, np.where(violation <= tolerance, 0.0, violation if degree is None else degree))
+
+
+def problem_type(cv: np.ndarray) -> float:
+    """What Algorithm 1 of Chai and others (2020) distinguishes: 0 if no point is feasible, 1 if all are, 0.5 otherwise.
+
+    There it saves work, and decides nothing: where no point is feasible, ranks by constrained dominance are those by violation. `cv` is as
+    from `excess`.
+    """
+    feasible = cv == 0.0
+    return 1.0 if feasible.all() else 0.5 if feasible.any() else 0.0
 
 
 def feasible_first(F: np.ndarray, cv: np.ndarray) -> Told:
     """Superiority of feasible solutions (Deb 2000): objectives decide among the feasible, the violation among the others.
+
+    That is Definition 1 of Chai and others (2020), but for its third line: among feasible points it is Pareto dominance that counts, not
+    that every single objective is better.
 
     Parameters
     ----------
@@ -45,9 +59,9 @@ def objective(F: np.ndarray, cv: np.ndarray) -> Told:
     return _numbers(np.hstack([F, cv[:, None]]), cv), np.where(np.isfinite(cv), 0.0, cv)
 
 
-def told(handling: str, factor: float, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Told:
-    """What an algorithm is told of points with these objectives and violations."""
-    cv = excess(F, violation, tolerance)
+def told(handling: str, factor: float, F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.ndarray | None = None) -> Told:
+    """What an algorithm is told of points with these objectives and violations, and degrees of violation if they are others."""
+    cv = excess(F, violation, tolerance, degree)
     if handling == "penalty":
         return penalty(F, cv, factor)
     return objective(F, cv) if handling == "objective" else feasible_first(F, cv)

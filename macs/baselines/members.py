@@ -10,6 +10,7 @@ from ..archive import Archive
 from ..dominance import nondominated
 from ..evaluation import Evaluator
 from ..search import box_of
+from . import degrees
 
 
 @dataclass(frozen=True)
@@ -24,32 +25,39 @@ class Members:
         Objectives, all minimised; NaN where the evaluation failed.
     violation : array (n,)
         Infinite where the evaluation failed.
+    degree : array (n,)
+        The number that infeasible points are ranked by; see `degrees`.
     """
 
     Z: np.ndarray
     F: np.ndarray
     violation: np.ndarray
+    degree: np.ndarray
 
     def __len__(self) -> int:
         return len(self.F)
 
     def take(self, rows: np.ndarray) -> Members:
         """The points of `rows` (indices or mask)."""
-        return Members(self.Z[rows], self.F[rows], self.violation[rows])
+        return Members(*(values[rows] for values in self._fields))
 
     def join(self, others: Members) -> Members:
         """These, then the others."""
         return Members(*(np.concatenate(pair) for pair in zip(self._fields, others._fields, strict=True)))
 
     @property
-    def _fields(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.Z, self.F, self.violation
+    def _fields(self) -> tuple[np.ndarray, ...]:
+        return self.Z, self.F, self.violation, self.degree
 
 
-def evaluate(evaluator: Evaluator, Z: np.ndarray) -> Members:
-    """Evaluate full vectors (k, D). A point is where the evaluator moved it; a failure that brought nothing back, where it was sent."""
+def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:
+    """Evaluate full vectors (k, D), with the degree of violation named `by`.
+
+    A point is where the evaluator moved it; a failure that brought nothing back, where it was sent.
+    """
     seen = evaluator.evaluate(Z)
-    return Members(np.where(np.isfinite(seen.Z), seen.Z, Z), seen.F, seen.violation)
+    degree = degrees.degree(by, seen.violation, lambda: seen.violations, evaluator.tolerance)
+    return Members(np.where(np.isfinite(seen.Z), seen.Z, Z), seen.F, seen.violation, degree)
 
 
 def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.ndarray:

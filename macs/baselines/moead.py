@@ -11,8 +11,9 @@ from ..directions import tchebycheff
 from ..evaluation import Evaluator
 from ..social import pair_up
 from . import handling as handlings
-from .baseline import Baseline, State
+from .baseline import Baseline
 from .members import Members
+from .population import State
 from .reference import check_directions, population_size, reference_directions
 
 
@@ -54,7 +55,7 @@ class MOEAD(Baseline):
         Evaluate the offspring of a whole generation in one batch, and let them replace others afterwards (pymoo's ParallelMOEAD).
     crossover_eta, mutation_eta : float, default 20
         Distribution indices of simulated binary crossover and of polynomial mutation, in [1, 100].
-    handling, penalty
+    handling, penalty, degree
         As for `NSGA2`. With "objective", directions are of one more objective.
 
     Raises
@@ -73,6 +74,7 @@ class MOEAD(Baseline):
     mutation_eta: float = 20.0
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    degree: str = "largest"
     _knows_constraints = False
 
     def __post_init__(self) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..evaluation import Evaluator
 from . import handling as handlings
-from .baseline import Baseline, State, rows_of
+from .baseline import Baseline, rows_of
 from .members import Members
+from .population import State
 
 
 @dataclass
@@ -55,7 +56,7 @@ class MOPSOCD(Baseline):
         Weights of a particle's velocity, of the step to its own best point and of that to its leader; at least 0.
     max_velocity : float, default 0.5
         Largest step in a variable, in spans of it, in (0, 1].
-    handling, penalty
+    handling, penalty, degree
         As for `NSGA2`.
 
     Raises
@@ -72,6 +73,7 @@ class MOPSOCD(Baseline):
     max_velocity: float = 0.5
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    degree: str = "largest"
     _knows_constraints = False
 
     def __post_init__(self) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..evaluation import Evaluator
-from .baseline import Baseline, State
+from .baseline import Baseline
 from .members import Members
+from .population import State
 
 UNRANKED = -1
 
@@ -48,6 +49,9 @@ class NSGA2(Baseline):
         objective; or the violation is one more objective.
     penalty : float, default 1000
         For handling="penalty": in units of the objectives.
+    degree : {"largest", "sum", "log", "printed"}, default "largest"
+        What counts as the violation of an infeasible point: its largest one, the sum of those of all constraints or of their logarithms, or
+        the sum of all, none of which counts as more than 1; see `degrees`. Feasible is what violates nothing, whatever the degree.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class NSGA2(Baseline):
     mutation_eta: float = 20.0
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    degree: str = "largest"
 
     def __post_init__(self) -> None:
         self._check({"population": 2}, {"crossover": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..evaluation import Evaluator
-from .baseline import Baseline, State
+from .baseline import Baseline
 from .members import Members
+from .population import State
 from .reference import check_directions, population_size, reference_directions
 
 
@@ -49,7 +50,7 @@ class NSGA3(Baseline):
         Probability of simulated binary crossover.
     crossover_eta, mutation_eta : float, default 30 and 20
         Distribution indices of crossover and of polynomial mutation, in [1, 100]: the higher, the nearer are children to their parents.
-    handling, penalty
+    handling, penalty, degree
         As for `NSGA2`. With "objective", directions are of one more objective.
 
     Raises
@@ -65,6 +66,7 @@ class NSGA3(Baseline):
     mutation_eta: float = 20.0
     handling: str = "feasible-first"
     penalty: float = 1000.0
+    degree: str = "largest"
 
     def __post_init__(self) -> None:
         counts = {"population": 2, "divisions": 1}

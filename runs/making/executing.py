@@ -99,6 +99,7 @@ def _task(study: Study, store: Store, run: Run) -> Task:
         inner=study.inner,
         tolerance=float(study.tolerance),
         time_limit=study.time_limit,
+        start=study.sampling,
         checkpoint=store.checkpoint_path(run.cell, run.number),
     )
 

@@ -18,6 +18,7 @@ from .samples import Report, Samples
 if TYPE_CHECKING:
     from macs.front import Front
     from macs.solver import Solver
+    from transcription import Smooth
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +41,7 @@ class Task:
     inner: str
     tolerance: float
     time_limit: float | None
+    start: Smooth | str | None = None
     checkpoint: Path | None = None
 
 
@@ -110,6 +112,7 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
                 seed=task.seed,
                 inner=task.inner,
                 tolerance=task.tolerance,
+                start=task.start,
                 callback=samples.note,
                 checkpoint=kept,
             )

@@ -15,7 +15,7 @@ from ascent import Ascent
 from fronts import distance_to_curve
 from plain import dtlz
 
-from macs import MOEAD, MOPSOCD, NSGA2, NSGA3
+from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from macs.baselines.reference import reference_directions
 from macs.blackbox import BlackBox
 from macs.dominance import nondominated
@@ -30,6 +30,7 @@ SMALL = [
     MOEAD(divisions=11, neighbors=5),
     MOEAD(divisions=11, batch=True),
     MOPSOCD(particles=12),
+    MOPSO(particles=12),
 ]
 HANDLED = [type(s)(**{**s.__dict__, "handling": h}) for s in SMALL for h in ("feasible-first", "penalty", "objective")]
 
@@ -156,7 +157,7 @@ def test_any_number_of_directions_spreads_over_the_simplex(m: int, count: int) -
 
 
 def test_importing_the_package_imports_no_pymoo() -> None:
-    code = "import sys; from macs import NSGA2, NSGA3, MOEAD, MOPSOCD; NSGA3(divisions=4); sys.exit('pymoo' in sys.modules)"
+    code = "import sys; from macs import MOPSO, NSGA2, NSGA3, MOEAD, MOPSOCD; NSGA3(divisions=4); sys.exit('pymoo' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -211,7 +212,9 @@ def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12)], ids=named
+    "settings",
+    [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12), MOPSO(particles=20)],
+    ids=named,
 )
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(settings: Any) -> None:
     def go(seed: int) -> Any:
@@ -376,6 +379,13 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: MOEAD(batch=2), "MOEAD: batch"),  # type: ignore[arg-type]
         (lambda: MOPSOCD(particles=2.5), "MOPSOCD: particles"),  # type: ignore[arg-type]
         (lambda: MOPSOCD(max_velocity=0.0), "MOPSOCD: max_velocity"),
+        (lambda: NSGA2(degree="mean"), "NSGA2: degree must be one of 'largest', 'sum', 'log', 'printed', not 'mean'"),
+        (lambda: MOPSO(particles=0), "MOPSO: particles must be a whole number of at least 1, not 0"),
+        (lambda: MOPSO(archive=0), "MOPSO: archive must be a whole number of at least 1"),
+        (lambda: MOPSO(cells=2.5), "MOPSO: cells must be a whole number of at least 1, not 2.5"),  # type: ignore[arg-type]
+        (lambda: MOPSO(search=1.5), r"MOPSO: search must be in \[0, 1\], not 1.5"),
+        (lambda: MOPSO(final_inertia=-1), "MOPSO: final_inertia must be a number of at least 0"),
+        (lambda: MOPSO(handling="death"), "MOPSO: handling must be one of"),
     ],
 )
 def test_settings_that_make_no_sense(make: Any, message: str) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from macs import MACS, MOEAD, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, refinement
+from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, refinement
 from macs.solver import Solver
 from problems import load
 from transcription import DFET
@@ -92,7 +92,14 @@ def test_a_black_box_goes_on_to_the_same_bits(file, iterations) -> None:
     assert rest.stats["wall_time"] > part.stats["wall_time"]
 
 
-BASELINES = [NSGA2(population=12), NSGA3(divisions=11), MOEAD(divisions=11), MOEAD(divisions=11, batch=True), MOPSOCD(particles=12)]
+BASELINES = [
+    NSGA2(population=12),
+    NSGA3(divisions=11),
+    MOEAD(divisions=11),
+    MOEAD(divisions=11, batch=True),
+    MOPSOCD(particles=12),
+    MOPSO(particles=12),
+]
 
 
 @pytest.mark.parametrize("solver", BASELINES, ids=str)
@@ -109,7 +116,7 @@ def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
         file.unlink()
 
 
-@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6)], ids=str)
+@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6), MOPSO(particles=6)], ids=str)
 def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
     solve(solver, 30, checkpoint=file, callback=after(1))
     assert_same(solve(solver, 30, checkpoint=file), solve(solver, 30))
@@ -251,7 +258,7 @@ def test_a_start_goes_on_too(file) -> None:
 SCRIPT = """
 import sys, time
 import numpy as np
-from macs import MACS, checkpoint
+from macs import MACS, MOPSO, checkpoint
 
 checkpoint.SECONDS = checkpoint.SHARE = 0.0
 
@@ -262,13 +269,14 @@ def function(X):
     g = 1 + X[:, 1:].sum(axis=1)
     return np.stack([X[:, 0], g * (1 - np.sqrt(X[:, 0] / g))], axis=1)
 
-front = MACS(agents=4, archive=6).minimize(function, [(0.0, 1.0)] * 5, evaluations=400, checkpoint="run.ckpt", seed=1)
+front = SOLVER.minimize(function, [(0.0, 1.0)] * 5, evaluations=400, checkpoint="run.ckpt", seed=1)
 front.save("front.nc")
 """
 
 
-def test_kill_9(tmp_path) -> None:
-    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+@pytest.mark.parametrize("solver", [SMALL, MOPSO(particles=10)], ids=["MACS", "MOPSO"])
+def test_kill_9(tmp_path, solver) -> None:
+    (tmp_path / "script.py").write_text(SCRIPT.replace("SOLVER", repr(solver)), encoding="utf-8")
     log = tmp_path / "log"
     call = [sys.executable, "script.py"]
     run = subprocess.Popen(call, cwd=tmp_path)
@@ -283,7 +291,7 @@ def test_kill_9(tmp_path) -> None:
     subprocess.run(call, cwd=tmp_path, check=True, timeout=60)
     again = log.stat().st_size - done
     assert 400 - done <= again < 400 - done + 120 < 400  # what one or two iterations had evaluated since the last write
-    assert_same(Front.load(tmp_path / "front.nc"), uninterrupted())
+    assert_same(Front.load(tmp_path / "front.nc"), minimize(solver))
     assert {path.name for path in tmp_path.iterdir() if ".part" not in path.name} == {"script.py", "log", "run.ckpt", "front.nc"}
 
 

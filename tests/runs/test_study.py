@@ -352,6 +352,10 @@ def test_ctrl_c_stops_promptly_and_keeps_what_is_finished(tmp_path):
         ({"inner": "autos"}, "unknown inner level 'autos', did you mean auto?"),
         ({"tolerance": 0}, "tolerance must be a positive number"),
         ({"time_limit": "long"}, "time_limit must be a positive number"),
+        ({"start": "smoth"}, "unknown start 'smoth', did you mean smooth?"),
+        ({"start": {"spred": 0.1}}, "unknown setting of start 'spred', did you mean spread?"),
+        ({"start": {"spread": 2}}, "Smooth: spread must be in (0, 1], not 2"),
+        ({"start": [1.0]}, "start must be 'uniform', 'smooth', or a table"),
     ],
 )
 def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, words):
@@ -369,6 +373,7 @@ def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, w
         ({"solvers": {"other": Plain()}}, "plain' is there but not here"),
         ({"problems": {"glide": glide(speed=2.0)}}, "fingerprint"),
         ({"tolerance": 1e-5}, "tolerance"),
+        ({"start": "smooth"}, "start is null there"),
     ],
 )
 def test_another_study_in_the_same_folder_is_refused(made, changes, words):
@@ -376,6 +381,16 @@ def test_another_study_in_the_same_folder_is_refused(made, changes, words):
     with pytest.raises(ValueError, match="holds another study") as refused:
         study(**changes).run(made[0])
     assert words in str(refused.value) and stamps(made[0]) == before
+
+
+def test_runs_begin_as_the_study_says(tmp_path):
+    def made(start) -> list[list[float]]:
+        given = {"solvers": {"nsga2": {"solver": "nsga2", "population": 6, "degree": "sum"}}, "evaluations": 12, "runs": 1}
+        one = study(start=start, **given).run(tmp_path / str(start), executor=Inline())
+        assert one.runs[0].front.stats["population"]["generations"] == 2
+        return one.runs[0].front.F.tolist()
+
+    assert made("uniform") == made(None) != made("smooth") == made({"spread": 0.2})  # without a guess, uniform is the default
 
 
 def test_wrong_calls_of_run(tmp_path):

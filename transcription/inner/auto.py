@@ -25,7 +25,7 @@ class Auto(InnerSolver):
             return found
         start = started(nlp, candidates, warm)
         repaired = Ipopt().solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
-        parts = {name: getattr(found, name).copy() for name in ("z", "F", "violation", "status", "moved")}
+        parts = {name: getattr(found, name).copy() for name in ("z", "F", "violation", "status", "moved", "residuals")}
         for name, values in parts.items():
             values[rest] = getattr(repaired, name)
         parts["iterations"] = found.iterations.copy()

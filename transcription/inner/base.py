@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import NLP
+from ..base import NLP, largest
 from ..programs import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "started"]
@@ -35,6 +35,8 @@ class InnerResult:
         Whether a clock ended any of the work, whatever came of it: then the same candidates need not give the same result again.
     fallbacks : int
         How many candidates a faster method left to a slower one.
+    residuals : array (k, n + r), optional
+        What `NLP.residuals` returns there, for those who want to know each constraint's own. Without it, they have it computed from z.
     """
 
     z: np.ndarray
@@ -45,6 +47,7 @@ class InnerResult:
     iterations: np.ndarray
     clocked: bool = False
     fallbacks: int = 0
+    residuals: np.ndarray | None = None
 
 
 class InnerSolver(ABC):
@@ -81,7 +84,8 @@ def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.nda
 
 def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
     """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
-    F, violation = nlp.evaluate(Z)
+    F, residuals = nlp.residuals(Z)
+    violation = largest(residuals)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
     status = np.where(violation <= tolerance, CONVERGED, said)
     moved = nlp.distance(Z, start)
@@ -89,4 +93,7 @@ def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterati
         broken = ~finite
         Z = np.where(finite[:, None], Z, start)
         F[broken], violation[broken], moved[broken], status[broken] = np.nan, np.inf, 0.0, FAILED
-    return InnerResult(z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=TIMEOUT in said)
+    clocked = TIMEOUT in said
+    return InnerResult(
+        z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=clocked, residuals=residuals
+    )

@@ -1,0 +1,199 @@
+"""MOPSO: a swarm led by points of thinly populated hypercubes of an archive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..dominance import nondominated
+from ..evaluation import Evaluator
+from ..search import box_of
+from . import handling as handlings
+from .grid import hypercubes, roulette, thin_out
+from .members import Members, evaluate, full_vectors
+from .particles import flown, improved, inertia, velocities
+from .population import PopulationSolver, State, distinct, no_points, thinned
+
+WAITING = -1
+
+
+@dataclass
+class FlightState(State):
+    """The members are the particles, in their order.
+
+    Attributes
+    ----------
+    best : Members
+        The best point that each particle has been at.
+    leaders : Members
+        What the swarm may follow: the algorithm's own archive.
+    velocity : array (n, d)
+        In spans of the variables.
+    launched : int
+        After how many evaluations the swarm was complete and began to fly; -1 as long as first particles are sought.
+    """
+
+    best: Members
+    leaders: Members
+    velocity: np.ndarray
+    launched: int
+
+
+@dataclass(frozen=True)
+class MOPSO(PopulationSolver):
+    """MOPSO after Coello Coello, Pulido and Lechuga (2004), in the variant of Armellin and Lavagna (2008), section 4.1.
+
+    Each particle is drawn to the best place where it has been and to a point of the archive, which a roulette prefers from thinly populated
+    hypercubes of an adaptive grid; of a full archive, points of the fullest hypercubes are left out. Inertia decreases linearly. Their
+    velocity formula, eq. (22), has a slip of sign, which is mended here; see `particles`. For any number of objectives.
+
+    Feasible solutions are preserved (with handling="feasible-first"): the swarm begins with feasible particles only, for which candidates
+    are drawn, a swarm at a time, until there are enough. Each of these counts as an evaluation, and no more than `search` of the budget
+    is spent on it: then the least violated ones fly too, towards less violation, until they are feasible. A feasible place is never given
+    up for an infeasible one. If nothing feasible is found at all, the front is empty; its `message` and `closest` say what is nearest.
+
+    Beyond that, as for the other baselines: a failed evaluation counts as infeasible, behind all others; where the evaluator moves
+    candidates, particles take the points that come back; of a last flight for which the budget is too small, the first particles fly;
+    `start` takes the first places of the swarm. Periodic variables are closed: particles fly through their bounds, and the short way round.
+
+    Parameters
+    ----------
+    particles : int, default 100
+        At least 1.
+    archive : int, default 100
+        Largest number of points in the archive, and so on the front.
+    cells : int, default 30
+        Into how many parts the grid divides each objective.
+    inertia, final_inertia : float, default 0.4 and 0
+        Weight of a particle's velocity, when the swarm begins to fly and when the budget is spent; at least 0. With the paper's 1.4 and
+        0.4, see `paper`, a swarm of many variables flies from bound to bound for most of its time.
+    cognitive, social : float, default 2
+        Weights of the step to a particle's own best place and of that to its leader, each times a random number; at least 0.
+    max_velocity : float, default 1
+        Largest step in a variable, in spans of it, in (0, 1].
+    search : float, default 0.2
+        Share of the budget, in [0, 1], that may be spent in search of feasible first particles, the first swarm included. 0: that one is
+        taken as it is drawn.
+    handling, penalty, degree
+        As for `NSGA2`. With "penalty" and "objective", the first swarm is taken as it is drawn.
+
+    Raises
+    ------
+    ValueError
+        Where a setting is out of its range; the message names it.
+    """
+
+    particles: int = 100
+    archive: int = 100
+    cells: int = 30
+    inertia: float = 0.4
+    final_inertia: float = 0.0
+    cognitive: float = 2.0
+    social: float = 2.0
+    max_velocity: float = 1.0
+    search: float = 0.2
+    handling: str = "feasible-first"
+    penalty: float = 1000.0
+    degree: str = "largest"
+
+    def __post_init__(self) -> None:
+        weights = dict.fromkeys(("inertia", "final_inertia", "cognitive", "social"), (0.0, np.inf))
+        counts = {"particles": 1, "archive": 1, "cells": 1}
+        self._check(counts, {**weights, "max_velocity": (1e-9, 1), "search": (0, 1)})
+
+    @classmethod
+    def paper(cls, **overrides: Any) -> MOPSO:
+        """The settings of Armellin and Lavagna: 20 particles, an archive of 100, inertia from 1.4 to 0.4; `overrides` as for MOPSO itself.
+
+        What stays different: it spends its budget, where theirs also ends when the mean of the front stands still; and theirs knows no
+        limit of the search for feasible first particles, nor of velocities.
+        """
+        return cls(**({"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4} | overrides))
+
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> FlightState:
+        """Evaluate a first swarm; see `Solver.begin`."""
+        if budget <= evaluator.counts.evaluations:
+            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        Z = self._candidates(evaluator, thinned(distinct(start), self.particles), self.particles, rng)
+        swarm = evaluate(evaluator, Z[: budget - evaluator.counts.evaluations], self.degree)
+        state = FlightState(
+            members=swarm,
+            archive=no_points(swarm),
+            closest=no_points(swarm),
+            iteration=0,
+            first_feasible=0,
+            all_feasible=0,
+            rng=rng,
+            best=swarm,
+            leaders=swarm.take(np.arange(0)),
+            velocity=np.zeros((len(swarm), len(evaluator.free))),
+            launched=WAITING,
+        )
+        self._learn(state, swarm, evaluator, budget)
+        return state
+
+    def advance(self, state: FlightState, evaluator: Evaluator, budget: int) -> None:
+        """One flight, or one more draw of first particles, within the budget of evaluations; changes `state`."""
+        left = budget - evaluator.counts.evaluations
+        if left <= 0:
+            return
+        if state.launched == WAITING:
+            seen = self._drawn(state, evaluator, min(left, int(self.search * budget) - evaluator.counts.evaluations))
+        else:
+            seen = self._flown(state, evaluator, left, budget)
+        state.iteration += 1
+        self._learn(state, seen, evaluator, budget)
+
+    def _drawn(self, state: FlightState, evaluator: Evaluator, most: int) -> Members:
+        """Draw more first particles, at most `most`: the first that are feasible stay, and the least violated of the others."""
+        count = len(state.members)
+        seen = evaluate(evaluator, self._candidates(evaluator, np.empty((0, 0)), count, state.rng)[:most], self.degree)
+        every = state.members.join(seen)
+        cv = handlings.excess(every.F, every.violation, evaluator.tolerance, every.degree)
+        state.members = state.best = every.take(np.argsort(cv, kind="stable")[:count])
+        return seen
+
+    def _flown(self, state: FlightState, evaluator: Evaluator, left: int, budget: int) -> Members:
+        """Let the particles fly once, the first `left` of them if they are more."""
+        box, rng, tolerance, free = box_of(evaluator), state.rng, evaluator.tolerance, evaluator.free
+        swarm, d = len(state.members), len(free)
+        share = (evaluator.counts.evaluations - state.launched) / (budget - state.launched)
+        followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), swarm, rng)
+        chance, rebound, coin = rng.random((2, swarm, d)), -rng.random((swarm, d)), rng.random(swarm) < 0.5
+
+        X, best, leaders = (box.to_unit(some.Z[:, free]) for some in (state.members, state.best, state.leaders.take(followed)))
+        weights = inertia(share, self.inertia, self.final_inertia), self.cognitive, self.social
+        V = velocities(box, X, state.velocity, best, leaders, weights=weights, chance=chance, largest=self.max_velocity)
+        X, V = flown(box, X, V, rebound)
+
+        seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
+        n = len(seen)
+        state.members = seen.join(state.members.take(np.arange(n, swarm)))
+        state.velocity = np.concatenate([V[:n], state.velocity[n:]])
+        better = improved(self._goals(seen, tolerance), self._goals(state.best, tolerance)[:n], coin[:n])
+        rows = np.arange(swarm)
+        rows[np.flatnonzero(better)] += swarm
+        state.best = state.best.join(seen).take(rows)
+        return seen
+
+    def _learn(self, state: FlightState, seen: Members, evaluator: Evaluator, budget: int) -> None:
+        """Offer what was seen to the archive; let the swarm fly from now on if it is complete."""
+        tolerance = evaluator.tolerance
+        every = state.leaders.join(seen)
+        goals = self._goals(every, tolerance)
+        rows = np.flatnonzero(nondominated(goals))
+        if len(rows) > self.archive:
+            rows = rows[thin_out(hypercubes(goals[rows], self.cells), self.archive, state.rng)]
+        state.leaders = every.take(rows)
+        state.show(tolerance, seen, state.leaders, state.members)
+        state.note(tolerance)
+        spent = evaluator.counts.evaluations
+        complete = self.handling != "feasible-first" or state.all_feasible or spent >= int(self.search * budget)
+        if state.launched == WAITING and complete:
+            state.launched = spent
+
+    def _goals(self, points: Members, tolerance: float) -> np.ndarray:
+        """What is minimised (n, m): objectives that say all, also of constraints; see `handling.by_objectives`."""
+        return handlings.by_objectives(*self._told(points, tolerance))

@@ -1,0 +1,295 @@
+"""MOPSO: its kernels by hand and by what always holds, its archive, constraints, periodic variables, first particles, known fronts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from moocore import igd
+from plain import zdt
+
+from macs import MOPSO, MOPSOCD
+from macs.baselines.grid import hypercubes, roulette, thin_out
+from macs.baselines.particles import flown, improved, inertia, velocities
+from macs.blackbox import BlackBox
+from macs.box import Box
+from macs.catalogue import solver
+from macs.dominance import nondominated
+from macs.evaluation import Counts, Evaluation, Evaluator
+
+PLAIN = Box(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
+ROUND = Box(np.zeros(2), np.ones(2), np.array([True, False]))
+
+
+# The grid
+
+
+def test_hypercubes_by_hand() -> None:
+    F = np.array([[0.0, 10.0], [0.9, 10.0], [1.0, 5.0], [4.0, 0.0], [3.9, 0.1], [2.0, 5.0]])
+    cube = hypercubes(F, 4)  # sides of 1 and of 2.5
+    assert cube[0] == cube[1]
+    assert cube[3] == cube[4]  # the greatest value belongs to the last part
+    assert len(set(cube)) == 4
+    assert hypercubes(np.ones((3, 2)), 30).tolist() == [0, 0, 0]
+    assert len(set(hypercubes(np.stack([np.arange(30.0), np.ones(30)], axis=1), 30))) == 30
+
+
+@given(arrays(float, st.tuples(st.integers(1, 40), st.integers(1, 4)), elements=st.floats(-1e6, 1e6)), st.integers(1, 30))
+def test_points_of_one_hypercube_are_no_farther_apart_than_its_sides(F, cells) -> None:
+    cube = hypercubes(F, cells)
+    assert set(cube) == set(range(cube.max() + 1))
+    for number in set(cube):
+        inside = F[cube == number]
+        assert (np.ptp(inside, axis=0) <= np.ptp(F, axis=0) / cells * (1 + 1e-9) + 1e-9).all()
+
+
+def test_the_roulette_prefers_thin_hypercubes() -> None:
+    cube = np.array([0, 0, 0, 1, 2, 2])
+    rows = roulette(cube, 60_000, np.random.default_rng(0))
+    share = np.bincount(rows, minlength=6) / 60_000
+    wheel = 1 / 3 + 1 + 1 / 2
+    assert share == pytest.approx(np.array([1 / 9, 1 / 9, 1 / 9, 1, 1 / 4, 1 / 4]) / wheel, abs=0.01)
+
+
+def test_the_fullest_hypercubes_are_thinned_out() -> None:
+    cube = np.array([0, 1, 0, 1, 0, 2, 0, 2, 3])
+    keep = thin_out(cube, 5, np.random.default_rng(1))
+    assert sorted(np.bincount(cube[keep], minlength=4)) in ([1, 1, 1, 2],)
+    assert keep[8]
+    kept = [tuple(np.flatnonzero(thin_out(cube, 4, np.random.default_rng(seed)))) for seed in range(50)]
+    assert all(sorted(cube[list(rows)]) == [0, 1, 2, 3] for rows in kept)
+    assert len(set(kept)) > 10  # which of those in a hypercube is left to chance
+
+
+@given(arrays(int, st.integers(1, 60), elements=st.integers(0, 5)), st.integers(1, 60), st.integers(0, 9))
+def test_thinning_levels_what_there_is(numbers, limit, seed) -> None:
+    cube = np.unique(numbers, return_inverse=True)[1].reshape(-1)
+    keep = thin_out(cube, limit, np.random.default_rng(seed))
+    assert np.count_nonzero(keep) == min(limit, len(cube))
+    before, after = np.bincount(cube), np.bincount(cube[keep], minlength=cube.max() + 1)
+    cut = after < before
+    if cut.any():  # what was thinned out is among the fullest of what is left
+        assert after[cut].min() >= after.max() - 1
+
+
+# Particles
+
+
+def test_inertia_decreases_on_a_line() -> None:
+    assert [inertia(share, 1.4, 0.4) for share in (0.0, 0.5, 1.0, 1.1)] == pytest.approx([1.4, 0.9, 0.4, 0.4])
+
+
+def test_velocities_by_hand() -> None:
+    X, V, best, leader = (np.array([row]) for row in ([0.5, 0.5], [0.1, -0.1], [0.7, 0.5], [0.5, 0.1]))
+    chance = np.array([[[0.5, 1.0]], [[1.0, 0.5]]])
+    found = velocities(PLAIN, X, V, best, leader, weights=(0.5, 2.0, 2.0), chance=chance, largest=1.0)
+    assert found == pytest.approx(np.array([[0.05 + 2 * 0.5 * 0.2, -0.05 + 2 * 0.5 * -0.4]]))
+    assert np.abs(velocities(PLAIN, X, V, best, leader, weights=(0.5, 2.0, 2.0), chance=chance, largest=0.1)).max() == 0.1
+
+
+def test_particles_are_drawn_to_what_they_follow() -> None:
+    """The sign that eq. (22) is printed with would drive them away."""
+    rng = np.random.default_rng(0)
+    X, target = rng.random((50, 2)), np.full((50, 2), 0.5)
+    V = velocities(PLAIN, X, np.zeros((50, 2)), target, target, weights=(0.7, 1, 1), chance=np.full((2, 50, 2), 0.3), largest=1.0)
+    assert (np.linalg.norm(X + V - 0.5, axis=1) < np.linalg.norm(X - 0.5, axis=1)).all()
+
+
+def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:
+    X, V, rebound = np.array([[0.9, 0.9], [0.1, 0.1]]), np.array([[0.3, 0.3], [-0.3, -0.3]]), np.full((2, 2), -0.25)
+    there, speed = flown(PLAIN, X, V, rebound)
+    assert there == pytest.approx(np.array([[1, 1], [0, 0]])) and speed == pytest.approx(-0.25 * V)
+    there, speed = flown(ROUND, X, V, rebound)
+    assert there == pytest.approx(np.array([[0.2, 1], [0.8, 0]]))
+    assert speed == pytest.approx(np.array([[0.3, -0.075], [-0.3, 0.075]]))
+    V = velocities(
+        ROUND, X[:1], 0 * V[:1], X[1:], X[1:], weights=(0, 1, 0), chance=np.ones((2, 1, 2)), largest=1.0
+    )  # to 0.1 from 0.9: forward where it is periodic
+    assert pytest.approx(V) == np.array([[0.2, -0.8]])
+
+
+@given(arrays(float, (6, 2), elements=st.floats(0, 1)), arrays(float, (6, 2), elements=st.floats(-1, 1)), st.integers(0, 9))
+def test_particles_stay_in_the_box(X, V, seed) -> None:
+    for box in (PLAIN, ROUND):
+        there, speed = flown(box, X, V, -np.random.default_rng(seed).random((6, 2)))
+        assert ((there >= 0) & (there <= 1)).all()
+        assert (np.abs(speed) <= np.abs(V)).all()
+
+
+def test_the_best_place_of_a_particle() -> None:
+    best = np.array([[1.0, 1.0]] * 4)
+    F = np.array([[0.5, 1.0], [1.0, 1.5], [0.5, 1.5], [0.5, 1.5]])
+    assert improved(F, best, np.array([False, True, True, False])).tolist() == [True, False, True, False]
+
+
+# The swarm
+
+
+def schaffer(X: np.ndarray) -> np.ndarray:
+    return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 6), st.integers(0, 10**6))
+def test_what_always_holds_of_its_archive(particles, archive, cells, seed) -> None:
+    box = BlackBox(lambda X: (schaffer(X), X[:, :1] - 0.8), [(-2, 2)] * 2)
+    method = MOPSO(particles=particles, archive=archive, cells=cells)
+    state, ever = method.begin(box, 90, np.random.default_rng(seed)), []
+    while box.counts.evaluations < 90:
+        method.advance(state, box, 90)
+        assert len(state.leaders) <= archive
+        assert nondominated(state.leaders.F).all() or (state.leaders.violation > box.tolerance).any()
+        assert len(state.members) == len(state.best) == len(state.velocity) == min(particles, 90)
+        assert (state.archive.violation <= box.tolerance).all()
+        ever.append(state.archive.F)
+        assert nondominated(state.archive.F).all()
+    assert box.counts.evaluations == 90
+
+
+def test_it_is_there_by_name() -> None:
+    assert solver("mopso", particles=12) == MOPSO(particles=12)
+
+
+# First particles
+
+
+def ring(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feasible in some 8 % of its box."""
+    return schaffer(X), (np.linalg.norm(X - 0.5, axis=1) - 0.65)[:, None]
+
+
+def test_the_swarm_begins_with_feasible_particles_only_and_their_search_is_counted() -> None:
+    box, method = BlackBox(ring, [(-2, 2)] * 2), MOPSO(particles=10, search=0.5)
+    state = method.begin(box, 1000, np.random.default_rng(1))
+    drawn = [state.members]
+    while state.launched < 0:
+        assert (state.velocity == 0).all()
+        method.advance(state, box, 1000)
+        drawn.append(state.members)
+    assert (state.members.violation <= box.tolerance).all()
+    assert state.launched == box.counts.evaluations == 10 * len(drawn)
+    assert 50 <= state.launched <= 400
+    assert state.all_feasible == len(drawn) >= state.first_feasible
+    for _ in range(20):  # a feasible best place is never given up
+        method.advance(state, box, 1000)
+        assert (state.best.violation <= box.tolerance).all()
+
+
+def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_there() -> None:
+    def corner(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return schaffer(X), (np.abs(X - 1.2).sum(axis=1) - 0.15)[:, None]
+
+    box, method = BlackBox(corner, [(-2, 2)] * 3), MOPSO(particles=20, search=0.1)
+    state = method.begin(box, 2000, np.random.default_rng(1))
+    while state.launched < 0:
+        method.advance(state, box, 2000)
+    assert state.launched == 200
+    assert not len(state.archive) and len(state.closest) == 1
+    while box.counts.evaluations < 2000:
+        method.advance(state, box, 2000)
+    assert len(state.archive) and (state.archive.violation <= box.tolerance).all()
+
+
+@pytest.mark.parametrize("more", [{"search": 0.0}, {"handling": "penalty"}, {"handling": "objective"}])
+def test_where_nobody_asks_for_feasible_particles_none_are_searched(more) -> None:
+    box, method = BlackBox(ring, [(-2, 2)] * 2), MOPSO(particles=10, **more)
+    assert method.begin(box, 1000, np.random.default_rng(1)).launched == 10
+
+
+def test_nothing_feasible_is_told() -> None:
+    front = MOPSO(particles=10).minimize(lambda X: (schaffer(X), X[:, :1] + 3), [(-2, 2)] * 2, evaluations=200, seed=1)
+    assert not len(front)
+    assert front.message == "nothing feasible in 200 evaluations; the nearest violates the constraints by 1"
+    assert front.closest.decision[0] == -2
+
+
+# Fronts
+
+
+@pytest.mark.parametrize("kind", [1, 2])
+def test_zdt(kind) -> None:
+    function, bounds, truth = zdt(kind)
+    for seed in (1, 2):
+        front = MOPSO().minimize(function, bounds, evaluations=10_000, seed=seed)
+        assert igd(front.F, ref=truth) < 0.1
+        assert 50 <= len(front) <= 100
+
+
+def test_inside_the_box_it_is_better_than_mopso_cd() -> None:
+    """The fronts of ZDT lie on bounds, where pymoo's particles stick."""
+    function, bounds, truth = zdt(1)
+
+    def moved(X: np.ndarray) -> np.ndarray:
+        return function(np.hstack([X[:, :1], np.abs(X[:, 1:] - 0.3)]))
+
+    ours, theirs = (
+        igd(solver.minimize(moved, bounds[:10], evaluations=2000, seed=1).F, ref=truth)
+        for solver in (MOPSO(particles=40), MOPSOCD(particles=40, archive=100))
+    )
+    assert ours < 0.2 < theirs
+
+
+def test_the_paper_s_settings() -> None:
+    assert MOPSO.paper(cells=10) == MOPSO(particles=20, archive=100, cells=10, inertia=1.4, final_inertia=0.4, cognitive=2, social=2)
+
+
+def srn(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Srinivas and Deb (1994): the front lies at x1 = -2.5, x2 in [-14.79, 2.5]."""
+    x, y = X.T
+    F = np.stack([2 + (x - 2) ** 2 + (y - 1) ** 2, 9 * x - (y - 1) ** 2], axis=1)
+    return F, np.stack([(x**2 + y**2) / 225 - 1, (x - 3 * y + 10) / 10], axis=1)
+
+
+@pytest.mark.parametrize("degree", ["largest", "sum"])
+def test_the_front_of_srn(degree) -> None:
+    front = MOPSO(particles=40, degree=degree).minimize(srn, [(-20, 20)] * 2, evaluations=6000, seed=1)
+    y = np.linspace(-14.79, 2.5, 500)
+    truth = np.stack([2 + 4.5**2 + (y - 1) ** 2, -22.5 - (y - 1) ** 2], axis=1)
+    assert (front.violation <= 1e-6).all()
+    assert igd(front.F, ref=truth) < 0.02 * np.ptp(truth)
+
+
+def osy(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Osyczka and Kundu (1995), two objectives, six variables, six limits; its front runs along five of them."""
+    a, b, c, d, e, f = X.T
+    F = np.stack([-(25 * (a - 2) ** 2 + (b - 2) ** 2 + (c - 1) ** 2 + (d - 4) ** 2 + (e - 1) ** 2), (X**2).sum(axis=1)], axis=1)
+    left = [(a + b) / 2 - 1, 1 - (a + b) / 6, 1 - (b - a) / 2, 1 - (a - 3 * b) / 2, 1 - ((c - 3) ** 2 + d) / 4, ((e - 3) ** 2 + f) / 4 - 1]
+    return F, -np.stack(left, axis=1)
+
+
+def test_limits_of_osy_are_respected() -> None:
+    bounds = [(0, 10), (0, 10), (1, 5), (0, 6), (1, 5), (0, 10)]
+    front = MOPSO(particles=50).minimize(osy, bounds, evaluations=10_000, seed=1)
+    assert len(front) > 10
+    assert (osy(front.decision)[1] <= 1e-6).all()
+    assert front.F[:, 0].min() < -200  # the front: -274 ... -42
+    assert front.F[:, 1].min() < 30  # 4 ... 76
+
+
+class Compass(Evaluator):
+    """Two directions to head for, one on each side of north, where the box is cut open."""
+
+    def __init__(self) -> None:
+        self.free, self.lower, self.upper, self.period = np.arange(1), np.zeros(1), np.full(1, 360.0), np.full(1, 360.0)
+        self.tolerance, self.counts = 1e-6, Counts()
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        return candidates.copy()
+
+    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        assert ((Z >= 0) & (Z <= 360)).all()
+        F = 1 - np.cos(np.deg2rad(Z - [350, 10]))
+        return Evaluation(Z.copy(), F, np.zeros(len(Z)), np.full(len(Z), "converged")), 0
+
+
+def test_periodic_variables_are_closed() -> None:
+    box, method = Compass(), MOPSO(particles=10, archive=20)
+    state = method.begin(box, 400, np.random.default_rng(1))
+    while box.counts.evaluations < 400:
+        method.advance(state, box, 400)
+    heading = (state.archive.Z[:, 0] + 180) % 360 - 180
+    assert (np.abs(heading) < 15).all()
+    assert heading.min() < -5 and heading.max() > 5
+    assert np.count_nonzero(np.abs(state.members.Z[:, 0] - 180) > 120) >= 8  # so is the swarm, on both sides of the cut

@@ -1,0 +1,164 @@
+"""Smooth first candidates: about the guess, within bounds, correlated in time, from the generator that is given."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import MACS, MOPSO, NSGA2
+from problems import Problem
+from transcription import DFET, Smooth
+from transcription.smooth import smoothing
+
+MESHES = [DFET(20, 2), DFET(20, 2, basis="bernstein"), DFET(4, 3, mesh={"climb": ((0.0, 0.1, 0.15, 0.6, 1.0), 5)})]
+
+
+def climb(**guesses) -> Problem:
+    """A climb with two controls, one of them an angle all the way round, a free end and a parameter."""
+    problem = Problem("climb")
+    phase = problem.phase("climb", t0=0, tf=(8, 12))
+    phase.state("y", bounds=(-100, 100), initial=(-1, 1))
+    throttle, angle = phase.control("throttle", bounds=(0, 2)), phase.control("angle", bounds=(-180, 180), period=360)
+    gain = problem.parameter("gain", bounds=(1, 3))
+    phase.dynamics(y=throttle * gain + 0 * angle)
+    problem.minimize("time", phase.tf)
+    problem.maximize("height", phase.final(phase["y"]))
+    phase.guess(**guesses)
+    return problem
+
+
+GUESS = {"throttle": (0.8, 1.2), "angle": 170.0, "tf": 9.0}
+
+
+def columns(nlp, word: str) -> np.ndarray:
+    return np.array([i for i, index in enumerate(nlp.free) if word in nlp.variables[index].name])
+
+
+@pytest.mark.parametrize("mesh", MESHES, ids=lambda mesh: f"{mesh.basis}{mesh.elements}")
+def test_profiles_tell_which_variables_are_a_control_and_when(mesh) -> None:
+    nlp = mesh.transcribe(climb(throttle=([0, 12], [0.0, 2.0]), tf=12.0))
+    assert [profile.name for profile in nlp.profiles] == ["climb.throttle", "climb.angle"]
+    for profile, word in zip(nlp.profiles, ("throttle", "angle"), strict=True):
+        assert np.array_equal(profile.columns, columns(nlp, word))
+        assert (np.diff(profile.places) >= 0).all() and profile.places.min() >= 0 and profile.places.max() <= 1
+    assert nlp.profiles[0].places == pytest.approx(nlp.guess[nlp.profiles[0].columns] / 2)  # a ramp from 0 to 2 is where it is
+
+
+@pytest.mark.parametrize("mesh", MESHES, ids=lambda mesh: f"{mesh.basis}{mesh.elements}")
+def test_candidates_vary_about_the_guess_within_bounds(mesh) -> None:
+    problem = climb(**GUESS)
+    nlp = mesh.transcribe(problem)
+    lower, upper = nlp.lower[nlp.free], nlp.upper[nlp.free]
+    X = Smooth(spread=0.1).draw(problem, mesh, 4000, np.random.default_rng(0))
+    assert X.shape == (4000, len(nlp.free))
+    assert ((lower <= X) & (upper >= X)).all()
+    throttle = columns(nlp, "throttle")
+    assert X[:, throttle].mean(axis=0) == pytest.approx(nlp.guess[throttle], abs=0.02)
+    assert X[:, throttle].std(axis=0) == pytest.approx(0.2, rel=0.06)
+    turned = (X[:, columns(nlp, "angle")] - 170 + 180) % 360 - 180  # the short way round, across the bound
+    assert turned.mean(axis=0) == pytest.approx(0, abs=3)
+    assert turned.std(axis=0) == pytest.approx(36, rel=0.06)
+    end = columns(nlp, "climb.tf")
+    assert X[:, end].mean() == pytest.approx(9, abs=0.02) and X[:, end].std() == pytest.approx(0.1 * 4, rel=0.06)
+    gain = X[:, columns(nlp, "gain")]  # nobody guessed it
+    assert gain.min() < 1.01 and gain.max() > 2.99 and gain.mean() == pytest.approx(2, abs=0.05)
+
+
+def test_neighbours_in_time_are_alike_and_others_independent() -> None:
+    mesh, problem = DFET(50, 1), climb(throttle=1.0)
+    profile = mesh.transcribe(problem).profiles[0]
+    X = Smooth(spread=0.1, length=0.1).draw(problem, mesh, 4000, np.random.default_rng(0))[:, profile.columns]
+    found, apart = np.corrcoef(X.T), profile.places[:, None] - profile.places
+    inside = np.ix_(*[(profile.places > 0.2) & (profile.places < 0.8)] * 2)  # near the ends there are fewer to average
+    assert found[inside] == pytest.approx(np.exp(-(apart**2) / (2 * 0.1**2))[inside], abs=0.08)
+    assert (np.diag(found, 1) > 0.9).all()
+
+
+def test_smoothing_keeps_the_variance_and_a_short_length_everything() -> None:
+    places = np.array([0.0, 0.3, 0.31, 1.0])
+    assert (smoothing(places, 0.2) ** 2).sum(axis=1) == pytest.approx(1)
+    assert smoothing(places, 1e-4) == pytest.approx(np.eye(4))
+    assert smoothing(places, 1e4) == pytest.approx(np.full((4, 4), 0.5))
+
+
+def test_without_a_guess_they_vary_about_the_middle() -> None:
+    problem = climb()
+    nlp = DFET(5, 2).transcribe(problem)
+    X = Smooth(spread=0.05).draw(problem, DFET(5, 2), 2000, np.random.default_rng(0))
+    assert X[:, columns(nlp, "throttle")].mean(axis=0) == pytest.approx(1, abs=0.02)
+
+
+def test_the_generator_is_the_only_source_of_chance() -> None:
+    problem, mesh = climb(**GUESS), DFET(3, 2)
+    first, again, other = (Smooth().draw(problem, mesh, 5, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
+def test_settings_that_make_no_sense(settings) -> None:
+    with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
+        Smooth(**settings)
+
+
+# Solvers that begin with them
+
+
+SOLVERS = [MACS(agents=4, archive=6), NSGA2(population=8), MOPSO(particles=8)]
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
+def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
+    from macs.bilevel import Bilevel
+
+    batches, mesh = [], DFET(10, 2)
+    inside = Bilevel._evaluate
+    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (batches.append(Z.copy()), inside(self, Z))[1])
+    nlp = mesh.transcribe(climb(**GUESS))
+
+    def roughness(start) -> float:
+        batches.clear()
+        solver.solve(climb(**GUESS), mesh, evaluations=12, seed=1, start=start, inner="march")
+        first = np.vstack(batches)[:, nlp.free]
+        assert np.array_equal(first[0][np.isfinite(nlp.guess)], nlp.guess[np.isfinite(nlp.guess)])  # the guess itself comes first
+        return float(np.abs(np.diff(first[1 : min(len(batches[0]), 6), nlp.profiles[0].columns], axis=1)).mean())
+
+    assert roughness("smooth") < 0.5 * roughness(None)
+    assert roughness(Smooth(spread=0.01)) < 0.1 * roughness(None)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
+@pytest.mark.parametrize("start", ["uniform", Smooth(guess=False)], ids=str)
+def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
+    from macs.bilevel import Bilevel
+
+    nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
+    inside = Bilevel._evaluate
+    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (first.append(Z.copy()), inside(self, Z))[1])
+    solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="march")
+    throttle = nlp.profiles[0].columns
+    assert not np.isclose(np.vstack(first)[:, nlp.free][:, throttle], nlp.guess[throttle]).all(axis=1).any()
+
+
+def test_an_array_of_them_is_a_start_too() -> None:
+    problem, mesh = climb(**GUESS), DFET(4, 2)
+    start = Smooth().draw(problem, mesh, 8, np.random.default_rng(3))
+    assert len(NSGA2(population=8).solve(problem, mesh, evaluations=16, seed=1, start=start, inner="march"))
+
+
+def test_an_unknown_start_is_refused_before_any_work() -> None:
+    with pytest.raises(ValueError, match="unknown start 'smoth', did you mean smooth"):
+        NSGA2().solve(climb(), DFET(4, 2), evaluations=100, start="smoth")
+    with pytest.raises(ValueError, match="start must be a Front, Points or an array"):
+        NSGA2().minimize(lambda X: X, [(0, 1)] * 2, evaluations=100, start="smooth")
+
+
+def test_a_checkpoint_belongs_to_its_start(tmp_path) -> None:
+    given = {"evaluations": 24, "seed": 1, "inner": "march", "checkpoint": tmp_path / "run.ckpt"}
+    solver, mesh = MOPSO(particles=8), DFET(4, 2)
+    solver.solve(climb(**GUESS), mesh, start="smooth", callback=lambda progress: True, **given)
+    with pytest.raises(ValueError, match="first candidates"):
+        solver.solve(climb(**GUESS), mesh, **given)
+    front = solver.solve(climb(**GUESS), mesh, start="smooth", **given)
+    whole = solver.solve(climb(**GUESS), mesh, start="smooth", **{**given, "checkpoint": None})
+    assert front.F.tobytes() == whole.F.tobytes()

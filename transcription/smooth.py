@@ -1,0 +1,80 @@
+"""First candidates that can be flown: smooth random profiles about what the user guessed.
+
+Where a control has many nodes, values drawn one by one make a noise that averages to the middle of its bounds, all candidates fly much
+the same, and none of them anywhere useful. Nobody flies like that either. Of a profile that somebody has in mind, and of smooth deviations
+from it, a search has something to choose from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.problem import Problem
+
+from .base import NLP, Transcription
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Candidates drawn about the problem's guess (`phase.guess(...)`, `problem.guess(...)`), their controls as smooth profiles.
+
+    It is what `solve(start="smooth")` of every solver begins with, as many as it needs, from the run's own generator. `draw` gives an array
+    of them, to look at or to give as `start`.
+
+    A control is its guess, or where there is none the middle of its bounds, plus a random function of time: values of unit variance, whose
+    correlation decreases with the time between them, d, in units of the phase's length, as exp(-d^2 / (2 length^2)), times `spread`, times
+    the span of its bounds. Other variables with a guess vary independently about it, evenly, as much. Those without are drawn evenly from
+    their bounds. What leaves its bounds is put back: periodic variables come in at the other end.
+
+    Parameters
+    ----------
+    spread : float, default 0.2
+        Standard deviation, in spans of the bounds, in (0, 1].
+    length : float, default 0.2
+        Over which time values are alike, as a fraction of the phase, in (0, 10]. With less than there is between two nodes, these are
+        independent.
+    guess : bool, default True
+        Whether a search also begins with the guess itself, as the first candidate.
+
+    Raises
+    ------
+    ValueError
+        Where a setting is out of its range.
+    """
+
+    spread: float = 0.2
+    length: float = 0.2
+    guess: bool = True
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("spread", self.spread, 1), ("length", self.length, 10)):
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= most:
+                raise ValueError(f"Smooth: {name} must be in (0, {most}], not {value!r}")
+        if not isinstance(self.guess, bool):
+            raise ValueError(f"Smooth: guess must be True or False, not {self.guess!r}")
+
+    def draw(self, problem: Problem, transcription: Transcription, count: int, rng: np.random.Generator) -> np.ndarray:
+        """`count` candidates (count, d), values of the free variables: an array that `start=` takes."""
+        nlp = transcription.transcribe(problem)
+        lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
+        return self.shaped(nlp, lower + span * rng.random((count, len(nlp.free))))
+
+    def shaped(self, nlp: NLP, candidates: np.ndarray) -> np.ndarray:
+        """The candidates (k, d) that others (k, d) become, which were drawn evenly from their bounds, each variable by itself."""
+        lower, upper, span, guess = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free], nlp.guess
+        noise = np.sqrt(12.0) * ((candidates - lower) / span - 0.5)
+        X = np.where(np.isfinite(guess), guess + self.spread * span * noise, candidates)
+        for profile in nlp.profiles:
+            columns = profile.columns
+            middle = np.where(np.isfinite(guess[columns]), guess[columns], 0.5 * (lower + upper)[columns])
+            X[:, columns] = middle + self.spread * span[columns] * (noise[:, columns] @ smoothing(profile.places, self.length).T)
+        wrapped = lower + np.mod(X - lower, span)
+        return np.where(nlp.period[nlp.free] > 0.0, wrapped, np.clip(X, lower, upper))
+
+
+def smoothing(places: np.ndarray, length: float) -> np.ndarray:
+    """A matrix (k, k) that makes smooth values of unit variance at `places` (k,) of independent ones."""
+    weights = np.exp(-(((places[:, None] - places) / length) ** 2))
+    return weights / np.linalg.norm(weights, axis=1, keepdims=True)
