@@ -4,6 +4,7 @@ from .base import NLP, Transcription
 from .catalogue import from_dict, parse
 from .dfet import DFET
 from .inner import InnerResult, InnerSolver
+from .shooting import MultipleShooting, SingleShooting
 from .simulate import Simulation
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
@@ -12,9 +13,11 @@ __all__ = [
     "NLP",
     "InnerResult",
     "InnerSolver",
+    "MultipleShooting",
     "PhaseTrajectory",
     "PiecewisePolynomial",
     "Simulation",
+    "SingleShooting",
     "Trajectory",
     "Transcription",
     "from_dict",

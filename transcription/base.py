@@ -37,8 +37,14 @@ class Transcription(ABC):
         return {"method": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
 
 
+CHAIN = "chain"
+"""What a Function is called that repeats so much that it, and what it is a part of, is not to be written out."""
+
+
 def expanded(function: ca.Function) -> ca.Function:
     """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
+    if any(part.name() == CHAIN for part in function.find_functions()):
+        return function
     try:
         return function.expand()
     except RuntimeError:
@@ -125,15 +131,23 @@ class NLP:
         equations, where that fails."""
         return self.reduced.fly(Z).Z
 
+    def fly(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `march` makes of vectors (k, n), with the objectives (k, m) and violations (k,) of that: in one go, where the method sees
+        on the way all that these depend on."""
+        flown = self.reduced.fly(Z)
+        if flown.scores is None:
+            return flown.Z, *self.evaluate(flown.Z)
+        F, g = flown.scores
+        return flown.Z, F, _largest(self._residuals(flown.Z, g))
+
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
-        F, residuals = self._evaluate(Z)
-        violation = residuals.max(axis=1, initial=0.0)
-        return F, np.where(np.isfinite(violation), violation, np.inf)
+        F, g = self._batched(Z)
+        return F, _largest(self._residuals(Z, g))
 
     def violations(self, z: np.ndarray) -> dict[str, float]:
         """The largest scaled residual of each constraint of a vector (n,), by its label; bounds are labelled by phase and variable."""
-        _, residuals = self._evaluate(z[None])
+        residuals = self._residuals(z[None], self._batched(z[None])[1])
         worst: dict[str, float] = {}
         for label, residual in zip((*self._bound_labels, *self.g_labels), residuals[0], strict=True):
             worst[label] = float(np.fmax(worst.get(label, 0.0), residual if np.isfinite(residual) else np.inf))
@@ -148,16 +162,16 @@ class NLP:
         difference /= self.span[self.free]
         return np.sqrt(np.einsum("kd,kd->k", difference, difference))
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Objectives, and scaled residuals (k, n + r) of bounds and rows of g: negative inside, NaN where they are no numbers."""
-        (F, g), n = self._batched(Z), Z.shape[1]
+    def _residuals(self, Z: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """Scaled residuals (k, n + r) of bounds and rows of g (k, r): negative inside, NaN where they are no numbers."""
+        n = Z.shape[1]
         residuals = np.empty((len(Z), n + g.shape[1]))
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore"):
             np.maximum(self.lower - Z, Z - self.upper, out=residuals[:, :n])
             np.maximum(self.g_lower - g, g - self.g_upper, out=residuals[:, n:])
             residuals /= self._scales
-        return F, residuals
+        return residuals
 
     @cached_property
     def _scales(self) -> np.ndarray:
@@ -170,3 +184,9 @@ class NLP:
     @cached_property
     def _bound_labels(self) -> tuple[str, ...]:
         return tuple(f"bounds of {v.name.split('[')[0]}" for v in self.variables)
+
+
+def _largest(residuals: np.ndarray) -> np.ndarray:
+    """Violations (k,) by scaled residuals (k, n + r); infinite where one is no number."""
+    violation = residuals.max(axis=1, initial=0.0)
+    return np.where(np.isfinite(violation), violation, np.inf)

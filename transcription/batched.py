@@ -45,7 +45,7 @@ class Batched:
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._may_compile = compiled and compiler() is not None
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
-        self._work, self._each, self._length = 0, _work(function), _length(function)
+        self._work, self._each, self._length = 0, work(function), _length(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -130,17 +130,17 @@ def _library(function: ca.Function) -> ca.Function | None:
             return None
 
 
-def _work(function: ca.Function) -> int:
+def work(function: ca.Function) -> int:
     """Instructions that one call goes through, as often as it does; none of what is not made of instructions."""
     if function.is_a("SXFunction"):
         return function.n_instructions()
     if function.is_a("Map"):
         information = function.info()
-        return information["n"] * _work(information["f"])
+        return information["n"] * work(information["f"])
     if not function.is_a("MXFunction"):
         return 0
     calls = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CALL)
-    return function.n_instructions() + sum(_work(function.instruction_MX(i).which_function()) for i in calls)
+    return function.n_instructions() + sum(work(function.instruction_MX(i).which_function()) for i in calls)
 
 
 def _length(function: ca.Function) -> int:

@@ -72,13 +72,17 @@ class PhaseWriter(ABC):
     phase: CompiledPhase
     ends: Ends
     interior: np.ndarray
-    """Slots of the states that `sensitivity` replaces only on demand."""
+    """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
     compilable: bool
     """Whether what `march` does fast, and `sensitivity`, can be written in C."""
 
+    def fill(self, extended: ca.MX) -> ca.MX:
+        """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
+        return extended
+
     @abstractmethod
     def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """Add the rows of dynamics and path constraints of an extended symbol."""
+        """Add the rows of dynamics and path constraints of an extended symbol, hidden quantities and all."""
 
     @abstractmethod
     def guess(self, extended: np.ndarray) -> None:
@@ -102,7 +106,7 @@ class PhaseWriter(ABC):
         Returns
         -------
         MX (e, 1)
-            With the states that the dynamics give.
+            With the states and hidden quantities that the dynamics give.
         MX (nx, 1)
             The final states, also where they are imposed and so no variables.
         MX (any, 1)
@@ -118,14 +122,14 @@ class PhaseWriter(ABC):
         extended : MX (e, 1)
         S : MX (e, d)
             Derivatives of the extended vector: the seeds of the layout, with the rows of initial states given. The rows of the other states
-            are to be replaced.
+            and of hidden quantities are to be replaced.
         interior : bool
             Also inside the elements; otherwise only at their ends.
 
         Returns
         -------
         MX (e, d)
-            With the rows of the states.
+            With the rows of the states and hidden quantities.
         MX (nx, d)
             Of the final states, also where they are imposed.
         """

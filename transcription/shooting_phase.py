@@ -1,0 +1,277 @@
+"""One phase by shooting: its variables, its rows, its propagation and its trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from .base import CHAIN
+from .batched import work
+from .control_law import ControlLaw
+from .dfet_element import wrapped_controls
+from .guess import along, line
+from .layout import Layout
+from .phase_writer import Ends, PhaseWriter, Rows, Written
+from .polynomials import basis_matrix, lobatto_nodes
+from .shooting_step import Step
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
+
+SAME = 1e-9
+"""Places nearer to each other than this, relative to the phase, are one."""
+LONG = 3_000_000
+"""Most operations of a chain of steps times free variables, all of which it depends on, that is written out for derivatives."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepMesh:
+    """Where steps begin and end: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
+
+    places: np.ndarray
+    ends: np.ndarray
+
+    @classmethod
+    def of(cls, intervals: int, steps: int, nodes: np.ndarray) -> StepMesh:
+        """`intervals` equal ones of `steps` equal steps each; a step across one of the nodes of controls becomes two."""
+        whole = np.linspace(0.0, 1.0, intervals * steps + 1)
+        apart = np.abs(nodes[:, None] - whole).min(axis=1) > SAME
+        places = np.sort(np.concatenate([whole, nodes[apart]]))
+        return cls(places, np.searchsorted(places, whole[::steps]))
+
+    @property
+    def steps(self) -> int:
+        """How many steps there are, N."""
+        return len(self.places) - 1
+
+
+class ShootingPhase(PhaseWriter):
+    """One phase on M intervals.
+
+    Slots: `U` (values, nu) of the controls and, where the intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends,
+    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of whatever is flown in one
+    go; `Y` (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) what path
+    constraints and peaks see.
+    """
+
+    def __init__(
+        self, mesh: StepMesh, law: ControlLaw, step: Step, phase: CompiledPhase, layout: Layout, ends: Ends, *, apart: bool
+    ) -> None:
+        self.mesh, self.law, self.step, self.phase, self.ends, self.apart = mesh, law, step, phase, ends, apart
+        self._layout, nx, prefix = layout, len(phase.states), f"{phase.name}."
+        inner = len(mesh.ends) - 2
+        self.U = layout.add_table(prefix, phase.controls, law.count, 1, free=True)[:, 0]
+        at_nodes = [replace(v, name=f"{v.name}[node]") for v in phase.states]
+        inside = layout.add_table(prefix, at_nodes, inner if apart else 0, 1)[:, 0]
+        self.B = np.vstack([ends.initial[None], inside, ends.final[None]])
+        self._shots = mesh.ends if apart else mesh.ends[[0, -1]]
+        self.R = layout.add_hidden(len(self._shots) - 1, nx)
+        self.Y = layout.add_hidden(0 if apart else inner, nx)
+        self.Q = layout.add_hidden(phase.integrands.size1_out(0))
+        points = mesh.steps * len(step.points) + (1.0 not in step.points)
+        self.W = layout.add_hidden(points if step.rows else 0, step.rows)
+        self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
+        self.compilable = step.symbolic
+
+    def fill(self, extended: ca.MX) -> ca.MX:
+        """See `PhaseWriter.fill`."""
+        inputs = self._inputs(extended)
+        left, flown = self._layout.pick(extended, self.B[:-1]), []
+        for j, (first, last) in enumerate(zip(self._shots[:-1], self._shots[1:], strict=True)):
+            flown.append(self._fly(left[:, j], *self._part(inputs, first, last)))
+        states, integrals, samples = zip(*flown, strict=True)
+        return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples), inputs)
+
+    def write(self, extended: ca.MX, rows: Rows) -> Written:
+        """See `PhaseWriter.write`."""
+        phase, pick, n = self.phase, self._layout.pick, len(self.R)
+        right = self.B[1:] if self.apart else self.B[-1:]
+        residual = pick(extended, self.R) - pick(extended, right)
+        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], n), self._labels(), marched=True)
+        at_nodes = pick(extended, self.Y)
+        for i, v in enumerate(phase.states if len(self.Y) else ()):
+            rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
+        seen = pick(extended, self.W)
+        for k, limit in enumerate(phase.paths):
+            rows.add(seen[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
+        C = self._inputs(extended)[0]
+        first, last = self._at_ends(C)
+        return Written(first, last, pick(extended, self.Q), seen[len(phase.paths) :, :])
+
+    def guess(self, extended: np.ndarray) -> None:
+        """See `PhaseWriter.guess`."""
+        t0, tf, share = extended[:, self.ends.t0], extended[:, self.ends.tf], self.mesh.places[self.mesh.ends][1:]
+        slots = self.B[1:] if self.apart else self.B[-1:]
+        for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
+            start = extended[:, self.ends.initial[i]]
+            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
+            given = self.phase.guesses.get(state.name)
+            values = (line(start, end, share) if given is None else along(given, t0, tf, share))[:, -len(slots) :]
+            self._layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
+            self._layout.write(extended, slots[-1:, i], np.clip(extended[:, slots[-1:, i]], *final))
+
+    def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
+        """See `PhaseWriter.guess_controls`."""
+        found: dict[int, float] = {}
+        for i, control in enumerate(self.phase.controls):
+            if control.name in self.phase.guesses:
+                values = along(self.phase.guesses[control.name], np.array([t0]), np.array([tf]), self.law.places)[0]
+                found.update(zip(self.U[:, i].tolist(), np.clip(values, control.lower, control.upper), strict=True))
+        return found
+
+    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """See `PhaseWriter.march`. There is nothing to solve."""
+        inputs = self._inputs(extended)
+        states, q, samples = self._fly(self._layout.pick(extended, self.ends.initial), *inputs)
+        extended = self._filled(extended, states, q, samples, inputs)
+        right = states[:, (self._shots[1:] - 1).tolist()]
+        slots = self.B[1:] if self.apart else self.B[-1:]
+        return self._layout.replaced(extended, slots.ravel(), ca.vec(right)), states[:, -1], ca.MX(0, 1)
+
+    def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
+        """See `PhaseWriter.sensitivity`."""
+        nx, nq, n, k = len(self.phase.states), len(self.Q), self.mesh.steps, self.step.inputs
+        inputs = self._inputs(extended)
+        initial = self._layout.pick(extended, self.ends.initial)
+        states = self._fly(initial, *inputs)[0]
+        before = ca.horzcat(initial, states[:, :-1])
+        blocks = ca.horzsplit(self.step.gradient(samples=interior).map(n)(before, *inputs), k)
+        edges, q, seen = [S[self._layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
+        for i, D in enumerate(blocks):
+            out = D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer[i]
+            edges.append(out[:nx, :])
+            q += out[nx : nx + nq, :]
+            seen.append(out[nx + nq :, :])
+        slots, values = [self.R, self.Q], [*(edges[i] for i in self._shots[1:]), q]
+        if self.apart:
+            slots, values = [self.B[1:], *slots], [*(edges[i] for i in self._shots[1:]), *values]
+        else:
+            slots, values = [self.B[-1:], *slots], [edges[-1], *values]
+        if interior:
+            if len(self.W) > n * len(self.step.points):
+                C, starts, lengths, s = inputs
+                D = self.step.end_gradient(states[:, -1], C[:, -self.law.degree - 1 :], starts[-1], lengths[-1], s[:, -1])
+                seen.append(D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer[n - 1])
+            slots, values = [*slots, self.Y, self.W], [*values, *(edges[i] for i in self.mesh.ends[1:-1] if len(self.Y)), *seen]
+        return self._layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), edges[n]
+
+    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
+        """See `PhaseWriter.interpolate`."""
+        length = flown.tf - flown.t0
+        values = flown.control(flown.t0 + length * self.law.places)
+        self._layout.write(extended, self.U, wrapped(values, self.phase.controls)[None])
+        nodes = self.mesh.places[self.mesh.ends][1:-1] if self.apart else np.empty(0)
+        self._layout.write(extended, self.B[1:-1], flown.state(flown.t0 + length * nodes)[None])
+
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """See `PhaseWriter.unpack`."""
+        phase, k = self.phase, self.law.degree + 1
+        C, states = (np.array(values) for values in self._flight(extended))
+        s = extended[self._layout.index(self.ends.statics)]
+        edges = s[0] + (s[1] - s[0]) * self.mesh.places
+        control = PiecewisePolynomial(edges, C.T.reshape(self.mesh.steps, k, len(phase.controls)), "lobatto")
+        table = states.T.reshape(self.mesh.steps, -1, len(phase.states))
+        B = extended[self._layout.index(self.B)].reshape(self.B.shape)
+        shots = self._shots
+        table[shots[:-1], 0], table[shots[1:] - 1, -1] = B[:-1], B[1:]
+        state = PiecewisePolynomial(edges, table, "lobatto")
+        inside = 2.0 * np.array([place for place in self.step.points if place < 1.0]) - 1.0
+        time = np.append((edges[:-1, None] + 0.5 * (1.0 + inside) * np.diff(edges)[:, None]).ravel(), edges[-1])
+        every = range(self.mesh.steps)
+        nodes = np.vstack([*(state.on_element(j, inside) for j in every), B[-1:]])
+        controls = np.vstack([*(control.on_element(j, inside) for j in every), control.ends()[1][-1:]])
+        controls = wrapped(controls, phase.controls)
+        paths = np.array(phase.path(nodes.T, controls.T, time[None], s)).T
+        return PhaseTrajectory(
+            name=phase.name,
+            time_unit=phase.time_unit,
+            time=time,
+            states=nodes,
+            controls=controls,
+            paths=paths.reshape(len(time), len(phase.paths)),
+            state=state,
+            control=control,
+            state_variables=phase.states,
+            control_variables=phase.controls,
+            path_limits=phase.paths,
+        )
+
+    @cached_property
+    def _flight(self) -> ca.Function:
+        """Extended vector -> (coefficients of the controls, states (nx, N (order + 1)) at Gauss-Lobatto nodes of the steps)."""
+        extended = ca.MX.sym("extended", self._layout.total)
+        inputs = self._inputs(extended)
+        left, before = self._layout.pick(extended, self.B[:-1]), []
+        for j, (first, last) in enumerate(zip(self._shots[:-1], self._shots[1:], strict=True)):
+            before += [left[:, j], self._fly(left[:, j], *self._part(inputs, first, last))[0][:, :-1]]
+        places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
+        states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
+        return ca.Function("unpacked", [extended], [inputs[0], states])
+
+    def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
+        """What else goes into the steps, side by side: coefficients of the controls, starts, lengths, and s."""
+        s = self._layout.pick(extended, self.ends.statics)
+        places, length = self.mesh.places, s[1] - s[0]
+        C = self.law.coefficients(self._layout.pick(extended, self.U), places, self.phase)
+        starts, lengths = s[0] + length * ca.DM(places[:-1]).T, length * ca.DM(np.diff(places)).T
+        return C, starts, lengths, ca.repmat(s, 1, self.mesh.steps)
+
+    def _part(self, inputs: tuple[ca.MX, ...], first: int, last: int) -> tuple[ca.MX, ...]:
+        """The inputs of some of the steps."""
+        C, *others = inputs
+        k = self.law.degree + 1
+        return C[:, int(first) * k : int(last) * k], *(values[:, int(first) : int(last)] for values in others)
+
+    def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
+        nx, n = len(self.phase.states), inputs[1].shape[1]
+        step = self.step.forward
+        # Derivatives of a long chain written out would take all memory there is.
+        name = CHAIN if n * work(step) * len(self._layout.free) > LONG else "steps"
+        y, samples = (step.mapaccum(name, n) if n > 1 else step)(ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *inputs)
+        return y[:nx, :], y[nx:, -1], samples
+
+    def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX, inputs: tuple[ca.MX, ...]) -> ca.MX:
+        """With the hidden quantities of a flight: states (nx, N) after each step, integrals, samples."""
+        if len(self.W) > samples.shape[1]:
+            C, starts, lengths, s = inputs
+            end = self.step.at_end(states[:, -1], C[:, -self.law.degree - 1 :], starts[:, -1], lengths[:, -1], s[:, -1])
+            samples = ca.horzcat(samples, end)
+        at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
+        right = states[:, (self._shots[1:] - 1).tolist()]
+        slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W)])
+        return self._layout.replaced(extended, slots, ca.veccat(right, at_nodes, q, samples))
+
+    def _at_ends(self, C: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Controls (nu,) at the beginning and at the end of the phase."""
+        k = self.law.degree + 1
+        first, last = basis_matrix("lobatto", self.law.degree, np.array([-1.0, 1.0]))
+        return wrapped_controls(C[:, :k] @ ca.DM(first), self.phase), wrapped_controls(C[:, -k:] @ ca.DM(last), self.phase)
+
+    @cached_property
+    def _outer(self) -> list[ca.DM]:
+        """Derivatives of the coefficients of the controls, the start, the length and s of each step by the free variables: constants."""
+        seeds, n = self._layout.seeds(), self.mesh.steps
+        U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
+        C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
+        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0))
+        controls = ca.vertsplit(by_values @ seeds[self._layout.index(self.U).tolist(), :], C.numel() // n) if C.numel() else [ca.DM(0, seeds.shape[1])] * n
+        statics = seeds[self._layout.index(self.ends.statics).tolist(), :]
+        length = statics[1, :] - statics[0, :]
+        places, widths = self.mesh.places[:-1], np.diff(self.mesh.places)
+        return [
+            ca.vertcat(mine, statics[0, :] + length * place, length * width, statics)
+            for mine, place, width in zip(controls, places.tolist(), widths.tolist(), strict=True)
+        ]
+
+    def _labels(self) -> list[str]:
+        """What a miss is called: an imposed final value enters the last row of its state, which therefore bears its name."""
+        names = [f"dynamics of {self.phase.name}.{v.name}" for v in self.phase.states]
+        last = [
+            f"final value of {self.phase.name}.{v.name}" if low == high else name
+            for v, (low, high), name in zip(self.phase.states, self.phase.final, names, strict=True)
+        ]
+        return names * (len(self.R) - 1) + last
