@@ -70,9 +70,11 @@ class Layout:
         return np.hstack([Z, np.zeros((len(Z), self.hidden)), constants])
 
     def extended_symbol(self, z: ca.MX) -> ca.MX:
-        """The extended vector of a symbol of the variables, or of these and the hidden quantities, which otherwise are 0."""
-        missing = len(self.variables) + self.hidden - z.shape[0]
-        return ca.vertcat(z, ca.DM.zeros(missing, 1), ca.DM(self._constants[::-1])) if missing or self._constants else z
+        """Extended vectors (total, k) of a symbol (..., k) of the variables, or of these and the hidden quantities, which otherwise are 0."""
+        missing, k = len(self.variables) + self.hidden - z.shape[0], z.shape[1]
+        if not missing and not self._constants:
+            return z
+        return ca.vertcat(z, ca.DM.zeros(missing, k), ca.repmat(ca.DM(self._constants[::-1]), 1, k))
 
     def seeds(self) -> ca.DM:
         """Derivatives (total, d) of an extended vector by its free variables, before anything follows from them."""

@@ -75,6 +75,8 @@ class PhaseWriter(ABC):
     """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
     compilable: bool
     """Whether what `march` does fast, and `sensitivity`, can be written in C."""
+    wide: bool = False
+    """Whether `march` takes several extended vectors side by side."""
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -98,8 +100,8 @@ class PhaseWriter(ABC):
 
         Parameters
         ----------
-        extended : MX (e, 1)
-            An extended symbol, of which the states are to be replaced.
+        extended : MX (e, 1), or (e, k) if the writer is `wide`
+            An extended symbol, of which the states are to be replaced. What comes back has as many columns.
         robust : bool
             To solve the equations of states by whatever it takes; otherwise fast, if need be with a residual.
 

@@ -14,6 +14,7 @@ from problems.compiled import Variable
 from .batched import Batched
 from .layout import Layout
 from .phase_writer import PhaseWriter
+from .widening import widened
 
 SOLVED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
@@ -45,8 +46,8 @@ class Reduced:
         Slots of the peaks, and z -> (p,), what they have to be; here and below, z are the variables and the hidden quantities.
     rest : tuple of Function and arrays (r,)
         z -> (r,), those constraints; their lower and upper limits and scales.
-    scores : Function, optional
-        z -> (F, g), to be known of whatever is propagated.
+    scores : Function and array (r,) of int, optional
+        z -> (F, g), to be known of whatever is propagated, and which of the rows of g are those constraints.
 
     Attributes
     ----------
@@ -62,12 +63,12 @@ class Reduced:
         writers: Sequence[PhaseWriter],
         peaks: tuple[np.ndarray, ca.Function],
         rest: tuple[ca.Function, np.ndarray, np.ndarray, np.ndarray],
-        scores: ca.Function | None = None,
+        scores: tuple[ca.Function, np.ndarray] | None = None,
     ) -> None:
         self._layout, self._writers = layout, writers
         self._peaks, self._largest = peaks
         self._rest, g_lower, g_upper, g_scale = rest
-        self._scores = scores
+        self._scores, self._left = scores or (None, np.empty(0))
         self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
         finals: list[tuple[Variable, tuple[float, float]]] = [
             pair for writer in writers for pair in zip(writer.phase.states, writer.phase.final, strict=True)
@@ -106,7 +107,8 @@ class Reduced:
 
     @cached_property
     def _quick(self) -> Batched:
-        return Batched(self._flight(robust=False), compiled=self._compilable)
+        wide = (lambda k: self._flight(robust=False, k=k)) if all(writer.wide for writer in self._writers) else None
+        return Batched(self._flight(robust=False), compiled=self._compilable, wide=wide)
 
     @cached_property
     def _robust(self) -> Batched:
@@ -124,18 +126,20 @@ class Reduced:
     def _compilable(self) -> bool:
         return all(writer.compilable for writer in self._writers)
 
-    def _flight(self, *, robust: bool) -> ca.Function:
-        """z -> (propagated z, values, residuals of the equations of states)."""
-        start = ca.MX.sym("z", len(self._layout.variables))
+    def _flight(self, *, robust: bool, k: int = 1) -> ca.Function:
+        """z -> (propagated z, values, residuals of the equations of states [, F, g]); for k vectors side by side, if writers are `wide`."""
+        start = ca.MX.sym("z", len(self._layout.variables), k)
         extended, finals, residuals = self._layout.extended_symbol(start), [], []
         for writer in self._writers:
             extended, final, residual = writer.march(extended, robust=robust)
             finals.append(final)
             residuals.append(residual)
-        z = extended[: start.numel() + self._layout.hidden]
-        z = self._layout.replaced(z, self._peaks, self._largest(z))
-        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], self._rest(z))
-        found = [z[: start.numel()], values, ca.vertcat(*residuals), *(self._scores(z) if self._scores else ())]
+        z = extended[: start.shape[0] + self._layout.hidden, :]
+        z = self._layout.replaced(z, self._peaks, widened(self._largest, k)(z))
+        scores = widened(self._scores, k).call([z]) if self._scores else []
+        rest = scores[1][self._left.tolist(), :] if scores else self._rest(z)
+        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], rest)
+        found = [z[: start.shape[0], :], values, ca.vertcat(*residuals), *scores]
         return ca.Function("flight", [start], [ca.densify(value) for value in found])
 
     def _total(self, *, interior: bool) -> ca.Function:

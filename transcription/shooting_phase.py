@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from .base import CHAIN
+from .base import CHAIN, expanded
 from .batched import work
 from .control_law import ControlLaw
 from .dfet_element import wrapped_controls
@@ -20,6 +20,7 @@ from .phase_writer import Ends, PhaseWriter, Rows, Written
 from .polynomials import basis_matrix, lobatto_nodes
 from .shooting_step import Step
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
+from .widening import widened
 
 SAME = 1e-9
 """Places nearer to each other than this, relative to the phase, are one."""
@@ -74,7 +75,7 @@ class ShootingPhase(PhaseWriter):
         points = mesh.steps * len(step.points) + (1.0 not in step.points)
         self.W = layout.add_hidden(points if step.rows else 0, step.rows)
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
-        self.compilable = step.symbolic
+        self.compilable = self.wide = step.symbolic
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """See `PhaseWriter.fill`."""
@@ -124,12 +125,16 @@ class ShootingPhase(PhaseWriter):
 
     def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.march`. There is nothing to solve."""
-        inputs = self._inputs(extended)
-        states, q, samples = self._fly(self._layout.pick(extended, self.ends.initial), *inputs)
-        extended = self._filled(extended, states, q, samples, inputs)
-        right = states[:, (self._shots[1:] - 1).tolist()]
-        slots = self.B[1:] if self.apart else self.B[-1:]
-        return self._layout.replaced(extended, slots.ravel(), ca.vec(right)), states[:, -1], ca.MX(0, 1)
+        k, n = extended.shape[1], self.mesh.steps
+        if k == 1:
+            before, after, chain = self._launched, self._landed, self._chain(n)
+        else:
+            before, after = widened(expanded(self._before), k), widened(expanded(self._after), k)
+            chain = self._chain(n, k)
+        y, *inputs = before(extended)
+        # Candidates have all their steps together; a step, all its candidates.
+        flown = chain(y, *(_regrouped(part, k, n) for part in inputs))
+        return *after(extended, *(_regrouped(part, n, k) for part in flown)), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
@@ -225,13 +230,40 @@ class ShootingPhase(PhaseWriter):
         k = self.law.degree + 1
         return C[:, int(first) * k : int(last) * k], *(values[:, int(first) : int(last)] for values in others)
 
+    def _launched(self, extended: ca.MX) -> tuple[ca.MX, ...]:
+        """What goes into the chain of all steps: states and integrals at the beginning, and `_inputs`."""
+        initial = self._layout.pick(extended, self.ends.initial)
+        return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *self._inputs(extended)
+
+    def _landed(self, extended: ca.MX, y: ca.MX, samples: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """The extended vector and the final states from what comes out of it."""
+        nx = len(self.phase.states)
+        extended = self._filled(extended, y[:nx, :], y[nx:, -1], samples, self._inputs(extended))
+        slots = self.B[1:] if self.apart else self.B[-1:]
+        return self._layout.replaced(extended, slots.ravel(), ca.vec(y[:nx, (self._shots[1:] - 1).tolist()])), y[:nx, -1]
+
+    @cached_property
+    def _before(self) -> ca.Function:
+        extended = ca.MX.sym("extended", self._layout.total)
+        return ca.Function("before", [extended], [ca.densify(part) for part in self._launched(extended)])
+
+    @cached_property
+    def _after(self) -> ca.Function:
+        step, n = self.step.forward, self.mesh.steps
+        inputs = [ca.MX.sym("extended", self._layout.total), *(ca.MX.sym("flown", rows, columns * n) for rows, columns in map(step.size_out, (0, 1)))]
+        return ca.Function("after", inputs, [ca.densify(part) for part in self._landed(*inputs)])
+
+    def _chain(self, n: int, k: int = 1) -> ca.Function:
+        """(states and integrals so far, inputs of n steps) -> (these after each step, samples), for k candidates at once."""
+        # Derivatives of a long chain written out would take all memory there is.
+        name = CHAIN if n * work(self.step.forward) * len(self._layout.free) > LONG else "steps"
+        step = widened(self.step.forward, k)
+        return step.mapaccum(name, n) if n > 1 else step
+
     def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
-        nx, n = len(self.phase.states), inputs[1].shape[1]
-        step = self.step.forward
-        # Derivatives of a long chain written out would take all memory there is.
-        name = CHAIN if n * work(step) * len(self._layout.free) > LONG else "steps"
-        y, samples = (step.mapaccum(name, n) if n > 1 else step)(ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *inputs)
+        nx = len(self.phase.states)
+        y, samples = self._chain(inputs[1].shape[1])(ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *inputs)
         return y[:nx, :], y[nx:, -1], samples
 
     def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX, inputs: tuple[ca.MX, ...]) -> ca.MX:
@@ -275,3 +307,11 @@ class ShootingPhase(PhaseWriter):
             for v, (low, high), name in zip(self.phase.states, self.phase.final, names, strict=True)
         ]
         return names * (len(self.R) - 1) + last
+
+
+def _regrouped(values: ca.MX, outer: int, inner: int) -> ca.MX:
+    """Columns that come in `outer` groups of `inner` blocks each, as `inner` groups of the same blocks."""
+    if 1 in (outer, inner) or not values.numel():
+        return values
+    order = np.arange(values.numel()).reshape(outer, inner, -1).transpose(1, 0, 2).ravel()
+    return ca.reshape(ca.vec(values)[order.tolist()], *values.shape)
