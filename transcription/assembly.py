@@ -58,8 +58,10 @@ class Assembly:
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
-        scores = expanded(ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"]))
-        largest_peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
+        scores = ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])
+        largest_peaks = ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"])
+        if not self.layout.hidden:
+            largest_peaks = expanded(largest_peaks)
         self._largest = Batched(self._filled(largest_peaks))
         return NLP(
             problem=self.problem,
@@ -110,7 +112,7 @@ class Assembly:
     def _filled(self, function: ca.Function) -> ca.Function:
         """A Function of the variables alone from one of these and the hidden quantities."""
         if not self.layout.hidden:
-            return function
+            return expanded(function)
         z = ca.MX.sym("z", len(self.layout.variables))
         extended = self.layout.extended_symbol(z)
         for writer in self._writers.values():

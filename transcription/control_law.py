@@ -71,7 +71,7 @@ class ControlLaw:
         ----------
         U : MX (nu, count)
         steps : array (N + 1,)
-            Where, relative to the phase, the steps begin and end; all nodes are among these.
+            Where, relative to the phase, steps begin and end that follow each other; no node lies inside one.
         phase : CompiledPhase
 
         Returns
@@ -105,7 +105,7 @@ class ControlLaw:
             t, r = place, 1.0 - place
             ends = [(piece, (1.0 + 2.0 * t) * r**2), (piece + 1, (1.0 + 2.0 * r) * t**2)]
             parts = [*ends, (self.nodes + piece, t * r**2), (self.nodes + piece + 1, -r * t**2)]
-        table = np.zeros((max(int(rows.max()) for rows, _ in parts) + 1, len(place)))
+        table = np.zeros(({"constant": last, "linear": 2 * last, "spline": 2 * self.nodes}[self.kind], len(place)))
         for rows, weights in parts:
             table[rows, columns] += weights
         return table

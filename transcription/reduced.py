@@ -14,7 +14,6 @@ from problems.compiled import Variable
 from .batched import Batched
 from .layout import Layout
 from .phase_writer import PhaseWriter
-from .widening import widened
 
 SOLVED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
@@ -135,8 +134,8 @@ class Reduced:
             finals.append(final)
             residuals.append(residual)
         z = extended[: start.shape[0] + self._layout.hidden, :]
-        z = self._layout.replaced(z, self._peaks, widened(self._largest, k)(z))
-        scores = widened(self._scores, k).call([z]) if self._scores else []
+        z = self._layout.replaced(z, self._peaks, self._largest.map(k)(z))
+        scores = self._scores.map(k).call([z]) if self._scores else []
         rest = scores[1][self._left.tolist(), :] if scores else self._rest(z)
         values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], rest)
         found = [z[: start.shape[0], :], values, ca.vertcat(*residuals), *scores]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -79,18 +80,13 @@ class ShootingPhase(PhaseWriter):
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """See `PhaseWriter.fill`."""
-        inputs = self._inputs(extended)
-        left, flown = self._layout.pick(extended, self.B[:-1]), []
-        for j, (first, last) in enumerate(zip(self._shots[:-1], self._shots[1:], strict=True)):
-            flown.append(self._fly(left[:, j], *self._part(inputs, first, last)))
-        states, integrals, samples = zip(*flown, strict=True)
-        return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples), inputs)
+        states, integrals, samples = zip(*self._shots_flown(extended), strict=True)
+        return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
         phase, pick, n = self.phase, self._layout.pick, len(self.R)
-        right = self.B[1:] if self.apart else self.B[-1:]
-        residual = pick(extended, self.R) - pick(extended, right)
+        residual = pick(extended, self.R) - pick(extended, self._arrivals)
         rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], n), self._labels(), marched=True)
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
@@ -98,14 +94,13 @@ class ShootingPhase(PhaseWriter):
         seen = pick(extended, self.W)
         for k, limit in enumerate(phase.paths):
             rows.add(seen[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
-        C = self._inputs(extended)[0]
-        first, last = self._at_ends(C)
-        return Written(first, last, pick(extended, self.Q), seen[len(phase.paths) :, :])
+        first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
+        return Written(self._control(first, 0.0), self._control(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
 
     def guess(self, extended: np.ndarray) -> None:
         """See `PhaseWriter.guess`."""
         t0, tf, share = extended[:, self.ends.t0], extended[:, self.ends.tf], self.mesh.places[self.mesh.ends][1:]
-        slots = self.B[1:] if self.apart else self.B[-1:]
+        slots = self._arrivals
         for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
             start = extended[:, self.ends.initial[i]]
             end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
@@ -126,42 +121,32 @@ class ShootingPhase(PhaseWriter):
     def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.march`. There is nothing to solve."""
         k, n = extended.shape[1], self.mesh.steps
-        if k == 1:
-            before, after, chain = self._launched, self._landed, self._chain(n)
-        else:
-            before, after = widened(expanded(self._before), k), widened(expanded(self._after), k)
-            chain = self._chain(n, k)
-        y, *inputs = before(extended)
-        # Candidates have all their steps together; a step, all its candidates.
-        flown = chain(y, *(_regrouped(part, k, n) for part in inputs))
-        return *after(extended, *(_regrouped(part, n, k) for part in flown)), ca.MX(0, k)
+        y, *inputs = self._before.map(k)(extended)
+        # A candidate has all its steps together; the chain goes from step to step with all candidates.
+        flown = self._chain(n, k)(y, *(_regrouped(part, k, n) for part in inputs))
+        return *self._after.map(k)(extended, *(_regrouped(part, n, k) for part in flown)), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
-        nx, nq, n, k = len(self.phase.states), len(self.Q), self.mesh.steps, self.step.inputs
-        inputs = self._inputs(extended)
-        initial = self._layout.pick(extended, self.ends.initial)
+        nx, nq, n = len(self.phase.states), len(self.Q), self.mesh.steps
+        inputs, initial = self._inputs(extended), self._layout.pick(extended, self.ends.initial)
         states = self._fly(initial, *inputs)[0]
         before = ca.horzcat(initial, states[:, :-1])
-        blocks = ca.horzsplit(self.step.gradient(samples=interior).map(n)(before, *inputs), k)
-        edges, q, seen = [S[self._layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
+        blocks = ca.horzsplit(self.step.gradient(samples=interior).map(n)(before, *inputs), self.step.inputs)
+        ends, q, seen = [S[self._layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
         for i, D in enumerate(blocks):
-            out = D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer[i]
-            edges.append(out[:nx, :])
+            out = D[:, :nx] @ ends[-1] + D[:, nx:] @ self._outer[i]
+            ends.append(out[:nx, :])
             q += out[nx : nx + nq, :]
             seen.append(out[nx + nq :, :])
-        slots, values = [self.R, self.Q], [*(edges[i] for i in self._shots[1:]), q]
-        if self.apart:
-            slots, values = [self.B[1:], *slots], [*(edges[i] for i in self._shots[1:]), *values]
-        else:
-            slots, values = [self.B[-1:], *slots], [edges[-1], *values]
+        arrivals = [ends[i] for i in self._shots[1:]]
+        slots, values = [self._arrivals, self.R, self.Q], [*arrivals, *arrivals, q]
         if interior:
             if len(self.W) > n * len(self.step.points):
-                C, starts, lengths, s = inputs
-                D = self.step.end_gradient(states[:, -1], C[:, -self.law.degree - 1 :], starts[-1], lengths[-1], s[:, -1])
-                seen.append(D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer[n - 1])
-            slots, values = [*slots, self.Y, self.W], [*values, *(edges[i] for i in self.mesh.ends[1:-1] if len(self.Y)), *seen]
-        return self._layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), edges[n]
+                D = self.step.end_gradient(states[:, -1], *self._inputs(extended, n - 1))
+                seen.append(D[:, :nx] @ ends[-1] + D[:, nx:] @ self._outer[n - 1])
+            slots, values = [*slots, self.Y, self.W], [*values, *(ends[i] for i in self.mesh.ends[1:-1] if len(self.Y)), *seen]
+        return self._layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), ends[n]
 
     def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
         """See `PhaseWriter.interpolate`."""
@@ -204,54 +189,34 @@ class ShootingPhase(PhaseWriter):
             path_limits=phase.paths,
         )
 
+    @property
+    def _arrivals(self) -> np.ndarray:
+        """Slots of the states at the ends of what is flown in one go, as variables."""
+        return self.B[1:] if self.apart else self.B[-1:]
+
     @cached_property
     def _flight(self) -> ca.Function:
         """Extended vector -> (coefficients of the controls, states (nx, N (order + 1)) at Gauss-Lobatto nodes of the steps)."""
         extended = ca.MX.sym("extended", self._layout.total)
-        inputs = self._inputs(extended)
-        left, before = self._layout.pick(extended, self.B[:-1]), []
-        for j, (first, last) in enumerate(zip(self._shots[:-1], self._shots[1:], strict=True)):
-            before += [left[:, j], self._fly(left[:, j], *self._part(inputs, first, last))[0][:, :-1]]
+        inputs, left = self._inputs(extended), self._layout.pick(extended, self.B[:-1])
+        before = [part for j, (states, *_) in enumerate(self._shots_flown(extended)) for part in (left[:, j], states[:, :-1])]
         places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
         states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
         return ca.Function("unpacked", [extended], [inputs[0], states])
 
-    def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
-        """What else goes into the steps, side by side: coefficients of the controls, starts, lengths, and s."""
+    def _inputs(self, extended: ca.MX, first: int = 0, last: int | None = None) -> tuple[ca.MX, ...]:
+        """What else goes into the steps, or some of them, side by side: coefficients of the controls, starts, lengths, and s."""
         s = self._layout.pick(extended, self.ends.statics)
-        places, length = self.mesh.places, s[1] - s[0]
+        places = self.mesh.places[first : None if last is None else last + 1]
         C = self.law.coefficients(self._layout.pick(extended, self.U), places, self.phase)
+        length = s[1] - s[0]
         starts, lengths = s[0] + length * ca.DM(places[:-1]).T, length * ca.DM(np.diff(places)).T
-        return C, starts, lengths, ca.repmat(s, 1, self.mesh.steps)
+        return C, starts, lengths, ca.repmat(s, 1, len(places) - 1)
 
-    def _part(self, inputs: tuple[ca.MX, ...], first: int, last: int) -> tuple[ca.MX, ...]:
-        """The inputs of some of the steps."""
-        C, *others = inputs
-        k = self.law.degree + 1
-        return C[:, int(first) * k : int(last) * k], *(values[:, int(first) : int(last)] for values in others)
-
-    def _launched(self, extended: ca.MX) -> tuple[ca.MX, ...]:
-        """What goes into the chain of all steps: states and integrals at the beginning, and `_inputs`."""
-        initial = self._layout.pick(extended, self.ends.initial)
-        return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *self._inputs(extended)
-
-    def _landed(self, extended: ca.MX, y: ca.MX, samples: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """The extended vector and the final states from what comes out of it."""
-        nx = len(self.phase.states)
-        extended = self._filled(extended, y[:nx, :], y[nx:, -1], samples, self._inputs(extended))
-        slots = self.B[1:] if self.apart else self.B[-1:]
-        return self._layout.replaced(extended, slots.ravel(), ca.vec(y[:nx, (self._shots[1:] - 1).tolist()])), y[:nx, -1]
-
-    @cached_property
-    def _before(self) -> ca.Function:
-        extended = ca.MX.sym("extended", self._layout.total)
-        return ca.Function("before", [extended], [ca.densify(part) for part in self._launched(extended)])
-
-    @cached_property
-    def _after(self) -> ca.Function:
-        step, n = self.step.forward, self.mesh.steps
-        inputs = [ca.MX.sym("extended", self._layout.total), *(ca.MX.sym("flown", rows, columns * n) for rows, columns in map(step.size_out, (0, 1)))]
-        return ca.Function("after", inputs, [ca.densify(part) for part in self._landed(*inputs)])
+    def _control(self, C: ca.MX, place: float) -> ca.MX:
+        """Controls (nu,) at a place in [0, 1] of a step, by its coefficients."""
+        weights = basis_matrix("lobatto", self.law.degree, np.array([2.0 * place - 1.0])).T
+        return wrapped_controls(C @ ca.DM(weights), self.phase)
 
     def _chain(self, n: int, k: int = 1) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples), for k candidates at once."""
@@ -263,25 +228,47 @@ class ShootingPhase(PhaseWriter):
     def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
         nx = len(self.phase.states)
-        y, samples = self._chain(inputs[1].shape[1])(ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1)), *inputs)
+        y, samples = self._chain(inputs[1].shape[1])(self._begun(initial), *inputs)
         return y[:nx, :], y[nx:, -1], samples
 
-    def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX, inputs: tuple[ca.MX, ...]) -> ca.MX:
+    def _shots_flown(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
+        """What `_fly` gives of each shot, from its own initial states."""
+        k, left = self.law.degree + 1, self._layout.pick(extended, self.B[:-1])
+        C, *others = self._inputs(extended)
+        return [
+            self._fly(left[:, j], C[:, first * k : last * k], *(values[:, first:last] for values in others))
+            for j, (first, last) in enumerate(pairwise(self._shots.tolist()))
+        ]
+
+    @cached_property
+    def _before(self) -> ca.Function:
+        """Extended vector -> what goes into the chain of all steps."""
+        extended = ca.MX.sym("extended", self._layout.total)
+        inputs = self._begun(self._layout.pick(extended, self.ends.initial)), *self._inputs(extended)
+        return ca.Function("before", [extended], [ca.densify(part) for part in inputs])
+
+    @cached_property
+    def _after(self) -> ca.Function:
+        """(extended vector, what comes out of it) -> (the same with the states and hidden quantities, final states)."""
+        nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
+        extended = ca.MX.sym("extended", self._layout.total)
+        y, samples = (ca.MX.sym(f"flown{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
+        filled = self._filled(extended, y[:nx, :], y[nx:, -1], samples)
+        filled = self._layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
+        return ca.Function("after", [extended, y, samples], [ca.densify(filled), ca.densify(y[:nx, -1])])
+
+    def _begun(self, initial: ca.MX) -> ca.MX:
+        """States, and integrals of nothing yet."""
+        return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1))
+
+    def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> ca.MX:
         """With the hidden quantities of a flight: states (nx, N) after each step, integrals, samples."""
         if len(self.W) > samples.shape[1]:
-            C, starts, lengths, s = inputs
-            end = self.step.at_end(states[:, -1], C[:, -self.law.degree - 1 :], starts[:, -1], lengths[:, -1], s[:, -1])
-            samples = ca.horzcat(samples, end)
+            samples = ca.horzcat(samples, self.step.at_end(states[:, -1], *self._inputs(extended, self.mesh.steps - 1)))
         at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
         right = states[:, (self._shots[1:] - 1).tolist()]
         slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W)])
         return self._layout.replaced(extended, slots, ca.veccat(right, at_nodes, q, samples))
-
-    def _at_ends(self, C: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Controls (nu,) at the beginning and at the end of the phase."""
-        k = self.law.degree + 1
-        first, last = basis_matrix("lobatto", self.law.degree, np.array([-1.0, 1.0]))
-        return wrapped_controls(C[:, :k] @ ca.DM(first), self.phase), wrapped_controls(C[:, -k:] @ ca.DM(last), self.phase)
 
     @cached_property
     def _outer(self) -> list[ca.DM]:
@@ -290,13 +277,13 @@ class ShootingPhase(PhaseWriter):
         U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
         C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
         by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0))
-        controls = ca.vertsplit(by_values @ seeds[self._layout.index(self.U).tolist(), :], C.numel() // n) if C.numel() else [ca.DM(0, seeds.shape[1])] * n
+        controls = by_values @ seeds[self._layout.index(self.U).tolist(), :]
         statics = seeds[self._layout.index(self.ends.statics).tolist(), :]
-        length = statics[1, :] - statics[0, :]
-        places, widths = self.mesh.places[:-1], np.diff(self.mesh.places)
+        length, each = statics[1, :] - statics[0, :], C.numel() // n
+        places, widths = self.mesh.places[:-1].tolist(), np.diff(self.mesh.places).tolist()
         return [
-            ca.vertcat(mine, statics[0, :] + length * place, length * width, statics)
-            for mine, place, width in zip(controls, places.tolist(), widths.tolist(), strict=True)
+            ca.vertcat(controls[i * each : (i + 1) * each, :], statics[0, :] + length * places[i], length * widths[i], statics)
+            for i in range(n)
         ]
 
     def _labels(self) -> list[str]:
