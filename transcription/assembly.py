@@ -131,7 +131,7 @@ class Assembly:
             (np.concatenate(self._peaks), peaks),
             (function, lower, upper, scale),
             # What hangs on hidden quantities is looked at where these are flown; elsewhere on demand.
-            (scores, np.flatnonzero(np.repeat(~np.array(rows.marched), [e.numel() for e in rows.expressions]))) if self.layout.hidden else None,
+            (scores, rows.left) if self.layout.hidden else None,
         )
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:

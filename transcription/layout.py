@@ -10,7 +10,6 @@ import numpy as np
 
 from problems.compiled import Variable
 
-
 HIDDEN = 2**40
 """Slots from here on are those of hidden quantities: how many variables come before them is known only in the end."""
 
@@ -70,7 +69,7 @@ class Layout:
         return np.hstack([Z, np.zeros((len(Z), self.hidden)), constants])
 
     def extended_symbol(self, z: ca.MX) -> ca.MX:
-        """Extended vectors (total, k) of a symbol (..., k) of the variables, or of these and the hidden quantities, which otherwise are 0."""
+        """Extended vectors (total, k) of a symbol (..., k) of the variables, and perhaps the hidden quantities, else 0."""
         missing, k = len(self.variables) + self.hidden - z.shape[0], z.shape[1]
         if not missing and not self._constants:
             return z

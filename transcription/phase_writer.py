@@ -55,6 +55,11 @@ class Rows:
         self.marched.append(marched)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
 
+    @property
+    def left(self) -> np.ndarray:
+        """Indices of the rows that propagation does not satisfy."""
+        return np.flatnonzero(np.repeat(~np.array(self.marched, dtype=bool), [e.numel() for e in self.expressions]))
+
 
 @dataclass(frozen=True, eq=False)
 class Written:

@@ -23,7 +23,7 @@ MOST = 20_000_000
 
 @dataclass(frozen=True, eq=False)
 class Flown:
-    """Propagated vectors `Z` (k, n), the values (k, rows) of what is left to satisfy and, where it shows on the way, F (k, m) and g (k, r)."""
+    """Propagated vectors `Z` (k, n), the values (k, rows) of what is left to satisfy, and F (k, m) and g (k, r) if they show on the way."""
 
     Z: np.ndarray
     values: np.ndarray
@@ -67,7 +67,7 @@ class Reduced:
         self._layout, self._writers = layout, writers
         self._peaks, self._largest = peaks
         self._rest, g_lower, g_upper, g_scale = rest
-        self._scores, self._left = scores or (None, np.empty(0))
+        self._scores = scores
         self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
         finals: list[tuple[Variable, tuple[float, float]]] = [
             pair for writer in writers for pair in zip(writer.phase.states, writer.phase.final, strict=True)
@@ -133,13 +133,19 @@ class Reduced:
             extended, final, residual = writer.march(extended, robust=robust)
             finals.append(final)
             residuals.append(residual)
-        z = extended[: start.shape[0] + self._layout.hidden, :]
-        z = self._layout.replaced(z, self._peaks, self._largest.map(k)(z))
-        scores = self._scores.map(k).call([z]) if self._scores else []
-        rest = scores[1][self._left.tolist(), :] if scores else self._rest(z)
-        values = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], z[self._dependent.tolist(), :], rest)
-        found = [z[: start.shape[0], :], values, ca.vertcat(*residuals), *scores]
-        return ca.Function("flight", [start], [ca.densify(value) for value in found])
+        z, *found = self._judged().map(k).call([extended, ca.vertcat(*finals)])
+        return ca.Function("flight", [start], [ca.densify(value) for value in (z, found[0], ca.vertcat(*residuals), *found[1:])])
+
+    def _judged(self) -> ca.Function:
+        """(propagated extended vector, final states of all phases) -> (z with its peaks, values [, F, g])."""
+        n, count = len(self._layout.variables), sum(len(writer.phase.states) for writer in self._writers)
+        extended, finals = ca.MX.sym("extended", self._layout.total), ca.MX.sym("finals", count)
+        z = extended[: n + self._layout.hidden]
+        z = self._layout.replaced(z, self._peaks, self._largest(z))
+        scores = self._scores[0].call([z]) if self._scores else []
+        rest = scores[1][self._scores[1].tolist(), :] if self._scores else self._rest(z)
+        values = ca.vertcat(finals[self._imposed.tolist(), :], z[self._dependent.tolist(), :], rest)
+        return ca.Function("judged", [extended, finals], [ca.densify(value) for value in (z[:n], values, *scores)])
 
     def _total(self, *, interior: bool) -> ca.Function:
         """Propagated z -> total derivatives of the values by the free variables, (d, rows); without `interior`, of the rows that need none

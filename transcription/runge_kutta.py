@@ -133,4 +133,4 @@ TABLEAUX: dict[str, Tableau] = {
         _cooper_verner(),
     )
 }
-"""All there are: Euler, explicit midpoint, Heun (trapezoidal), Kutta's third order, the classical one, the 3/8 rule, Cooper and Verner's."""
+"""All there are: Euler, explicit midpoint, Heun (trapezoidal), Kutta's third order, the classical one, the 3/8 rule, Cooper and Verner."""

@@ -27,7 +27,7 @@ from .shooting_step import Step
 from .stability import check_steps
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Shooting(Transcription):
     """What single and multiple shooting have in common.
 
@@ -95,6 +95,9 @@ class Shooting(Transcription):
         settings = asdict(self)
         return {"method": type(self).__name__, "settings": {**{name: settings[name] for name in self._counted}, **settings}}
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.to_dict()['settings'].items())})"
+
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`. Raises ValueError, too, where steps are too long to be stable."""
         compiled = problem.compile() if isinstance(problem, Problem) else problem
@@ -112,7 +115,7 @@ class Shooting(Transcription):
         return Assembly(compiled, writer).nlp(self)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SingleShooting(Shooting):
     """Each phase is integrated in one go from its initial states; its final states are the only ones that are variables.
 
@@ -143,7 +146,7 @@ class SingleShooting(Shooting):
         return False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MultipleShooting(Shooting):
     """The states at the nodes between equal intervals are variables of their own, and each interval is integrated from its left one.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from .base import CHAIN, expanded
+from .base import CHAIN
 from .batched import work
 from .control_law import ControlLaw
 from .dfet_element import wrapped_controls
@@ -121,10 +121,13 @@ class ShootingPhase(PhaseWriter):
     def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.march`. There is nothing to solve."""
         k, n = extended.shape[1], self.mesh.steps
-        y, *inputs = self._before.map(k)(extended)
-        # A candidate has all its steps together; the chain goes from step to step with all candidates.
-        flown = self._chain(n, k)(y, *(_regrouped(part, k, n) for part in inputs))
-        return *self._after.map(k)(extended, *(_regrouped(part, n, k) for part in flown)), ca.MX(0, k)
+        begun = self._before.map(k)(extended)
+        if k == 1:
+            return *self._after(extended, *self._chain(n)(*begun)), ca.MX(0, 1)
+        step = self.step.forward
+        flown = widened(step, k).mapaccum("steps", n)(_by_step(begun[0], k, 1), *(_by_step(part, k, n) for part in begun[1:]))
+        back = (_by_candidate(part, k, n, step.size_out(i)) for i, part in enumerate(flown))
+        return *self._after.map(k)(extended, *back), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
@@ -218,12 +221,11 @@ class ShootingPhase(PhaseWriter):
         weights = basis_matrix("lobatto", self.law.degree, np.array([2.0 * place - 1.0])).T
         return wrapped_controls(C @ ca.DM(weights), self.phase)
 
-    def _chain(self, n: int, k: int = 1) -> ca.Function:
-        """(states and integrals so far, inputs of n steps) -> (these after each step, samples), for k candidates at once."""
+    def _chain(self, n: int) -> ca.Function:
+        """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
         # Derivatives of a long chain written out would take all memory there is.
         name = CHAIN if n * work(self.step.forward) * len(self._layout.free) > LONG else "steps"
-        step = widened(self.step.forward, k)
-        return step.mapaccum(name, n) if n > 1 else step
+        return self.step.forward.mapaccum(name, n) if n > 1 else self.step.forward
 
     def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
@@ -296,9 +298,13 @@ class ShootingPhase(PhaseWriter):
         return names * (len(self.R) - 1) + last
 
 
-def _regrouped(values: ca.MX, outer: int, inner: int) -> ca.MX:
-    """Columns that come in `outer` groups of `inner` blocks each, as `inner` groups of the same blocks."""
-    if 1 in (outer, inner) or not values.numel():
-        return values
-    order = np.arange(values.numel()).reshape(outer, inner, -1).transpose(1, 0, 2).ravel()
-    return ca.reshape(ca.vec(values)[order.tolist()], *values.shape)
+def _by_step(values: ca.MX, k: int, n: int) -> ca.MX:
+    """What k candidates, side by side, have for n steps each: one row a candidate, step after step."""
+    order = np.arange(values.numel()).reshape(k, n, -1).transpose(1, 2, 0).ravel()
+    return ca.reshape(ca.vec(values)[order.tolist()], k, len(order) // k) if len(order) else ca.MX(k, 0)
+
+
+def _by_candidate(values: ca.MX, k: int, n: int, size: tuple[int, int]) -> ca.MX:
+    """The way back, for matrices of this size of each candidate and step."""
+    order = np.arange(values.numel()).reshape(n, -1, k).transpose(2, 0, 1).ravel()
+    return ca.reshape(ca.vec(values)[order.tolist()], size[0], size[1] * n * k) if len(order) else ca.MX(size[0], size[1] * n * k)

@@ -80,8 +80,9 @@ class Step:
     @cached_property
     def end_gradient(self) -> ca.Function:
         """(x at the end, C, start, h, s) -> derivatives (rows, inputs) of the samples there."""
-        inputs = [self._kind.sym("x", len(self.phase.states)), *self._symbols()]
-        return self._function("end_gradient", inputs, [ca.jacobian(self._sample(*inputs[:2], 1.0, *inputs[2:]), ca.veccat(*inputs))])
+        x, (C, start, h, s) = self._kind.sym("x", len(self.phase.states)), self._symbols()
+        inputs = [x, C, start, h, s]
+        return self._function("end_gradient", inputs, [ca.jacobian(self._sample(x, C, 1.0, start, h, s), ca.veccat(*inputs))])
 
     @property
     def _kind(self) -> Any:

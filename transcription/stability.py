@@ -59,8 +59,8 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, w
         cure = f"{count}={ceil(value * enough[0]) + 1} or more, or steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
         raise ValueError(
             f"{who}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate of "
-            f"{-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and there are "
-            f"{n}; take {cure}"
+            f"{-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and there "
+            f"are {n}; take {cure}"
         )
 
 
