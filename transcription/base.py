@@ -150,7 +150,7 @@ class NLP:
         residuals = self._residuals(z[None], self._batched(z[None])[1])
         worst: dict[str, float] = {}
         for label, residual in zip((*self._bound_labels, *self.g_labels), residuals[0], strict=True):
-            worst[label] = float(np.fmax(worst.get(label, 0.0), residual if np.isfinite(residual) else np.inf))
+            worst[label] = float(np.fmax(worst.get(label, 0.0), np.inf if np.isnan(residual) else residual))
         return worst
 
     def distance(self, Z: np.ndarray, other: np.ndarray) -> np.ndarray:

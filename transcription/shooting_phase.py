@@ -76,7 +76,7 @@ class ShootingPhase(PhaseWriter):
         points = mesh.steps * len(step.points) + (1.0 not in step.points)
         self.W = layout.add_hidden(points if step.rows else 0, step.rows)
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
-        self.compilable = self.wide = step.symbolic
+        self.compilable, self.wide = step.symbolic, step.plain
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """See `PhaseWriter.fill`."""
@@ -223,9 +223,12 @@ class ShootingPhase(PhaseWriter):
 
     def _chain(self, n: int) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
-        # Derivatives of a long chain written out would take all memory there is.
-        name = CHAIN if n * work(self.step.forward) * len(self._layout.free) > LONG else "steps"
-        return self.step.forward.mapaccum(name, n) if n > 1 else self.step.forward
+        chain = self.step.forward.mapaccum("steps", n) if n > 1 else self.step.forward
+        if work(chain) * len(self._layout.free) <= LONG:
+            return chain
+        # Its derivatives, written out, would take all memory there is.
+        symbols = chain.mx_in()
+        return ca.Function(CHAIN, symbols, chain.call(symbols))
 
     def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""

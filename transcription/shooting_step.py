@@ -39,7 +39,7 @@ class Step:
     inputs : int
         nx + (degree + 1) nu + 2 + len(s): how many numbers the states after the step are a function of.
     symbolic : bool
-        Whether the phase is made of scalar operations only, which is several times faster and can be compiled.
+        Whether the phase can be written as scalar operations and calls, which is several times faster and can be compiled.
     """
 
     def __init__(self, scheme: Tableau, degree: int, points: Sequence[float], phase: CompiledPhase) -> None:
@@ -55,8 +55,14 @@ class Step:
         """(y, C, start, h, s) -> (y after the step, samples (rows, points) in the order of time); y are states and integrals so far."""
         nx, nq = len(self.phase.states), self.phase.integrands.size1_out(0)
         y, others = self._kind.sym("y", nx + nq), self._symbols()
-        after, samples = self._whole(y[:nx], *others)
-        return self._function("step", [y, *others], [ca.vertcat(after[:nx], y[nx:] + after[nx:]), samples])
+        after, samples = self._whole(y[:nx, :], *others)
+        return self._function("step", [y, *others], [ca.vertcat(after[:nx, :], y[nx:, :] + after[nx:, :]), samples])
+
+    @property
+    def plain(self) -> bool:
+        """Whether there are no calls among them, of tables for instance."""
+        step = self.forward
+        return self.symbolic and all(step.instruction_id(i) != ca.OP_CALL for i in range(step.n_instructions()))
 
     @cached_property
     def at_end(self) -> ca.Function:
@@ -100,12 +106,12 @@ class Step:
         nx = len(self.phase.states)
 
         def rates(c: float, y: Any) -> Any:
-            inputs = y[:nx], self._controls(C, c), start + c * h, s
+            inputs = y[:nx, :], self._controls(C, c), start + c * h, s
             return ca.vertcat(self.phase.dynamics(*inputs), self.phase.integrands(*inputs))
 
         after, _ = self.scheme.step(rates, ca.vertcat(x, self._kind.zeros(self.phase.integrands.size1_out(0))), h)
         columns = [
-            self._sample(after[:nx] if place == 1.0 else self._reached(x, place, C, start, h, s), C, place, start, h, s)
+            self._sample(after[:nx, :] if place == 1.0 else self._reached(x, place, C, start, h, s), C, place, start, h, s)
             for place in self.points
         ]
         return after, ca.horzcat(self._kind(self.rows, 0), *columns)
