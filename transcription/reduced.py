@@ -100,8 +100,8 @@ class Reduced:
         found = np.empty((len(flown.Z), len(rows), d))
         some = max(1, MOST // max(1, count * d))
         for first in range(0, len(found), some):
-            (values,) = function(flown.Z[first : first + some])
-            found[first : first + some] = values.reshape(-1, count, d)[:, chosen]
+            part = flown.Z[first : first + some]
+            found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
         return found
 
     @cached_property
