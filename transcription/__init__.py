@@ -1,7 +1,7 @@
 """Floor 2: from a continuous problem to numbers and back: transcriptions, the inner level, trajectories, their independent check."""
 
 from .base import NLP, Transcription
-from .catalogue import from_dict, parse
+from .catalogue import from_dict, parse, word
 from .dfet import DFET
 from .inner import InnerResult, InnerSolver
 from .shooting import MultipleShooting, SingleShooting
@@ -22,4 +22,5 @@ __all__ = [
     "Transcription",
     "from_dict",
     "parse",
+    "word",
 ]

@@ -44,6 +44,21 @@ def _options(text: str, words: list[str]) -> dict[str, Any]:
     return found
 
 
+def word(method: Transcription) -> str | None:
+    """How a transcription is said in one word, such that `parse` gives it again; None if it cannot be."""
+    words: list[str] = []
+    if isinstance(method, DFET) and isinstance(method.elements, int):
+        words = [f"dfet:{method.elements}x{method.order}", f"dfet:{method.elements}x{method.order}:{method.basis}"]
+    elif isinstance(method, SingleShooting | MultipleShooting):
+        name = next(name for name, kind in SHOOTING.items() if isinstance(method, kind))
+        count = method.nodes if isinstance(method, SingleShooting) else method.intervals
+        said = [f"{name}:{count}" + (f"x{method.steps}" if method.steps > 1 else "")]
+        for value, default in ((method.control, "constant"), (method.control_nodes, None), (method.scheme, "rk4")):
+            said += [str(value)] if value != default else []
+        words = [":".join(said)]
+    return next((one for one in words if parse(one) == method), None)
+
+
 def from_dict(data: Mapping[str, Any]) -> Transcription:
     """A transcription from what `Transcription.to_dict` gave. Raises ValueError if there is no such method or setting."""
     method = data.get("method")

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from macs import MACS, Front, optimize
 from problems import Problem, goddard, load
 from transcription import DFET, MultipleShooting, SingleShooting, from_dict, parse
+from transcription import word as said
 from transcription.inner import inner_solver
 from transcription.runge_kutta import TABLEAUX
 from transcription.shooting_phase import StepMesh
@@ -429,11 +430,16 @@ def test_settings_pickle_and_come_back_from_plain_data(method):
     ],
 )
 def test_words_of_the_command_line(word, method):
-    assert parse(word) == method
+    assert parse(word) == method == parse(said(method))
+
+
+def test_what_cannot_be_said_in_a_word():
+    assert said(SingleShooting(9, path_points=1)) is None and said(DFET(3, 2, control_order=1)) is None
+    assert said(SingleShooting(9)) == "shooting:9" and said(DFET(3, 2)) == "dfet:3x2"
 
 
 @pytest.mark.parametrize(
-    ("word", "said"),
+    ("word", "message"),
     [
         ("shooting", "write it as dfet:4x6"),
         ("shooting:4x", "write it as"),
@@ -445,13 +451,13 @@ def test_words_of_the_command_line(word, method):
         ("dfet:4x6:lobatto:3", "write it as"),
     ],
 )
-def test_words_that_mean_nothing(word, said):
-    with pytest.raises(ValueError, match=said):
+def test_words_that_mean_nothing(word, message):
+    with pytest.raises(ValueError, match=message):
         parse(word)
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda: SingleShooting(1), "SingleShooting: nodes must be an integer of at least 2, not 1"),
         (lambda: SingleShooting(2.5), "SingleShooting: nodes must be an integer"),
@@ -463,8 +469,8 @@ def test_words_that_mean_nothing(word, said):
         (lambda: SingleShooting(9, control="cubic"), "SingleShooting: control must be one of 'constant', 'linear', 'spline', not 'cubic'"),
     ],
 )
-def test_settings_that_make_no_sense(make, said):
-    with pytest.raises(ValueError, match=said):
+def test_settings_that_make_no_sense(make, message):
+    with pytest.raises(ValueError, match=message):
         make()
 
 
@@ -490,8 +496,8 @@ def test_a_lag_that_the_step_cannot_follow_is_refused(scheme, limit):
     SingleShooting(51, scheme=scheme).transcribe(lag(0.9 * limit / 2))
     for method, cure in ((SingleShooting(51, scheme=scheme), "nodes"), (MultipleShooting(50, scheme=scheme), "intervals")):
         name = type(method).__name__
-        said = rf"{name}: phase 'turn': steps of 2 s are too long for 'y', .* {scheme} .*; take {cure}=\d+ or more, or steps=\d"
-        with pytest.raises(ValueError, match=said) as error:
+        message = rf"{name}: phase 'turn': steps of 2 s are too long for 'y', .* {scheme} .*; take {cure}=\d+ or more, or steps=\d"
+        with pytest.raises(ValueError, match=message) as error:
             method.transcribe(lag(1.6 * limit / 2))
         words = str(error.value).replace(",", "").split()
         enough = int(next(word for word in words if word.startswith(f"{cure}=")).split("=")[1])
