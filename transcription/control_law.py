@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -14,9 +15,6 @@ from .dfet_element import unwrapped_law
 from .polynomials import lobatto_nodes
 
 DEGREES = {"constant": 0, "linear": 1, "spline": 3}
-NEGLIGIBLE = 1e-17
-"""Weights below this, where the largest are near 1, are left out: the slopes of a spline forget values that are far away, by a factor of
-3.7 a node."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class ControlLaw:
             values = ca.horzcat(left, ca.horzcat(*(pair[:, 1] for pair in pairs)) if pairs else right)
         elif self.kind == "spline":
             law = unwrapped_law(U, phase)
-            values = ca.horzcat(law, law @ _sparse(spline_slopes(self.nodes).T))
+            values = ca.horzcat(law, spline_slopes(self.nodes).map(law.shape[0])(law.T).T) if law.numel() else ca.MX(0, 2 * self.nodes)
         else:
             values = U
         return values @ _sparse(self._on_steps(steps))
@@ -111,23 +109,32 @@ class ControlLaw:
         return table
 
 
-def spline_slopes(nodes: int) -> np.ndarray:
-    """The slopes of a cubic spline at its equally spaced nodes are this matrix (nodes, nodes) times its values, per distance of two."""
+@cache
+def spline_slopes(nodes: int) -> ca.Function:
+    """(values (nodes,)) -> slopes (nodes,) of a cubic spline at its equally spaced nodes, per distance of two of these.
+
+    The slopes m satisfy m[k-1] + 4 m[k] + m[k+1] = 3 (u[k+1] - u[k-1]) inside and, where the first two pieces are one cubic,
+    m[0] + 2 m[1] = (u[2] + 4 u[1] - 5 u[0]) / 2, which Gaussian elimination solves; the same at the other end.
+    """
+    u = ca.SX.sym("u", nodes)
     if nodes == 2:
-        return np.array([[-1.0, 1.0], [-1.0, 1.0]])
-    left, right = np.zeros((nodes, nodes)), np.zeros((nodes, nodes))
-    for k in range(1, nodes - 1):
-        left[k, k - 1 : k + 2] = 1.0, 4.0, 1.0
-        right[k, [k - 1, k + 1]] = -3.0, 3.0
-    # The same cubic on both sides of the second node, and of the last but one.
-    left[0, [0, 2]], right[0, :3] = (1.0, -1.0), (-2.0, 4.0, -2.0)
-    left[-1, [-3, -1]], right[-1, -3:] = (1.0, -1.0), (-2.0, 4.0, -2.0)
+        return ca.Function("slopes", [u], [ca.repmat(u[1] - u[0], 2, 1)])
+    inside = [3.0 * (u[k + 1] - u[k - 1]) for k in range(1, nodes - 1)]
+    first, last = 0.5 * (u[2] + 4.0 * u[1] - 5.0 * u[0]), -0.5 * (u[-3] + 4.0 * u[-2] - 5.0 * u[-1])
     if nodes == 3:
-        # The two are one condition: a parabola.
-        left[1], right[1] = (0.0, 1.0, 0.0), (-0.5, 0.0, 0.5)
-        left[2], right[2] = (1.0, 4.0, 1.0), (-3.0, 0.0, 3.0)
-    slopes = np.linalg.solve(left, right)
-    return np.where(np.abs(slopes) < NEGLIGIBLE, 0.0, slopes)
+        # The two ends say the same: a parabola.
+        middle = 0.5 * (u[2] - u[0])
+        return ca.Function("slopes", [u], [ca.vertcat(first - 2.0 * middle, middle, last - 2.0 * middle)])
+    below, diagonal, above = ([1.0] * (nodes - 2) + [2.0], [1.0] + [4.0] * (nodes - 2) + [1.0], [2.0] + [1.0] * (nodes - 2))
+    pivot, right = [diagonal[0]], [first]
+    for k, known in enumerate([*inside, last]):
+        factor = below[k] / pivot[k]
+        pivot.append(diagonal[k + 1] - factor * above[k])
+        right.append(known - factor * right[k])
+    slopes = [right[-1] / pivot[-1]]
+    for k in range(nodes - 2, -1, -1):
+        slopes.append((right[k] - above[k] * slopes[-1]) / pivot[k])
+    return ca.Function("slopes", [u], [ca.vertcat(*reversed(slopes))])
 
 
 def _sparse(matrix: np.ndarray) -> ca.DM:

@@ -25,6 +25,8 @@ from .widening import widened
 
 SAME = 1e-9
 """Places nearer to each other than this, relative to the phase, are one."""
+FORGOTTEN = 1e-17
+"""Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""
 LONG = 3_000_000
 """Most operations of a chain of steps times free variables, all of which it depends on, that is written out for derivatives."""
 
@@ -281,7 +283,8 @@ class ShootingPhase(PhaseWriter):
         seeds, n = self._layout.seeds(), self.mesh.steps
         U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
         C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
-        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0))
+        # The slopes of a spline forget values that are far away, by a factor of 3.7 a node.
+        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0), FORGOTTEN)
         controls = by_values @ seeds[self._layout.index(self.U).tolist(), :]
         statics = seeds[self._layout.index(self.ends.statics).tolist(), :]
         length, each = statics[1, :] - statics[0, :], C.numel() // n
