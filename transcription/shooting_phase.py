@@ -28,7 +28,7 @@ SAME = 1e-9
 FORGOTTEN = 1e-17
 """Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""
 LONG = 3_000_000
-"""Most operations of a chain of steps times free variables, all of which it depends on, that is written out for derivatives."""
+"""Most operations of a chain of steps times variables that it depends on, for which its derivatives are written out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +226,7 @@ class ShootingPhase(PhaseWriter):
     def _chain(self, n: int) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
         chain = self.step.forward.mapaccum("steps", n) if n > 1 else self.step.forward
-        if work(chain) * len(self._layout.free) <= LONG:
+        if work(chain) * min(len(self._layout.free), n * self.step.inputs) <= LONG:
             return chain
         # Its derivatives, written out, would take all memory there is.
         symbols = chain.mx_in()
