@@ -53,6 +53,12 @@ macs study status DIR    tells how it stands.
 The exit code is 1 while any run is missing or failed."""
 
 
+TRANSCRIPTION = (
+    "such as dfet:4x6 (4 elements of order 6), shooting:200:linear (200 nodes; controls constant, linear or spline) or "
+    "multiple-shooting:40x5:rk8 (40 intervals of 5 steps; Runge-Kutta scheme) (default: the problem's own)"
+)
+
+
 class Parser(argparse.ArgumentParser):
     """One line for a wrong call, not a page of usage."""
 
@@ -136,7 +142,7 @@ def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> 
 def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve = _add(commands, "solve", "search a problem for its front, fly every point, save the front")
     solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
-    solve.add_argument("--transcription", metavar="T", help="such as dfet:4x6, 4 elements of order 6 (default: the problem's own)")
+    solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")

@@ -12,7 +12,7 @@ from macs.solver import Solver
 from macs.tables import call
 from problems import Problem, load
 from problems.compiled import CompiledProblem
-from transcription import DFET, Transcription, parse
+from transcription import Transcription, parse, word
 
 from .cell import Cell
 from .making.work import Payload
@@ -75,12 +75,8 @@ def _name_of_scheme(one: Any) -> str:
     """As on the command line, where it can be said there: so the same method has the same label, however it was given."""
     if not isinstance(one, Transcription):
         return str(one)
-    if isinstance(one, DFET) and isinstance(one.elements, int):
-        for words in (f"dfet:{one.elements}x{one.order}", f"dfet:{one.elements}x{one.order}:{one.basis}"):
-            if parse(words) == one:
-                return words
     about = one.to_dict()
-    return call(about["method"], about["settings"])
+    return word(one) or call(about["method"], about["settings"])
 
 
 def _problem(label: str, given: Any) -> Problem | CompiledProblem:

@@ -1,9 +1,10 @@
 """Floor 2: from a continuous problem to numbers and back: transcriptions, the inner level, trajectories, their independent check."""
 
 from .base import NLP, Transcription
-from .catalogue import from_dict, parse
+from .catalogue import from_dict, parse, word
 from .dfet import DFET
 from .inner import InnerResult, InnerSolver
+from .shooting import MultipleShooting, SingleShooting
 from .simulate import Simulation
 from .smooth import Smooth
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -13,12 +14,15 @@ __all__ = [
     "NLP",
     "InnerResult",
     "InnerSolver",
+    "MultipleShooting",
     "PhaseTrajectory",
     "PiecewisePolynomial",
     "Simulation",
+    "SingleShooting",
     "Smooth",
     "Trajectory",
     "Transcription",
     "from_dict",
     "parse",
+    "word",
 ]

@@ -46,7 +46,7 @@ class Assembly:
 
     def nlp(self, transcription: Transcription) -> NLP:
         """The whole NLP."""
-        z = ca.MX.sym("z", len(self.layout.variables))
+        z = ca.MX.sym("z", len(self.layout.variables) + self.layout.hidden)
         extended = self.layout.extended_symbol(z)
         rows = Rows()
         quantities, largest = [], []
@@ -58,14 +58,17 @@ class Assembly:
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
-        largest_peaks = expanded(ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"]))
-        self._largest = Batched(largest_peaks)
+        scores = ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])
+        largest_peaks = ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"])
+        if not self.layout.hidden:
+            largest_peaks = expanded(largest_peaks)
+        self._largest = Batched(self._filled(largest_peaks))
         return NLP(
             problem=self.problem,
             transcription=transcription,
             variables=tuple(self.layout.variables),
             free=np.array(self.layout.free, dtype=int),
-            functions=expanded(ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])),
+            functions=self._filled(scores),
             g_lower=np.concatenate(rows.lower),
             g_upper=np.concatenate(rows.upper),
             g_scale=np.concatenate(rows.scale),
@@ -73,7 +76,7 @@ class Assembly:
             guess=self.guess(),
             profiles=self.profiles(),
             first_guess=self.first_guess,
-            reduced=self._reduced(z, rows, largest_peaks),
+            reduced=self._reduced(z, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
@@ -121,12 +124,30 @@ class Assembly:
             writer.guess(extended)
         return self.tighten(extended[:, : Z.shape[1]])
 
-    def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function) -> Reduced:
+    def _filled(self, function: ca.Function) -> ca.Function:
+        """A Function of the variables alone from one of these and the hidden quantities."""
+        if not self.layout.hidden:
+            return expanded(function)
+        z = ca.MX.sym("z", len(self.layout.variables))
+        extended = self.layout.extended_symbol(z)
+        for writer in self._writers.values():
+            extended = writer.fill(extended)
+        values = function.call([extended[: z.numel() + self.layout.hidden]])
+        return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
+
+    def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
         """What propagation leaves to satisfy."""
         left = [i for i, marched in enumerate(rows.marched) if not marched]
         function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
-        return Reduced(self.layout, list(self._writers.values()), (np.concatenate(self._peaks), peaks), (function, lower, upper, scale))
+        return Reduced(
+            self.layout,
+            list(self._writers.values()),
+            (np.concatenate(self._peaks), peaks),
+            (function, lower, upper, scale),
+            # What hangs on hidden quantities is looked at where these are flown; elsewhere on demand.
+            (scores, rows.left) if self.layout.hidden else None,
+        )
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.tighten`."""

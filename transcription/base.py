@@ -37,8 +37,14 @@ class Transcription(ABC):
         return {"method": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
 
 
+CHAIN = "chain"
+"""What a Function is called that repeats so much that it, and what it is a part of, is not to be written out."""
+
+
 def expanded(function: ca.Function) -> ca.Function:
     """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
+    if any(part.name() == CHAIN for part in function.find_functions()):
+        return function
     try:
         return function.expand()
     except RuntimeError:
@@ -147,6 +153,15 @@ class NLP:
         equations, where that fails."""
         return self.reduced.fly(Z).Z
 
+    def fly(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `march` makes of vectors (k, n), with what `residuals` tells of that: in one go, where the method sees on the way all that
+        these depend on."""
+        flown = self.reduced.fly(Z)
+        if flown.scores is None:
+            return flown.Z, *self.residuals(flown.Z)
+        F, g = flown.scores
+        return flown.Z, F, self._residuals(flown.Z, g)
+
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
         F, residuals = self.residuals(Z)
@@ -179,14 +194,19 @@ class NLP:
 
     def residuals(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), and scaled residuals (k, n + r) of bounds and rows of g: negative inside, NaN where they are no numbers."""
-        (F, g), n = self._batched(Z), Z.shape[1]
+        F, g = self._batched(Z)
+        return F, self._residuals(Z, g)
+
+    def _residuals(self, Z: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """Scaled residuals (k, n + r) of bounds and rows of g (k, r)."""
+        n = Z.shape[1]
         residuals = np.empty((len(Z), n + g.shape[1]))
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore"):
             np.maximum(self.lower - Z, Z - self.upper, out=residuals[:, :n])
             np.maximum(self.g_lower - g, g - self.g_upper, out=residuals[:, n:])
             residuals /= self._scales
-        return F, residuals
+        return residuals
 
     @cached_property
     def _scales(self) -> np.ndarray:

@@ -21,6 +21,8 @@ LONG = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
+WORTH = 24
+"""Calls from which on a whole block of wide ones takes less time."""
 
 log = logging.getLogger(__name__)
 
@@ -37,15 +39,17 @@ class Batched:
     function : casadi.Function
     compiled : bool
         Whether it may be compiled; not where it has a rootfinder or the like.
+    wide : callable, optional
+        k -> what `function.map(k)` is, to the last bit, but faster. It is asked for one number of calls only, which must pay.
     """
 
-    def __init__(self, function: ca.Function, *, compiled: bool = True) -> None:
-        self._function = function
+    def __init__(self, function: ca.Function, *, compiled: bool = True, wide: Callable[[int], ca.Function] | None = None) -> None:
+        self._function, self._wide = function, wide
         self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._may_compile = compiled and compiler() is not None
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
-        self._work, self._each, self._length = 0, _work(function), _length(function)
+        self._work, self._each, self._length = 0, work(function), _length(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -66,6 +70,10 @@ class Batched:
         return outputs
 
     def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
+        if self._wide and k % BLOCK and k % BLOCK >= WORTH:
+            # Fill the last block up, and leave out what is too much again.
+            filled = [np.concatenate([values, np.repeat(values[-len(values) // k :], BLOCK - k % BLOCK, axis=0)]) for values in arrays]
+            return [values[:k] for values in self._evaluate(filled, k + BLOCK - k % BLOCK)]
         outputs = [np.empty((k, size)) for size in self._sizes]
         for first in range(0, k, BLOCK):
             last = min(first + BLOCK, k)
@@ -84,7 +92,8 @@ class Batched:
 
     def _block(self, size: int) -> tuple[Any, Callable[[], None]]:
         if size not in self._blocks:
-            self._blocks[size] = (self._function if size == 1 else self._function.map(size)).buffer()
+            wide = self._wide if size == BLOCK else None
+            self._blocks[size] = (self._function if size == 1 else wide(size) if wide else self._function.map(size)).buffer()
         return self._blocks[size]
 
     def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
@@ -96,11 +105,11 @@ class Batched:
         library = _library(interpreted)
         if library is None:
             return
-        self._function, self._blocks = library, {}
+        self._function, self._blocks, wide, self._wide = library, {}, self._wide, None
         found = self._evaluate(arrays, len(arrays[0]))
         if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(found, expected, strict=True)):
             log.info("%s: compiled values differ in the last bits; it stays interpreted", interpreted.name())
-            self._function, self._blocks = interpreted, blocks
+            self._function, self._blocks, self._wide = interpreted, blocks, wide
 
 
 def compiler() -> str | None:
@@ -130,17 +139,17 @@ def _library(function: ca.Function) -> ca.Function | None:
             return None
 
 
-def _work(function: ca.Function) -> int:
+def work(function: ca.Function) -> int:
     """Instructions that one call goes through, as often as it does; none of what is not made of instructions."""
     if function.is_a("SXFunction"):
         return function.n_instructions()
     if function.is_a("Map"):
         information = function.info()
-        return information["n"] * _work(information["f"])
+        return information["n"] * work(information["f"])
     if not function.is_a("MXFunction"):
         return 0
     calls = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CALL)
-    return function.n_instructions() + sum(_work(function.instruction_MX(i).which_function()) for i in calls)
+    return function.n_instructions() + sum(work(function.instruction_MX(i).which_function()) for i in calls)
 
 
 def _length(function: ca.Function) -> int:

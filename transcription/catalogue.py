@@ -6,20 +6,57 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import Transcription
+from .control_law import DEGREES
 from .dfet import DFET
+from .runge_kutta import TABLEAUX
+from .shooting import MultipleShooting, SingleShooting
 
-METHODS: dict[str, type[Transcription]] = {"DFET": DFET}
-EXAMPLES = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein"
+METHODS: dict[str, type[Transcription]] = {"DFET": DFET, "SingleShooting": SingleShooting, "MultipleShooting": MultipleShooting}
+EXAMPLES = (
+    "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, shooting:200 (200 nodes), shooting:200x2:linear:rk8 (2 steps between each, "
+    "linear controls, another Runge-Kutta scheme), shooting:200:spline:21 (controls on 21 nodes), multiple-shooting:40 (intervals)"
+)
+SHOOTING = {"shooting": SingleShooting, "multiple-shooting": MultipleShooting}
 
 
 def parse(text: str) -> Transcription:
     """A transcription from one word, as on the command line. Raises ValueError that shows how it is written."""
-    method, _, rest = text.partition(":")
-    mesh, _, basis = rest.partition(":")
-    elements, _, order = mesh.partition("x")
-    if method.lower() != "dfet" or not elements.isdecimal() or not order.isdecimal():
+    method, mesh, *options = (*text.split(":"), "")[: text.count(":") + 2]
+    first, cross, second = mesh.partition("x")
+    numbers = first.isdecimal() and (second.isdecimal() or not cross)
+    if method.lower() in SHOOTING and numbers:
+        settings = {**({"steps": int(second)} if cross else {}), **_options(text, [word for word in options if word])}
+        return SHOOTING[method.lower()](int(first), **settings)
+    if method.lower() != "dfet" or not numbers or not cross or len(options) > 2:
         raise ValueError(f"unknown transcription '{text}'; write it as {EXAMPLES}")
-    return DFET(int(elements), int(order), basis=basis or "lobatto")
+    return DFET(int(first), int(second), basis=options[0] or "lobatto")
+
+
+def _options(text: str, words: list[str]) -> dict[str, Any]:
+    """What is said of shooting after its mesh, in any order: the kind of control, its number of nodes, the scheme."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name = "control" if word in DEGREES else "scheme" if word in TABLEAUX else "control_nodes" if word.isdecimal() else ""
+        if not name or name in found:
+            known = f"{', '.join(DEGREES)}; {', '.join(TABLEAUX)}; or a number of nodes of the controls"
+            raise ValueError(f"transcription '{text}': '{word}' is said twice or unknown; there are {known}")
+        found[name] = int(word) if name == "control_nodes" else word
+    return found
+
+
+def word(method: Transcription) -> str | None:
+    """How a transcription is said in one word, such that `parse` gives it again; None if it cannot be."""
+    words: list[str] = []
+    if isinstance(method, DFET) and isinstance(method.elements, int):
+        words = [f"dfet:{method.elements}x{method.order}", f"dfet:{method.elements}x{method.order}:{method.basis}"]
+    elif isinstance(method, SingleShooting | MultipleShooting):
+        name = next(name for name, kind in SHOOTING.items() if isinstance(method, kind))
+        count = method.nodes if isinstance(method, SingleShooting) else method.intervals
+        said = [f"{name}:{count}" + (f"x{method.steps}" if method.steps > 1 else "")]
+        for value, default in ((method.control, "constant"), (method.control_nodes, None), (method.scheme, "rk4")):
+            said += [str(value)] if value != default else []
+        words = [":".join(said)]
+    return next((one for one in words if parse(one) == method), None)
 
 
 def from_dict(data: Mapping[str, Any]) -> Transcription:

@@ -10,17 +10,23 @@ import numpy as np
 
 from problems.compiled import Variable
 
+HIDDEN = 2**40
+"""Slots from here on are those of hidden quantities: how many variables come before them is known only in the end."""
+
 
 class Layout:
     """Collects the variables of an NLP and hands out their slots.
 
     A slot is the index of a variable, or a negative number for a constant: a quantity whose bounds coincide is no variable. Two quantities
-    that are always equal (a linked boundary state) share one slot. Slots index the *extended* vector: the variables, then the constants.
+    that are always equal (a linked boundary state) share one slot. Beside these there are *hidden* quantities, which are no variables
+    either, but follow from them at some expense: states in between, integrals. Slots are those of the *extended* vector: the variables,
+    the hidden quantities, then the constants; `index` tells where.
     """
 
     def __init__(self) -> None:
         self.variables: list[Variable] = []
         self.free: list[int] = []
+        self.hidden = 0
         self._constants: list[float] = []
 
     def add(self, variable: Variable, *, free: bool = False) -> int:
@@ -41,33 +47,50 @@ class Layout:
         ]
         return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
 
+    def add_hidden(self, *shape: int) -> np.ndarray:
+        """Hidden quantities; returns slots of this shape."""
+        first, count = HIDDEN + self.hidden, int(np.prod(shape))
+        self.hidden += count
+        return np.arange(first, first + count).reshape(shape)
+
+    @property
+    def total(self) -> int:
+        """Length of the extended vector."""
+        return len(self.variables) + self.hidden + len(self._constants)
+
+    def index(self, slots: np.ndarray) -> np.ndarray:
+        """Where in the extended vector slots are, a flat array."""
+        flat = slots.ravel()
+        return np.where(flat >= HIDDEN, flat - HIDDEN + len(self.variables), flat % self.total)
+
     def extended(self, Z: np.ndarray) -> np.ndarray:
-        """Extended vectors (k, n + constants) of variables (k, n): a copy, to be indexed by slots."""
+        """Extended vectors (k, total) of variables (k, n): a copy, to be indexed by slots; hidden quantities are 0."""
         constants = np.broadcast_to(self._constants[::-1], (len(Z), len(self._constants)))
-        return np.hstack([Z, constants])
+        return np.hstack([Z, np.zeros((len(Z), self.hidden)), constants])
 
     def extended_symbol(self, z: ca.MX) -> ca.MX:
-        """The extended vector of a symbol of the variables."""
-        return ca.vertcat(z, ca.DM(self._constants[::-1])) if self._constants else z
+        """Extended vectors (total, k) of a symbol (..., k) of the variables, and perhaps the hidden quantities, else 0."""
+        missing, k = len(self.variables) + self.hidden - z.shape[0], z.shape[1]
+        if not missing and not self._constants:
+            return z
+        return ca.vertcat(z, ca.DM.zeros(missing, k), ca.repmat(ca.DM(self._constants[::-1]), 1, k))
 
     def seeds(self) -> ca.DM:
-        """Derivatives (n + constants, d) of an extended vector by its free variables, before anything follows from them."""
-        total, d = len(self.variables) + len(self._constants), len(self.free)
-        return ca.DM(ca.Sparsity.triplet(total, d, self.free, list(range(d))), 1.0)
+        """Derivatives (total, d) of an extended vector by its free variables, before anything follows from them."""
+        d = len(self.free)
+        return ca.DM(ca.Sparsity.triplet(self.total, d, self.free, list(range(d))), 1.0)
 
     def pick(self, extended: ca.MX, slots: np.ndarray) -> ca.MX:
         """The entries of an extended symbol at slots of shape (a, b, ...), as a matrix (last axis, product of the others)."""
-        total = len(self.variables) + len(self._constants)
         shape = slots.shape[-1], int(np.prod(slots.shape[:-1]))
-        return ca.reshape(extended[(slots.ravel() % total).tolist()], *shape) if slots.size else ca.MX(*shape)
+        return ca.reshape(extended[self.index(slots).tolist()], *shape) if slots.size else ca.MX(*shape)
 
-    @staticmethod
-    def replaced(extended: ca.MX, slots: np.ndarray, values: ca.MX) -> ca.MX:
-        """A symbol of extended rows in which those of the variables among `slots` are the rows of `values`; constants stay what they
-        are. It is one permutation: to split rows and join them again would cost far more."""
-        total, flat = extended.shape[0], slots.ravel()
+    def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX) -> ca.MX:
+        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are. It is one
+        permutation: to split rows and join them again would cost far more."""
+        total, kept = extended.shape[0], np.flatnonzero(slots.ravel() >= 0)
         places = np.arange(total)
-        places[flat[flat >= 0]] = total + np.flatnonzero(flat >= 0)
+        places[self.index(slots)[kept]] = total + kept
         return ca.vertcat(extended, values)[places.tolist(), :]
 
     @staticmethod

@@ -56,6 +56,11 @@ class Rows:
         self.marched.append(marched)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
 
+    @property
+    def left(self) -> np.ndarray:
+        """Indices of the rows that propagation does not satisfy."""
+        return np.flatnonzero(np.repeat(~np.array(self.marched, dtype=bool), [e.numel() for e in self.expressions]))
+
 
 @dataclass(frozen=True, eq=False)
 class Written:
@@ -73,13 +78,19 @@ class PhaseWriter(ABC):
     phase: CompiledPhase
     ends: Ends
     interior: np.ndarray
-    """Slots of the states that `sensitivity` replaces only on demand."""
+    """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
     compilable: bool
     """Whether what `march` does fast, and `sensitivity`, can be written in C."""
+    wide: bool = False
+    """Whether `march` takes several extended vectors side by side."""
+
+    def fill(self, extended: ca.MX) -> ca.MX:
+        """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
+        return extended
 
     @abstractmethod
     def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """Add the rows of dynamics and path constraints of an extended symbol."""
+        """Add the rows of dynamics and path constraints of an extended symbol, hidden quantities and all."""
 
     @abstractmethod
     def guess(self, extended: np.ndarray) -> None:
@@ -105,15 +116,15 @@ class PhaseWriter(ABC):
 
         Parameters
         ----------
-        extended : MX (e, 1)
-            An extended symbol, of which the states are to be replaced.
+        extended : MX (e, 1), or (e, k) if the writer is `wide`
+            An extended symbol, of which the states are to be replaced. What comes back has as many columns.
         robust : bool
             To solve the equations of states by whatever it takes; otherwise fast, if need be with a residual.
 
         Returns
         -------
         MX (e, 1)
-            With the states that the dynamics give.
+            With the states and hidden quantities that the dynamics give.
         MX (nx, 1)
             The final states, also where they are imposed and so no variables.
         MX (any, 1)
@@ -129,14 +140,14 @@ class PhaseWriter(ABC):
         extended : MX (e, 1)
         S : MX (e, d)
             Derivatives of the extended vector: the seeds of the layout, with the rows of initial states given. The rows of the other states
-            are to be replaced.
+            and of hidden quantities are to be replaced.
         interior : bool
             Also inside the elements; otherwise only at their ends.
 
         Returns
         -------
         MX (e, d)
-            With the rows of the states.
+            With the rows of the states and hidden quantities.
         MX (nx, d)
             Of the final states, also where they are imposed.
         """

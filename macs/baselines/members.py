@@ -67,8 +67,9 @@ def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.nd
     if members.Z.shape[1] == len(free) or not usable.size:
         return evaluator.first_guess(X)
     box, Z = box_of(evaluator), members.Z[usable]
-    apart = box.difference(box.to_unit(X)[:, None], box.to_unit(Z[:, free]))
-    vectors = Z[np.argmin((apart**2).sum(axis=2), axis=1)]
+    there = box.to_unit(Z[:, free])
+    # One by one: all differences at once would not fit into any cache.
+    vectors = Z[[int(np.argmin((box.difference(x, there) ** 2).sum(axis=1))) for x in box.to_unit(X)]]
     vectors[:, free] = X
     return vectors
 

@@ -27,6 +27,15 @@ def build(speed=3.0):
     problem.default_evaluations = 40
     return problem
 
+def lagging():
+    problem = Problem("lagging")
+    phase = problem.phase("leg", t0=0.0, tf=20.0)
+    x = phase.state("x", bounds=(0, 20), initial=0)
+    u = phase.control("u", bounds=(0, 10))
+    phase.dynamics(x=5.0 * (u - x))
+    problem.maximize("end", phase.final(x))
+    return problem
+
 def impossible():
     problem = build()
     problem.constraint("twice", problem.phases["leg"].tf, lower=100.0)
@@ -121,6 +130,13 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
     assert main(["verify", "glide.nc"]) == 0
 
 
+@pytest.mark.parametrize("method", ["shooting:6:linear", "multiple-shooting:4x2:kutta3:spline:3"])
+def test_shooting_is_solved_shown_and_verified(capsys, method):
+    assert main(["solve", "glide.py:build", "--transcription", method, "--inner", "march", "--seed", "1", "--out", "shot.nc"]) == 0
+    assert main(["show", "shot.nc", "--point", "0"]) == 0 and "Shooting(" in capsys.readouterr().out
+    assert main(["verify", "shot.nc", "--tolerance", "1e-6"]) == 0
+
+
 def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
     from runs.commands import make_solver
 
@@ -142,6 +158,10 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--solver", "mcas"], ["'mcas'", "did you mean macs?"]),
         (["solve", "goddard", "--transcription", "dfet:4"], ["'dfet:4'", "dfet:4x6"]),
         (["solve", "goddard", "--transcription", "shot:4x4"], ["'shot:4x4'", "dfet:4x6"]),
+        (["solve", "goddard", "--transcription", "shooting:9:cubic"], ["'cubic'", "constant, linear, spline", "rk4"]),
+        (["solve", "goddard", "--transcription", "shooting:1"], ["nodes must be an integer of at least 2"]),
+        (["solve", "glide.py:lagging", "--transcription", "shooting:20"], ["'leg'", "'x'", "rk4", "nodes=", "steps="]),
+        (["solve", "goddard", "--transcription", "shooting:9", "--mesh", "adaptive"], ["needs DFET", "SingleShooting"]),
         (["solve", "goddard", "--mesh", "adaptve"], ["'adaptve'", "did you mean adaptive?", "fixed"]),
         (["solve", "goddard", "--inner", "marsh"], ["'marsh'", "did you mean march?", "ipopt"]),
         (["solve", "goddard", "--evaluations", "ten"], ["--evaluations", "'ten' is not a whole number above 0"]),

@@ -10,7 +10,7 @@ import numpy as np
 from ..base import NLP, largest
 from ..programs import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
-__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "started"]
+__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,19 @@ def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.nda
 
 def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
     """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
-    F, residuals = nlp.residuals(Z)
+    return scored(nlp, (Z, *nlp.residuals(Z)), start, said, iterations, tolerance)
+
+
+def scored(
+    nlp: NLP,
+    found: tuple[np.ndarray, np.ndarray, np.ndarray],
+    start: np.ndarray,
+    said: np.ndarray,
+    iterations: np.ndarray,
+    tolerance: float,
+) -> InnerResult:
+    """The same for vectors whose objectives (k, m) and residuals (k, n + r) are known: `found` are these three, the solver's own arrays."""
+    Z, F, residuals = found
     violation = largest(residuals)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
     status = np.where(violation <= tolerance, CONVERGED, said)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import NLP
-from .base import INFEASIBLE, InnerResult, InnerSolver, result, started
+from .base import INFEASIBLE, InnerResult, InnerSolver, scored, started
 
 
 @dataclass(frozen=True)
@@ -18,4 +18,4 @@ class March(InnerSolver):
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
         k = len(start)
-        return result(nlp, nlp.march(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        return scored(nlp, nlp.fly(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)

@@ -1,0 +1,136 @@
+"""Explicit Runge-Kutta methods: one table of coefficients, one step, and how far a step may go.
+
+Sources: Hairer, Norsett and Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer 1993, II.1 (the classical methods,
+tables 1.1 and 1.2) and II.5; Cooper and Verner, "Some explicit Runge-Kutta methods of high order", SIAM J. Numer. Anal. 9(3), 1972 (order 8
+in 11 stages, all coefficients in Q(sqrt 21)); Hairer and Wanner, "... II", IV.2 (stability functions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """The coefficients of an explicit method of s stages.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        The global error falls with this power of the step.
+    A : tuple of s tuples
+        Row i holds the i coefficients of the stages before stage i.
+    b : tuple of s floats
+    """
+
+    name: str
+    order: int
+    A: tuple[tuple[float, ...], ...]
+    b: tuple[float, ...]
+
+    @property
+    def c(self) -> tuple[float, ...]:
+        """Where in the step the stages are, (s,): the sums of the rows of A."""
+        return tuple(float(sum(row)) for row in self.A)
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """A in full, (s, s), strictly lower triangular."""
+        full = np.zeros((len(self.b), len(self.b)))
+        for i, row in enumerate(self.A):
+            full[i, :i] = row
+        return full
+
+    @property
+    def growth(self) -> np.ndarray:
+        """Coefficients (s + 1,) of the stability function R(z) = 1 + z b'(1 - z A)^-1 1, from the constant term on."""
+        power, terms = np.ones(len(self.b)), [1.0]
+        for _ in self.b:
+            terms.append(float(np.array(self.b) @ power))
+            power = self.matrix @ power
+        return np.array(terms)
+
+    def stability(self, z: np.ndarray) -> np.ndarray:
+        """R(z): by what a step of length h multiplies the solution of y' = lambda y, where z = h lambda; any shape, complex or not."""
+        return np.polynomial.polynomial.polyval(z, self.growth)
+
+    def step(self, rates: Callable[[float, Any], Any], y: Any, h: Any) -> tuple[Any, list[Any]]:
+        """One step.
+
+        Parameters
+        ----------
+        rates : callable
+            (c, y) -> dy/dt a part c of the step after its beginning.
+        y : array or CasADi matrix
+        h : float or CasADi scalar
+            The step.
+
+        Returns
+        -------
+        new y, and the rates at the stages
+        """
+        slopes: list[Any] = []
+        for c, row in zip(self.c, self.A, strict=True):
+            slopes.append(rates(c, moved(y, h, row, slopes)))
+        return moved(y, h, self.b, slopes), slopes
+
+
+def moved(y: Any, h: Any, weights: Sequence[float], slopes: Sequence[Any]) -> Any:
+    """y + h times the weighted sum of slopes, without the terms whose weight is 0."""
+    for weight, slope in zip(weights, slopes, strict=True):
+        if weight:
+            y = y + (h * weight) * slope
+    return y
+
+
+def tableau(name: str) -> Tableau:
+    """A method by its name. Raises ValueError that names those there are."""
+    if name not in TABLEAUX:
+        raise ValueError(f"unknown Runge-Kutta scheme {name!r}; there are {', '.join(TABLEAUX)}")
+    return TABLEAUX[name]
+
+
+def _cooper_verner() -> Tableau:
+    s = sqrt(21.0)
+    A = (
+        (),
+        (1 / 2,),
+        (1 / 4, 1 / 4),
+        (1 / 7, (-7 - 3 * s) / 98, (21 + 5 * s) / 49),
+        ((11 + s) / 84, 0.0, (18 + 4 * s) / 63, (21 - s) / 252),
+        ((5 + s) / 48, 0.0, (9 + s) / 36, (-231 + 14 * s) / 360, (63 - 7 * s) / 80),
+        ((10 - s) / 42, 0.0, (-432 + 92 * s) / 315, (633 - 145 * s) / 90, (-504 + 115 * s) / 70, (63 - 13 * s) / 35),
+        (1 / 14, 0.0, 0.0, 0.0, (14 - 3 * s) / 126, (13 - 3 * s) / 63, 1 / 9),
+        (1 / 32, 0.0, 0.0, 0.0, (91 - 21 * s) / 576, 11 / 72, (-385 - 75 * s) / 1152, (63 + 13 * s) / 128),
+        (
+            *(1 / 14, 0.0, 0.0, 0.0, 1 / 9, (-733 - 147 * s) / 2205),
+            *((515 + 111 * s) / 504, (-51 - 11 * s) / 56, (132 + 28 * s) / 245),
+        ),
+        (
+            *(0.0, 0.0, 0.0, 0.0, (-42 + 7 * s) / 18, (-18 + 28 * s) / 45),
+            *((-273 - 53 * s) / 72, (301 + 53 * s) / 72, (28 - 28 * s) / 45, (49 - 7 * s) / 18),
+        ),
+    )
+    b = (1 / 20, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 49 / 180, 16 / 45, 49 / 180, 1 / 20)
+    return Tableau("rk8", 8, A, b)
+
+
+TABLEAUX: dict[str, Tableau] = {
+    method.name: method
+    for method in (
+        Tableau("euler", 1, ((),), (1.0,)),
+        Tableau("midpoint", 2, ((), (1 / 2,)), (0.0, 1.0)),
+        Tableau("heun", 2, ((), (1.0,)), (1 / 2, 1 / 2)),
+        Tableau("kutta3", 3, ((), (1 / 2,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6)),
+        Tableau("rk4", 4, ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+        Tableau("rk38", 4, ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8)),
+        _cooper_verner(),
+    )
+}
+"""All there are: Euler, explicit midpoint, Heun (trapezoidal), Kutta's third order, the classical one, the 3/8 rule, Cooper and Verner."""
