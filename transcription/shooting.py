@@ -22,9 +22,10 @@ from .control_law import DEGREES, ControlLaw
 from .layout import Layout
 from .phase_writer import Ends
 from .runge_kutta import tableau
-from .shooting_phase import ShootingPhase, StepMesh
+from .shooting_phase import ShootingPhase
 from .shooting_step import Step
 from .stability import check_steps
+from .step_mesh import StepMesh
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

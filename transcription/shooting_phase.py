@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -20,36 +20,14 @@ from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows, Written
 from .polynomials import basis_matrix, lobatto_nodes
 from .shooting_step import Step
+from .step_mesh import StepMesh
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
 from .widening import widened
 
-SAME = 1e-9
-"""Places nearer to each other than this, relative to the phase, are one."""
 FORGOTTEN = 1e-17
 """Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""
 LONG = 3_000_000
 """Most operations of a chain of steps times variables that it depends on, for which its derivatives are written out."""
-
-
-@dataclass(frozen=True, eq=False)
-class StepMesh:
-    """Where steps begin and end: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
-
-    places: np.ndarray
-    ends: np.ndarray
-
-    @classmethod
-    def of(cls, intervals: int, steps: int, nodes: np.ndarray) -> StepMesh:
-        """`intervals` equal ones of `steps` equal steps each; a step across one of the nodes of controls becomes two."""
-        whole = np.linspace(0.0, 1.0, intervals * steps + 1)
-        apart = np.abs(nodes[:, None] - whole).min(axis=1) > SAME
-        places = np.sort(np.concatenate([whole, nodes[apart]]))
-        return cls(places, np.searchsorted(places, whole[::steps]))
-
-    @property
-    def steps(self) -> int:
-        """How many steps there are, N."""
-        return len(self.places) - 1
 
 
 class ShootingPhase(PhaseWriter):

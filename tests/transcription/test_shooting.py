@@ -17,8 +17,8 @@ from transcription import DFET, MultipleShooting, SingleShooting, from_dict, par
 from transcription import word as said
 from transcription.inner import inner_solver
 from transcription.runge_kutta import TABLEAUX
-from transcription.shooting_phase import StepMesh
 from transcription.simulate import simulate
+from transcription.step_mesh import StepMesh
 
 KINDS = ("constant", "linear", "spline")
 
