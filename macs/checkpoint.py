@@ -64,6 +64,10 @@ class Kept:
     stopped: str = ""
 
 
+class Unreadable(ValueError):  # noqa: N818 - what the file is
+    """The file holds no checkpoint, or one that is damaged or of another run."""
+
+
 class Checkpoint(AbstractContextManager["Checkpoint"]):
     """Keeps one run in a file.
 
@@ -108,7 +112,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
         Raises
         ------
-        ValueError
+        Unreadable
             If the file cannot be read, is no checkpoint, is damaged, or belongs to another run: then the message says what differs.
         """
         try:
@@ -116,32 +120,35 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise ValueError(f"checkpoint {self.path} cannot be read: {error.strerror or error}") from error
+            raise Unreadable(f"checkpoint {self.path} cannot be read: {error.strerror or error}") from error
         try:
             header, arrays = _from_bytes(content)
             theirs, kept = dict(header["belongs"]), unpack(header["run"], Kept, arrays, "run")
             known = [*header["versions"]]
         except Exception as error:
             # Whatever a damaged or foreign file provokes in numpy or in what follows, the file is what is wrong.
-            raise ValueError(f"{self.path} does not hold a checkpoint that can be read: {_reason(content, error)}; {INSTEAD}") from error
+            raise Unreadable(f"{self.path} does not hold a checkpoint that can be read: {_reason(content, error)}; {INSTEAD}") from error
         mine = self._belongs | {"seed": kept.seed if seed is None else seed}
         differences = [*_differences(theirs | {"seed": kept.seed}, mine)]
         if differences:
-            raise ValueError(f"checkpoint {self.path} belongs to another run: {'; '.join(differences)}. {INSTEAD.capitalize()}")
+            raise Unreadable(f"checkpoint {self.path} belongs to another run: {'; '.join(differences)}. {INSTEAD.capitalize()}")
         try:
             state = unpack(header["state"], self._state_class, arrays, "state")
         except TypeError as error:
-            raise ValueError(f"checkpoint {self.path} is of another {self._state_class.__name__}: {error}; {INSTEAD}") from error
+            raise Unreadable(f"checkpoint {self.path} is of another {self._state_class.__name__}: {error}; {INSTEAD}") from error
         self._versions = [*(one for one in known if one != versions()), versions()]
         if self.mixed:
             log.warning("checkpoint %s was written by other versions: the rest of the run may differ in its last bits", self.path)
         return state, kept
 
     def keep(self, state: Any, kept: Kept) -> None:
-        """Take note of how the run stands; write it if it is time."""
+        """Take note of how the run stands."""
         arrays: list[np.ndarray] = []
         trees = {"run": pack(kept, Kept, arrays, "run"), "state": pack(state, self._state_class, arrays, "state")}
         self._waiting = trees, arrays
+
+    def write_in_time(self) -> None:
+        """Write what is not in the file yet, if the last time is long enough ago."""
         if time.perf_counter() - self._written > max(SECONDS, SHARE * self._took):
             self.write()
 
@@ -165,6 +172,15 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
             self.failure, self._waiting = "", None
         self._written = time.perf_counter()
         self._took = self._written - began
+
+
+def keeps(solver: Solver) -> bool:
+    """Whether a checkpoint can keep a run of this solver: whether it says what its state is."""
+    try:
+        _state_class(solver)
+    except ValueError:
+        return False
+    return True
 
 
 def _state_class(solver: Solver) -> type:

@@ -102,6 +102,7 @@ class Run:
             self.evaluator.before_batch = lambda: monitor.show(self._standing(monitor))
             self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
             self._keep(monitor)
+            self._write_in_time()
         # From here on there is something to return, so from here on a batch need not even begin. Before, it ends with what it has.
         self.evaluator.before_batch = lambda: monitor.before_batch(self._standing(monitor))
         counts = self.evaluator.counts
@@ -113,6 +114,7 @@ class Run:
                 self._idle = self._idle + 1 if counts.evaluations == spent else 0
                 self._keep(monitor)
                 monitor.after_iteration(self._standing(monitor))
+                self._write_in_time()  # what is in the file, the callback has been told
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
@@ -129,6 +131,10 @@ class Run:
         self._uncut = counts.clocked
         assert self.seed is not None
         self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, monitor.elapsed, stopped))
+
+    def _write_in_time(self) -> None:
+        if self._checkpoint:
+            self._checkpoint.write_in_time()
 
     def _belongs(self) -> dict[str, Any]:
         """What a checkpoint has to be of, but for the seed."""

@@ -66,6 +66,10 @@ def reference(points: int = 2001, longest: float = 250.0) -> np.ndarray:
     return np.array([(first, 0.0), *((tf, _speed(tf)) for tf in times)])
 
 
+LAW = "linear tangent law"
+"""What `optimal_flight` is by."""
+
+
 def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
     """The flight of greatest horizontal speed in a given time, in closed form: the linear tangent law.
 

@@ -50,6 +50,10 @@ def reference_with_costates() -> np.ndarray:
         return np.loadtxt(file, delimiter=",", skiprows=1)
 
 
+LAW = "indirect shooting"
+"""What `optimal_flight` is by."""
+
+
 def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
     """The flight of greatest final energy in a given time, by indirect shooting from the costates of the nearest row of the table.
 

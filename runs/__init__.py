@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+    from .measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
     from .study import Study
 
 __all__ = ["Study", "additive_epsilon", "gd", "hypervolume", "igd", "igd_plus"]
@@ -16,4 +16,4 @@ def __getattr__(name: str) -> Any:
     # The command line lives here too: its help must not wait for numbers.
     if name not in __all__:
         raise AttributeError(f"module 'runs' has no attribute '{name}'")
-    return getattr(import_module(".study" if name == "Study" else ".indicators", __name__), name)
+    return getattr(import_module(".study" if name == "Study" else ".measures.indicators", __name__), name)

@@ -15,8 +15,8 @@ from problems.compiled import CompiledProblem
 from transcription import DFET, Transcription, parse
 
 from .cell import Cell
+from .making.work import Payload
 from .studyfile import plain, told
-from .work import Payload
 
 
 def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) -> list[tuple[Cell, Payload]]:

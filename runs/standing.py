@@ -8,7 +8,7 @@ import numpy as np
 
 from macs.tables import duration, text_table
 
-from .watching import reason
+from .making.watching import reason
 
 if TYPE_CHECKING:
     from .store import Summary

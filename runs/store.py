@@ -3,9 +3,10 @@
 study.json      what the study is, and how many runs of each cell there are to be
 CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is finished once it has one, which nobody touches any more
 CELL/RUN.json   of a finished run: how it converged; of any other: how it ended, with a traceback
+CELL/RUN.checkpoint, CELL/RUN.samples   of a run that is going on, or was: where it goes on. Its own process writes these two
 .lock           held by the process that runs the study, as long as it lives
 
-Every file is written whole, by the process that runs the study alone.
+Every file is written whole, the others by the process that runs the study alone.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from macs.storage import write_whole
 
 from .cell import Cell
 from .lock import locked
+from .making.work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 from .studyfile import same
-from .work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome
 
 MISSING, UNREADABLE = "missing", "unreadable"
 FORMAT = "macs study"
@@ -260,10 +261,16 @@ class Store:
         """Where it is said how a run went."""
         return self.path / cell.folder / f"{number:04d}.json"
 
+    def checkpoint_path(self, cell: Cell, number: int) -> Path:
+        """Where a run is kept while it lasts, in a folder that is there. It has the study's own path, wherever the process may be."""
+        path = self.front_path(cell, number).with_suffix(".checkpoint").absolute()
+        path.parent.mkdir(exist_ok=True)
+        return path
+
     def keep(self, cell: Cell, number: int, outcome: Outcome) -> None:
-        """Write what came of a run; its front last, which is what makes it finished. Raises OSError if that cannot be written."""
-        front, record = self.front_path(cell, number), self.record_path(cell, number)
-        front.parent.mkdir(exist_ok=True)
+        """Write what came of a run; its front last, which is what makes it finished: then it has no more need of a checkpoint. Raises
+        OSError if that cannot be written."""
+        front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
         about = {"status": outcome.status, "message": outcome.message, "seed": cell.seed(self.definition["seed"], number)}
         about |= {"wall_time": outcome.wall_time, "traceback": outcome.traceback, "history": outcome.history}
         about |= {"crc32": crc32(outcome.front)} if outcome.status == FINISHED else {}
@@ -273,6 +280,8 @@ class Store:
                 # Nobody could read it, but it is not ours to throw away.
                 front.replace(front.with_name(f"{front.name}.unreadable"))
             write_whole(front, outcome.front)
+            for path in (checkpoint, samples_path(checkpoint)):
+                path.unlink(missing_ok=True)
 
 
 def _check(path: Path, record: Mapping[str, Any]) -> None:

@@ -13,12 +13,12 @@ from transcription.inner import NAMED
 
 from . import combining, studyfile
 from .cell import Cell
-from .published import check as check_paper
+from .reporting.published import check as check_paper
 from .store import Store, Summary
 
 if TYPE_CHECKING:
-    from .report import Report
-from .work import Payload
+    from .reporting.report import Report
+from .making.work import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS = 2, 500
 
@@ -54,7 +54,7 @@ class Study:
     tolerance : float, default 1e-6
         As for `solve`.
     time_limit : float, optional
-        Seconds of a run, after which it is ended and recorded as a timeout. It changes no number of a run that ends before.
+        Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
         One line, for lists.
     paper : mapping
@@ -114,7 +114,7 @@ class Study:
         retry: bool = False,
         progress: bool = False,
     ) -> Summary:
-        """Make the runs that `out` does not have yet.
+        """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class Study:
         KeyboardInterrupt
             Ctrl-C; the same again goes on.
         """
-        from .executing import execute
+        from .making.executing import execute
 
         return execute(self, out, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
@@ -162,8 +162,9 @@ class Study:
         figures: bool = True,
         progress: bool = False,
     ) -> Report:
-        """Tables and figures of the runs that `out` has; see `runs.report.report`. Raises ValueError if it holds another study, or none."""
-        from .report import report
+        """Tables and figures of the runs that `out` has; see `reporting.report.report`. Raises ValueError if it holds another study,
+        or none."""
+        from .reporting.report import report
 
         Store.open(out).check(self.definition())
         return report(out, foreign=foreign, figures=figures, progress=progress)

@@ -19,8 +19,8 @@ def study(arguments: Namespace) -> int:
 
 def run(arguments: Namespace) -> int:
     """Make the runs that are missing."""
-    from .cluster import cluster
-    from .executing import Deserted
+    from .making.cluster import cluster
+    from .making.executing import Deserted
     from .study import Study
 
     if arguments.dask and arguments.jobs:
@@ -60,8 +60,8 @@ def report(arguments: Namespace) -> int:
     """Tables on the terminal, and with the figures in the study's folder."""
     from macs.monitor import Stopped
 
-    from .report import FOLDER
-    from .report import report as write
+    from .reporting.report import FOLDER
+    from .reporting.report import report as write
 
     foreign: dict[str, list[str]] = {}
     for word in arguments.join or []:

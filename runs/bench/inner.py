@@ -17,9 +17,9 @@ from transcription.batched import compiler
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, March, Newton
 from transcription.inner.base import CONVERGED
 
+from ..steps import Steps
 from .cases import BATCH, INNER, Batch, Case
 from .measured import Column, Row, short, table
-from .steps import Steps
 
 BASELINE, PROJECTION, DEFAULT = "ipopt, constant objective", "ipopt, projection", "auto"
 EXACT = Ipopt()

@@ -11,7 +11,7 @@ import numpy as np
 
 from macs.tables import text_table
 
-from ..report_tables import short
+from ..reporting.tables import short
 
 __all__ = ["Column", "Row", "save", "short", "table"]
 

@@ -15,9 +15,9 @@ from problems import Problem, goddard, landing_site, load, orbit_rise
 from transcription import Transcription
 from transcription.stopping import stopped_by
 
-from ..indicators import gd, hypervolume, igd
+from ..measures.indicators import gd, hypervolume, igd
+from ..steps import Steps
 from .measured import Column, Row, short, table
-from .steps import Steps
 
 POINTS = 10
 STARTS = 4

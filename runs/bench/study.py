@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..steps import Steps
 from ..study import Study
 from .measured import Column, Row, short, table
-from .steps import Steps
 
 ONE, TWO = "one process", "two processes"
 FASTER, BEYOND = 1.7, 0.05

@@ -74,3 +74,19 @@ class Slow(Plain):
     def advance(self, state: Any, evaluator: Any, budget: int) -> None:
         time.sleep(0.05)
         super().advance(state, evaluator, budget)
+
+
+@dataclass(frozen=True)
+class Faltering(Plain):
+    """Crashes half way as long as there is a file, and deletes that; notes in another how much was evaluated before each iteration."""
+
+    folder: str = ""
+
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        spent, obstacle = evaluator.counts.evaluations, Path(self.folder, "obstacle")
+        with Path(self.folder, "spent").open("a") as file:
+            file.write(f"{spent}\n")
+        if spent >= budget // 2 and obstacle.exists():
+            obstacle.unlink()
+            raise ArithmeticError("half way")
+        super().advance(state, evaluator, budget)

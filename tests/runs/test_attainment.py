@@ -9,8 +9,8 @@ import pytest
 from macs.dominance import nondominated
 from problems.compiled import Objective
 from runs import hypervolume
-from runs.attainment import attainment, staircase
-from runs.references import foreign
+from runs.measures.attainment import attainment, staircase
+from runs.measures.references import foreign
 
 A = np.array([[1.0, 3.0], [3.0, 1.0]])
 B = np.array([[2.0, 2.0]])

@@ -19,7 +19,7 @@ from problems import goddard, load
 from runs.bench import command, inner, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
-from runs.bench.steps import Steps
+from runs.steps import Steps
 from runs.cli import main
 from transcription import DFET
 

@@ -11,8 +11,8 @@ from macs import MACS, Front
 from problems import goddard, load, orbit_rise
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
-from runs.indicators import distance_to_curve, inverted_distance
-from runs.references import foreign
+from runs.measures.indicators import distance_to_curve, inverted_distance
+from runs.measures.references import foreign
 from transcription import DFET
 
 LINE = np.column_stack([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
@@ -106,7 +106,7 @@ def test_what_did_not_converge_is_no_point():
 
 
 def test_the_scale_says_what_was_done():
-    from runs.scale import Scale
+    from runs.measures.scale import Scale
 
     goals = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
     front = foreign(np.array([[110.0, 0.5]]), goals)

@@ -9,7 +9,7 @@ from macs import Front
 from problems import goddard
 from problems.compiled import Objective
 from runs import gd, hypervolume
-from runs.references import closed_form, foreign, read, union
+from runs.measures.references import closed_form, foreign, read, union
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
 A = np.array([[1.0, 1.0], [3.0, 3.0]])

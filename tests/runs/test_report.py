@@ -12,11 +12,11 @@ from misbehaving import Crashing, Plain, glide
 from macs import Front
 from runs import Study, gd, igd
 from runs.cli import main
-from runs.ground import grounds
-from runs.published import check
-from runs.report import report
+from runs.making.work import Outcome
+from runs.reporting.ground import grounds
+from runs.reporting.published import check
+from runs.reporting.report import report
 from runs.store import Store
-from runs.work import Outcome
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
 PAPER = {"source": "a paper", "note": "thirty runs", "differs": "everything", "glide": {"gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}}

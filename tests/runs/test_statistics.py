@@ -8,7 +8,7 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from runs.statistics import a12, effect, holm, overall, pairwise, summarise
+from runs.measures.statistics import a12, effect, holm, overall, pairwise, summarise
 
 NAN, INF = np.nan, np.inf
 values = st.one_of(st.integers(-20, 20).map(float), st.sampled_from([NAN, INF]))

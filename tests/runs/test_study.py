@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from misbehaving import Crashing, Dying, Hanging, Hungry, Plain, Slow, glide
+from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow, glide
 
 from runs import Study
+from runs.making.work import perform
 from runs.store import Store
-from runs.work import perform
 from transcription import DFET
 
 HERE = Path(__file__).parent
@@ -231,6 +231,27 @@ def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkey
     assert len(before) == 1
     monkeypatch.setattr(store, "write_whole", real)
     assert study().run(tmp_path / "out", executor=Inline()).finished == 3 and before.items() <= stamps(tmp_path).items()
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_a_run_goes_on_where_it_was(tmp_path, damaged):
+    batch = study(solvers={"faltering": Faltering(folder=str(tmp_path))}, runs=1, evaluations=200)
+    spent = tmp_path / "spent"
+    whole = batch.run(tmp_path / "whole", executor=Inline())
+    assert not list((tmp_path / "whole").rglob("*.checkpoint")) and not list((tmp_path / "whole").rglob("*.samples"))
+    (tmp_path / "obstacle").touch()
+    assert batch.run(tmp_path / "halved", executor=Inline()).count("crashed") == 1
+    (kept,) = (tmp_path / "halved").rglob("*.checkpoint")
+    if damaged:
+        kept.write_bytes(kept.read_bytes()[:-100])
+    spent.unlink()
+    halved = batch.run(tmp_path / "halved", executor=Inline(), retry=True)
+    counts = [int(word) for word in spent.read_text().split()]
+    assert counts[0] < 100 if damaged else counts[0] >= 100
+    assert numbers(halved) == numbers(whole)
+    histories = [{**summary.runs[0].history, "elapsed": None} for summary in (halved, whole)]
+    assert histories[0] == histories[1]
+    assert not list((tmp_path / "halved").rglob("*.checkpoint")) and not list((tmp_path / "halved").rglob("*.samples"))
 
 
 # Killed and interrupted

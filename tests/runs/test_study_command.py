@@ -11,9 +11,9 @@ import pytest
 
 from runs import Study, studyfile
 from runs.cli import main
+from runs.making.watching import Watch
+from runs.making.work import Outcome
 from runs.store import Store
-from runs.watching import Watch
-from runs.work import Outcome
 
 GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")
 TOML = """

@@ -16,8 +16,8 @@ pytest.importorskip("distributed")
 from test_study import Inline, numbers, slow, stamps, wait_for
 
 from runs.cli import main
-from runs.cluster import cluster
-from runs.executing import Deserted
+from runs.making.cluster import cluster
+from runs.making.executing import Deserted
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from typing import Any
 
 from macs.front import Front
 
-from .references import closed_form, foreign, read, union
-from .store import Run, Store
-from .work import CRASHED, MEMORY, TIMEOUT
+from ..making.work import CRASHED, MEMORY, TIMEOUT
+from ..measures.references import closed_form, foreign, read, union
+from ..store import Run, Store
 
 FAILED = (CRASHED, TIMEOUT, MEMORY)
 """What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""

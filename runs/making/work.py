@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+import logging
 import pickle
 import time
 import traceback
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from macs.checkpoint import Unreadable, keeps
+
+from .samples import Report, Samples
+
+if TYPE_CHECKING:
+    from macs.front import Front
+    from macs.solver import Solver
+
+log = logging.getLogger(__name__)
 
 FINISHED, CRASHED, TIMEOUT, MEMORY, KILLED = "finished", "crashed", "timeout", "out of memory", "killed"
-SAMPLES = 30
-"""At how many evaluation counts, at most and evenly spaced, the archive is noted, besides the end."""
-EVERY = 0.25
-"""Seconds between reports."""
 
 Payload = tuple[bytes, bytes]
-Report = Callable[[int, float], Any]
-"""Called now and then with evaluations and seconds spent so far."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled."""
+    """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled.
+
+    `checkpoint` is the file that it is kept in while it lasts, where whoever makes it can see that file's folder, as on this machine or on
+    a cluster with one file system.
+    """
 
     payload: Payload = field(repr=False)
     evaluations: int
@@ -31,6 +40,7 @@ class Task:
     inner: str
     tolerance: float
     time_limit: float | None
+    checkpoint: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -61,32 +71,54 @@ class Outcome:
 
 
 def perform(task: Task, report: Report | None = None) -> Outcome:
-    """Make a run here and now. An exception is an outcome."""
+    """Make a run here and now, or what is left of it. An exception is an outcome."""
     began = time.perf_counter()
-    history = _History(task.evaluations, report)
     try:
         problem, scheme = _unpacked(task.payload[0])
         solver = pickle.loads(task.payload[1])
-        front = solver.solve(
-            problem,
-            scheme,
-            evaluations=task.evaluations,
-            seed=task.seed,
-            inner=task.inner,
-            tolerance=task.tolerance,
-            callback=history.note,
-        )
+        front, samples = _solved(task, solver, problem, scheme, report)
         from macs.running import ENDED
         from macs.storage import to_bytes
 
         if front.stats["stopped"] not in ENDED:
             return Outcome(KILLED, f"it was stopped: {front.stats['stopped']}", wall_time=time.perf_counter() - began)
         content = to_bytes(front)
-        history.add(front.stats, front.stats["wall_time"], front.F)
-        return Outcome(FINISHED, front.message, front=content, wall_time=time.perf_counter() - began, history=history.columns)
+        samples.add(front.stats, front.stats["wall_time"], front.F)
+        # What was spent before it was taken up again is known to the front alone.
+        seconds = max(time.perf_counter() - began, front.stats["wall_time"])
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
+
+
+def samples_path(checkpoint: Path) -> Path:
+    """Where a run's samples are kept, beside its checkpoint."""
+    return checkpoint.with_suffix(".samples")
+
+
+def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, Samples]:
+    """The front, and how it came about. A checkpoint that is of no use any more is begun anew."""
+    kept = task.checkpoint if task.checkpoint and task.checkpoint.parent.is_dir() and keeps(solver) else None
+    while True:
+        samples = Samples(task.evaluations, report, samples_path(kept) if kept else None)
+        try:
+            front = solver.solve(
+                problem,
+                scheme,
+                evaluations=task.evaluations,
+                seed=task.seed,
+                inner=task.inner,
+                tolerance=task.tolerance,
+                callback=samples.note,
+                checkpoint=kept,
+            )
+        except Unreadable as error:
+            assert kept is not None
+            log.warning("%s: it is begun anew", error)
+            kept.unlink()
+        else:
+            return front, samples
 
 
 @lru_cache(maxsize=8)
@@ -97,25 +129,3 @@ def _unpacked(payload: bytes) -> tuple[Any, Any]:
     # It hides the method in this one value, which nobody else has.
     object.__setattr__(scheme, "transcribe", lambda _: nlp)
     return problem, scheme
-
-
-class _History:
-    """Notes the archive at some counts, and reports now and then; costs next to nothing."""
-
-    def __init__(self, budget: int, report: Report | None) -> None:
-        self.columns: dict[str, list[Any]] = {key: [] for key in ("evaluations", "inner_iterations", "gradient_solves", "elapsed", "F")}
-        self._step, self._next, self._report, self._told = max(1, budget // SAMPLES), 0, report, 0.0
-
-    def note(self, progress: Any) -> None:
-        if progress.evaluations >= self._next:
-            self._next = (progress.evaluations // self._step + 1) * self._step
-            self.add(vars(progress), progress.elapsed, progress.F)
-        if self._report is not None and progress.elapsed - self._told >= EVERY:
-            self._told = progress.elapsed
-            self._report(progress.evaluations, progress.elapsed)
-
-    def add(self, counts: Any, elapsed: float, F: Any) -> None:
-        for key in ("evaluations", "inner_iterations", "gradient_solves"):
-            self.columns[key].append(int(counts[key]))
-        self.columns["elapsed"].append(float(elapsed))
-        self.columns["F"].append(F.tolist())

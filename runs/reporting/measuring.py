@@ -8,10 +8,10 @@ import numpy as np
 
 from macs.front import Front
 
-from .convergence import History
+from ..measures.convergence import History
+from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+from ..store import Run
 from .ground import Ground, Reference
-from .indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
-from .store import Run
 
 INDICATORS: Mapping[str, Callable[..., float]] = {
     "GD": gd,

@@ -32,7 +32,7 @@ class Scale:
     normalise : bool
         Whether indicators are in these ranges, or in the objectives' own units.
     curve : bool
-        Whether the points of the reference are taken as the curve through them; see `runs.indicators.gd`.
+        Whether the points of the reference are taken as the curve through them; see `runs.measures.indicators.gd`.
     """
 
     ideal: tuple[float, ...]
@@ -56,7 +56,7 @@ class Scale:
         normalise: bool = True,
         curve: bool = True,
     ) -> Scale:
-        """What the indicators of `runs.indicators` do with a reference.
+        """What the indicators of `runs.measures.indicators` do with a reference.
 
         Parameters
         ----------

@@ -92,7 +92,7 @@ class Child:
         self._inbox = queue.SimpleQueue()
         places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "runs.worker"],
+            [sys.executable, "-m", "runs.making.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._words,

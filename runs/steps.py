@@ -1,4 +1,4 @@
-"""How far a benchmark is, for people: a bar on a terminal, a line for each step elsewhere. It writes to stderr."""
+"""How far work of a few long steps is, for people: a bar on a terminal, a line for each step elsewhere. It writes to stderr."""
 
 from __future__ import annotations
 

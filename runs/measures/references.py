@@ -74,7 +74,7 @@ def room(case: str) -> ModuleType:
     """The module that a problem comes from, in which there may also be
 
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
-    - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration;
+    - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, what it is by;
     - `track(values) -> {label: values, label: values}`: where a flight goes, across and up, from its states by name;
     - `plot(flights) -> {name: Figure}`: its own pictures of one flight or many, of whatever has a `trajectory`.
 
@@ -92,7 +92,7 @@ def room(case: str) -> ModuleType:
     try:
         return importlib.import_module(place)
     except (ModuleNotFoundError, ValueError, TypeError) as error:
-        raise ValueError(f"there is no problem '{case}' to take the true front of; there are {', '.join(CASES)}") from error
+        raise ValueError(f"there is no problem '{case}'; there are {', '.join(CASES)}") from error
 
 
 def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:

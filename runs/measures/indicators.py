@@ -1,7 +1,7 @@
 """How good a front is, as numbers: distances to a reference and from it, and the volume that it dominates.
 
-Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False; `runs.scale.Scale`
-says so in words, for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
+Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False; `Scale` says so
+in words, for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
 is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns are minimised.
 
 Against a sparse reference, or one of three and more objectives, all five are what moocore and pymoo compute. A dense reference of two

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..measures.scale import Scale
+from ..measures.statistics import summarise
 from .ground import Ground
 from .measuring import samples, spent
-from .report_tables import Cell, Column, Table, table
-from .scale import Scale
-from .statistics import summarise
+from .tables import Cell, Column, Table, table
 
 KEYS = ("gd_mean", "gd_variance", "igd_mean", "igd_variance", "seconds")
 """What a study's `[paper.PROBLEM]` may hold, and the columns of the table."""

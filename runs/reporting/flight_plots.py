@@ -16,7 +16,7 @@ from macs.front import Front
 from macs.plotting import COLORS, label
 from macs.point import Point
 
-from .indicators import normalised
+from ..measures.indicators import normalised
 from .paper import COLUMN, PAGE, new_figure, style
 
 if TYPE_CHECKING:

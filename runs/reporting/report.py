@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING
 from macs.front import Front
 from macs.storage import write_whole
 
-from .attainment import attainment
-from .bench.steps import Steps
+from ..measures.attainment import attainment
+from ..measures.references import read
+from ..measures.scale import Scale
+from ..measures.statistics import summarise
+from ..standing import summary_text
+from ..steps import Steps
+from ..store import Store
 from .flights import Flights
 from .ground import Ground, Reference, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import published_table
-from .references import read
-from .report_tables import Cell, Column, Table, table
-from .scale import Scale
-from .standing import summary_text
-from .statistics import summarise
 from .statistics_tables import comparison_table, overall_table, summary_table
-from .store import Store
+from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

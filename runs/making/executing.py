@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from macs.inputs import check_count
 
+from ..store import MISSING, UNREADABLE, Run, Store, Summary
 from .crew import Crew, Hired, Local
-from .store import MISSING, UNREADABLE, Run, Store, Summary
 from .watching import Watch
 from .work import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, Task
 
 if TYPE_CHECKING:
-    from .study import Study
+    from ..study import Study
 
 AGAIN = (MISSING, UNREADABLE, KILLED, TIMEOUT, MEMORY)
 """What is made when a study is called again. A run that ended with an exception would most likely end so again."""
@@ -59,7 +59,7 @@ def _make(study: Study, store: Store, crew: Crew, todo: list[Run], watch: Watch)
     left = len(todo)
     try:
         for run in todo:
-            future = crew.submit(_task(study, run), watch.reporter(run))
+            future = crew.submit(_task(study, store, run), watch.reporter(run))
             future.add_done_callback(partial(_put, done, run))
         while left:
             watch.look()
@@ -91,8 +91,7 @@ def _keep(store: Store, run: Run, outcome: Outcome, watch: Watch) -> None:
     watch.ended(run, outcome)
 
 
-def _task(study: Study, run: Run) -> Task:
-    # A run that is killed could go on from a checkpoint of its own: its path, beside the front's, would be one more field here.
+def _task(study: Study, store: Store, run: Run) -> Task:
     return Task(
         payload=study.payloads[run.cell.labels],
         evaluations=run.cell.evaluations,
@@ -100,6 +99,7 @@ def _task(study: Study, run: Run) -> Task:
         inner=study.inner,
         tolerance=float(study.tolerance),
         time_limit=study.time_limit,
+        checkpoint=store.checkpoint_path(run.cell, run.number),
     )
 
 

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from .report_tables import Cell, Column, Table, table
-from .statistics import Comparison, overall, pairwise, summarise
+from ..measures.statistics import Comparison, overall, pairwise, summarise
+from .tables import Cell, Column, Table, table
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]
 """Indicator -> solver -> one value for each run; NaN or infinite where a run failed."""

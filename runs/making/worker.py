@@ -1,4 +1,5 @@
-"""A process that makes one run after the other, `python -m runs.worker`: tasks come in on stdin, reports and outcomes go out on stdout.
+"""A process that makes one run after the other, `python -m runs.making.worker`: tasks come in on stdin, reports and outcomes go out on
+stdout.
 
 Whatever a user's problem prints goes to stderr, so does the traceback of a crash or of a run that is taking too long. It ends when nobody
 can want anything more of it: as soon as stdin is closed, also in the middle of a run, and after a while without a task.

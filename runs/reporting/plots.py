@@ -15,9 +15,9 @@ from macs.front import Front
 from macs.plotting import COLORS, GREY, better
 from problems.compiled import Objective
 
-from .attainment import Attainment, staircase
-from .convergence import History, band
-from .indicators import Points, minimised, pieces, truth
+from ..measures.attainment import Attainment, staircase
+from ..measures.convergence import History, band
+from ..measures.indicators import Points, minimised, pieces, truth
 from .paper import COLUMN, PAGE, legend, new_figure, style
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 from macs.progress import EVERY, minutes
 
-from .store import Run
+from ..store import Run
 from .work import FINISHED, Outcome
 
 SHOWN = 20
