@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -41,8 +42,16 @@ class DFETPhase(PhaseWriter):
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
         self._element = expanded(element_function(tables, phase))
-        self._propagation = Propagation(elements, tables, phase)
-        self.compilable = self._propagation.quick
+
+    @cached_property
+    def _propagation(self) -> Propagation:
+        # Only where something is propagated: gradient solves of few starts never need what takes seconds to write out.
+        return Propagation(self.n, self.tables, self.phase)
+
+    @property
+    def compilable(self) -> bool:  # type: ignore[override]
+        """See `PhaseWriter.compilable`."""
+        return self._propagation.quick
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
