@@ -35,15 +35,17 @@ START = {
 }
 END = {"altitude": 80000 * FOOT, "speed": 2500 * FOOT, "flight-path angle": radians(-5.0)}
 BOUNDS = {
-    "altitude": (0.0, 120e3),
+    "altitude": (20e3, 120e3),
     "longitude": (-pi, pi),
     "latitude": (-0.48 * pi, 0.48 * pi),
-    "speed": (10.0, 8500.0),
+    "speed": (300.0, 8500.0),
     "flight-path angle": (radians(-80.0), radians(80.0)),
     "heading": (-pi, pi),
     "angle of attack": (0.0, radians(40.0)),
     "bank angle": (radians(-90.0), radians(1.0)),
 }
+SCALES = {"altitude": 1e4, "speed": 1e3, "flight-path angle": 0.1}
+"""What counts as one: some ten times what is left open at the end."""
 UNITS = {"altitude": "m", "speed": "m/s"}
 """The others are in rad."""
 ANGLES = ("angle of attack", "bank angle")
@@ -150,7 +152,9 @@ def reentry(
 def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) -> dict[str, ca.MX]:
     """States of a flight, from `start`, which names them all, to what is given of the `end`; returns their symbols."""
     return {
-        name: phase.state(name, bounds=BOUNDS[name], initial=value, final=end.get(name), unit=UNITS.get(name, "rad"))
+        name: phase.state(
+            name, bounds=BOUNDS[name], initial=value, final=end.get(name), unit=UNITS.get(name, "rad"), scale=SCALES.get(name)
+        )
         for name, value in start.items()
     }
 

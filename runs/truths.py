@@ -1,0 +1,264 @@
+"""The true fronts of the re-entry cases, as far as gradients find them: how the tables beside the cases were made.
+
+    python -m runs.truths reentry_case1 [--points 120] [--out FILE.csv]
+
+Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
+commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
+are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import moocore
+import numpy as np
+
+from macs.descents import Descents
+from macs.directions import simplex_lattice
+from macs.dominance import nondominated
+from macs.evaluation import CONVERGED
+from macs.storage import write_whole
+from problems import load
+from problems.compiled import CompiledProblem
+from problems.reentry import case1, case2, statement
+from problems.reentry.case3 import ZONES
+from problems.reentry.statement import FOOT, Limits, Zone
+from transcription import DFET, NLP
+from transcription.scalarized import Solved
+from transcription.simulate import Simulation, simulate
+from transcription.trajectory import Trajectory
+
+from .steps import Steps
+
+CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
+METHOD = DFET(60, 2, control_order=1, basis="bernstein")
+CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
+"""Where the paper measures hypervolume from, minimised."""
+NARROWER, NEARER = 0.98, 0.7
+"""Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, times the case's own: what the mesh leaves open
+between its nodes."""
+ALIKE = 3e-3
+"""Flights whose objectives differ by less than this part of their ranges are one."""
+ALLOWED = 0.01
+"""What a flight may exceed of a limit, or of a tolerance at the end."""
+DIGITS = 2
+"""Of the commands, in degrees."""
+DIVISIONS, BEYOND = 12, 1.3
+"""Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
+SIDES = 2
+"""From how many ways past the zones a place is gone down from."""
+
+
+class Truth:
+    """The front of a case as it becomes known."""
+
+    def __init__(self, case: str) -> None:
+        limits, zones = CASES[case]
+        tolerances = {"altitude_tolerance": 3000 * FOOT, "speed_tolerance": 350 * FOOT, "angle_tolerance": np.radians(1.0)}
+        strict = statement.reentry(
+            case,
+            Limits(NARROWER * limits.heating_rate, NARROWER * limits.dynamic_pressure, NARROWER**2 * limits.load_factor),
+            [replace(zone, radius=zone.radius / NARROWER**0.5) for zone in zones],
+            **{name: NEARER * value for name, value in tolerances.items()},
+        )
+        self.case, self.zones = load(case).compile(), zones
+        self.nlp = METHOD.transcribe(strict)
+        self.descents = Descents(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
+        self.found: list[Solved] = []
+        self.ways: list[tuple[int, ...]] = []
+        # The tolerance of each state at the end, where it has one.
+        self._open = {name: value for name, value in zip(statement.END, tolerances.values(), strict=True)}
+
+    def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
+        """One solve, remembered if it converges."""
+        solved = self.descents.from_vector(start, reference, weights, ceiling)
+        if solved.status == CONVERGED:
+            self.found.append(solved)
+            self.ways.append(way(self.nlp.unpack(solved.z), self.zones))
+        return solved
+
+    def begin(self, steps: Steps) -> None:
+        """The best of each objective from a start on either side of each zone."""
+        for sides in product((-1, 1), repeat=len(self.zones)):
+            start = around(self.nlp, self.zones, sides)
+            for i in range(4):
+                steps.begin(f"sides {sides}, objective {i + 1}")
+                self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
+
+    def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
+        """The best of each objective within a ceiling, and then of the others in their order: objectives (4, 4)."""
+        rows = []
+        for i in range(4):
+            steps.begin(f"end {i + 1}")
+            reached = ceiling.copy()
+            for j in [i, *(k for k in range(4) if k != i)]:
+                F = np.array([solved.F for solved in self.found])
+                inside = np.where(np.maximum(F - reached, 0.0).sum(axis=1) > 0, np.inf, F[:, j])
+                nearest = int(np.argmin(inside)) if np.isfinite(inside).any() else int(np.argmin(np.maximum(F - reached, 0.0).sum(axis=1)))
+                solved = self.solve(self.found[nearest].z, np.where(np.arange(4) == j, 0.0, np.inf), np.eye(4)[j], reached)
+                best = min([inside.min(), solved.F[j] if solved.status == CONVERGED else np.inf])
+                reached[j] = min(reached[j], best + 1e-6 * abs(best))
+            F = np.array([solved.F for solved in self.found])
+            within = np.flatnonzero((F <= reached + 1e-5 * np.abs(reached)).all(axis=1))
+            rows.append(F[within[-1]] if len(within) else F[np.argmin(np.maximum(F - reached, 0.0).sum(axis=1))])
+        return np.array(rows)
+
+    def fill(self, steps: Steps, count: int, ceiling: np.ndarray) -> None:
+        """Go down from places that are far from all that is known."""
+        ends = self.ends(steps, ceiling)
+        ideal, ranges = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-6)
+        lattice = simplex_lattice(4, DIVISIONS)
+        middle = np.full((1, 4), 0.25)
+        places = projected(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
+        tried = np.empty((0, 4))
+        for _ in range(count):
+            F = np.array([solved.F for solved in self.found])
+            F = F[(F <= ceiling + 1e-9).all(axis=1)]
+            known = np.vstack([projected((F - ideal) / ranges), tried])
+            place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+            tried = np.vstack([tried, place])
+            reference = ideal + ranges * place
+            steps.begin(f"place {np.round(reference, 2).tolist()}")
+            for start in self.starts(reference, ranges, ceiling):
+                self.solve(start, reference, ranges, ceiling)
+
+    def starts(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> list[np.ndarray]:
+        """The best that is known for a place, of each of the best ways past the zones."""
+        F = np.array([solved.F for solved in self.found])
+        merit = np.max((F - reference) / ranges, axis=1) + (np.maximum(F - ceiling, 0.0) / ranges).sum(axis=1)
+        best: dict[tuple[int, ...], int] = {}
+        for k in np.argsort(merit):
+            best.setdefault(self.ways[k], int(k))
+        return [self.found[k].z for k in list(best.values())[:SIDES]]
+
+    def rows(self, steps: Steps) -> np.ndarray:
+        """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
+        F = np.array([solved.F for solved in self.found])
+        kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
+        told, broken = [], 0
+        for k in kept:
+            steps.begin(f"flight {k}")
+            trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
+            flown = simulate(self.case, trajectory)
+            if self.feasible(flown):
+                told.append([*flown.objectives.values(), *commands])
+            else:
+                broken += 1
+        print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
+        table = np.array(told)
+        table = table[nondominated(table[:, :4] * SIGNS)]
+        return apart(table[np.argsort(-table[:, 0])])
+
+    def feasible(self, flown: Simulation) -> bool:
+        """Whether a flight exceeds no limit by more than is allowed."""
+        phase = flown.trajectory["entry"]
+        end = dict(zip((v.name for v in phase.state_variables), phase.states[-1], strict=True))
+        ends = [abs(end[name] - statement.END[name]) <= (1 + ALLOWED) * value for name, value in self._open.items()]
+        return all(ends) and all(value <= ALLOWED for name, value in flown.violations.items() if not name.startswith("final"))
+
+
+SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
+
+
+def apart(table: np.ndarray) -> np.ndarray:
+    """Rows (k, 4 + n) without those that are like another one before them; the best of each objective come first."""
+    y = table[:, :4] / np.maximum(np.ptp(table[:, :4], axis=0), 1e-9)
+    kept = list(dict.fromkeys(np.argmin(table[:, :4] * SIGNS, axis=0).tolist()))
+    for k in range(len(y)):
+        if np.linalg.norm(y[kept] - y[k], axis=1).min() > ALIKE:
+            kept.append(k)
+    return table[np.sort(kept)]
+
+
+def projected(y: np.ndarray) -> np.ndarray:
+    """Points (k, m) on the plane that is square to the way down."""
+    return y - y.mean(axis=1, keepdims=True)
+
+
+def way(flight: Trajectory, zones: tuple[Zone, ...]) -> tuple[int, ...]:
+    """For each zone whether a flight passes south of it (-1), north (1), or does not get there (0)."""
+    phase = flight["entry"]
+    east, north = (np.degrees(phase[name]) for name in ("longitude", "latitude"))
+    return tuple(int(np.sign(np.interp(zone.longitude, east, north) - zone.latitude)) * (east[-1] > zone.longitude) for zone in zones)
+
+
+def around(nlp: NLP, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndarray:
+    """The guess, its latitudes moved to one side of each zone."""
+    z = nlp.first_guess(nlp.guess[None])[0]
+    names = {v.name: i for i, v in enumerate(nlp.variables)}
+    for name, i in names.items():
+        if not name.startswith("entry.longitude"):
+            continue
+        j = names[name.replace("longitude", "latitude")]
+        for zone, side in zip(zones, sides, strict=True):
+            apart = np.degrees(z[i]) - zone.longitude
+            if abs(apart) < 1.2 * zone.radius:
+                edge = np.radians(zone.latitude + side * 1.1 * np.sqrt(max(zone.radius**2 - apart**2, 0.0)))
+                z[j] = max(z[j], edge) if side > 0 else min(z[j], edge)
+    return nlp.tighten(z[None])[0]
+
+
+def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:
+    """A flight with commands of as many digits as the table has, and these: (elements, both ends, both angles) in a row."""
+    phase = flight["entry"]
+    commands = np.round(np.degrees(phase.control.coefficients), DIGITS)
+    control = replace(phase.control, coefficients=np.radians(commands))
+    return replace(flight, phases=(replace(phase, control=control),)), commands.ravel()
+
+
+def volume(front: np.ndarray) -> float:
+    """Hypervolume in the paper's units, from the paper's corner, of objectives (k, 4) as the user sees them."""
+    return float(moocore.hypervolume(np.ascontiguousarray(front[:, :4] * SIGNS), ref=CORNER))
+
+
+def made(case: str, points: int) -> np.ndarray:
+    """The table of a case; see the module."""
+    truth = Truth(case)
+    starts = 4 * 2 ** len(truth.zones)
+    with Steps(case, starts + 8 + points) as steps:
+        truth.begin(steps)
+        truth.fill(steps, points - points // 2, np.full(4, np.inf))
+        truth.fill(steps, points // 2, CORNER)
+    with Steps(f"{case}, flown", len(truth.found)) as steps:
+        return truth.rows(steps)
+
+
+def text(case: str, rows: np.ndarray) -> str:
+    """The table with a header that says what it is."""
+    head = [
+        f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
+        f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
+        "flown again by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
+        "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
+        f"angle of attack and bank angle at the beginning and the end of each of {METHOD.elements} equal parts of the time, linear between.",
+    ]
+
+    def shown(row: np.ndarray) -> str:
+        commands = (f"{value + 0.0:.{DIGITS}f}".rstrip("0").rstrip(".") for value in row[4:])
+        return ",".join([*(f"{value:.7g}" for value in row[:4]), *commands])
+
+    return "\n".join([*(f"# {line}" for line in head), *map(shown, rows)]) + "\n"
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="Make the table of a re-entry case's true front again.")
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("--points", type=int, default=120)
+    parser.add_argument("--out", default=None)
+    given = parser.parse_args()
+    rows = made(given.case, given.points)
+    write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
+    print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
+    for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
+        print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")
+
+
+if __name__ == "__main__":
+    main()
