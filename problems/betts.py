@@ -45,4 +45,6 @@ def betts(name: str, heating_rate: float | None = None) -> Problem:
     problem.maximize("cross-range", degrees(1.0) * phase.final(states["latitude"]), unit="deg")
     guess(phase, rates, START, FINAL_GUESS, ANGLES)
     phase.guess(tf=FINAL_GUESS)
+    problem.default_transcription = "dfet:20x3"
+    problem.default_evaluations = 1_000
     return problem

@@ -11,7 +11,6 @@ are flown again by DOP853; the objectives of the table are those that were flown
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -25,7 +24,6 @@ from macs.dominance import nondominated
 from macs.evaluation import CONVERGED
 from macs.storage import write_whole
 from problems import load
-from problems.compiled import CompiledProblem
 from problems.reentry import case1, case2, statement
 from problems.reentry.case3 import ZONES
 from problems.reentry.statement import FOOT, Limits, Zone
@@ -73,7 +71,7 @@ class Truth:
         self.found: list[Solved] = []
         self.ways: list[tuple[int, ...]] = []
         # The tolerance of each state at the end, where it has one.
-        self._open = {name: value for name, value in zip(statement.END, tolerances.values(), strict=True)}
+        self._open = dict(zip(statement.END, tolerances.values(), strict=True))
 
     def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
         """One solve, remembered if it converges."""

@@ -35,8 +35,12 @@ def guess(phase: Phase, rates: Mapping[str, ca.MX], start: Mapping[str, float], 
     times = np.linspace(0.0, final_time, STEPS + 1)
     laws = {name: np.interp(times, np.linspace(0.0, final_time, len(law)), law) for name, law in zip(controls, (ATTACK, BANK), strict=True)}
     states = _flown(phase, rates, [start[name] for name in rates], laws, times)
-    for name, values in (*zip(rates, states, strict=True), *laws.items()):
-        phase.guess(**{name: (times, values)})
+    for name, values in zip(rates, states, strict=True):
+        # With other data it may lead anywhere: then it is a poor guess, but one.
+        lower, upper = phase._states[name].lower, phase._states[name].upper
+        phase.guess(**{name: (times, np.clip(np.where(np.isfinite(values), values, lower), lower, upper))})
+    for name, law in laws.items():
+        phase.guess(**{name: (times, law)})
 
 
 def _flown(

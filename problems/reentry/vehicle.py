@@ -1,9 +1,9 @@
-"""A winged shuttle in the air: its constants, what the air does to it, and its equations of motion over a round Earth that does not turn.
+"""A winged shuttle in the air: its constants, what the air does to it, and its motion over a round Earth that does not turn.
 
-Betts, "Practical Methods for Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 6.1, whose figures are in feet,
-slugs and Btu; equations of motion (5) and (9) of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an
-extended evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020, in which the sign of the density's exponent is a slip.
-Everything here is SI with angles in radians, but for the limits of the air, which are in the units in which they are always told.
+Betts, "Practical Methods for Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 6.1, with figures in feet,
+slugs and Btu; equations (5) and (9) of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an extended
+evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020, in which the sign of the density's exponent is a slip. All is SI with
+angles in radians, but for the heating rate, the dynamic pressure and the load, which are in the units in which their limits are told.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from scipy.integrate import solve_ivp
 from statements import refused
 
 from problems import load
-from problems.reentry import statement, vehicle
+from problems.reentry import case1, case2, case3, statement, vehicle
+from transcription import DFET, Trajectory
 
 STATES = ["altitude", "longitude", "latitude", "speed", "flight-path angle", "heading", "angle of attack", "bank angle"]
 CASES = ["reentry_case1", "reentry_case2", "reentry_case3"]
@@ -63,13 +65,13 @@ def test_the_vehicle_is_the_published_one(case):
 
 
 def test_the_constants_are_those_of_the_literature():
-    assert vehicle.EARTH_RADIUS == pytest.approx(R, abs=0.01)
-    assert vehicle.EARTH_MU == pytest.approx(MU, rel=1e-6)
-    assert vehicle.MASS == pytest.approx(M, abs=0.1) and vehicle.AREA == pytest.approx(S, abs=1e-3)
-    assert vehicle.HEATING_CONSTANT == pytest.approx(1.570305e-8, rel=1e-6)
+    assert pytest.approx(R, abs=0.01) == vehicle.EARTH_RADIUS
+    assert pytest.approx(MU, rel=1e-6) == vehicle.EARTH_MU
+    assert pytest.approx(M, abs=0.1) == vehicle.MASS and pytest.approx(S, abs=1e-3) == vehicle.AREA
+    assert pytest.approx(1.570305e-8, rel=1e-6) == vehicle.HEATING_CONSTANT
     # 280 lbf/ft2 are 13406.46 Pa.
     assert float(vehicle.dynamic_pressure(1e9, 0.0)) == 0.0
-    assert 280 * vehicle.POUND / vehicle.FOOT**2 == pytest.approx(13406.46, abs=0.02)
+    assert pytest.approx(13406.46, abs=0.02) == 280 * vehicle.POUND / vehicle.FOOT**2
 
 
 def test_the_ends_and_the_limits_are_those_of_the_paper():
@@ -201,3 +203,69 @@ def test_the_guess_is_a_flight():
     for v, (low, high), value in zip(phase.states, phase.final, end, strict=True):
         assert low <= value <= high, v.name
     assert statement.START.keys() == set(STATES)
+
+
+@dataclass
+class Flight:
+    """What pictures need of a point or a simulation."""
+
+    trajectory: Trajectory | None
+
+
+@pytest.fixture(scope="module")
+def flights() -> dict[str, list[Flight]]:
+    """The guesses of all cases, and a heavier one's."""
+    made = {}
+    for case in CASES:
+        nlps = [DFET(10, 2).transcribe(load(case, mass=mass)) for mass in (vehicle.MASS, 1.05 * vehicle.MASS)]
+        made[case] = [Flight(nlp.unpack(nlp.first_guess(nlp.guess[None])[0])) for nlp in nlps]
+    return made
+
+
+@pytest.mark.parametrize(("case", "room"), list(zip(CASES, (case1, case2, case3), strict=True)))
+def test_pictures_show_states_limits_and_zones(case, room, flights, tmp_path):
+    pictures = room.plot(flights[case])
+    assert set(pictures) == {"population", "ground-track"}
+    axes = pictures["population"].axes
+    words = [ax.get_ylabel() for ax in axes]
+    assert "altitude [km]" in words and "bank angle [deg]" in words and "heating rate [Btu/ft2/s]" in words
+    assert "cross-range [deg]" in words, "what the colours mean"
+    altitude, heating = axes[words.index("altitude [km]")], axes[words.index("heating rate [Btu/ft2/s]")]
+    assert altitude.lines[0].get_ydata()[[0, -1]] == pytest.approx([79.248, 25.0], abs=0.5)
+    assert heating.lines[-1].get_ydata()[0] == room.LIMITS.heating_rate
+    track = pictures["ground-track"].axes[0]
+    assert len(track.patches) == (3 if case == "reentry_case3" else 0)
+    for name, picture in pictures.items():
+        picture.savefig(tmp_path / f"{name}.png")
+    assert "cross-range [deg]" not in [ax.get_ylabel() for ax in room.plot(flights[case][:1])["population"].axes]
+    with pytest.raises(ValueError, match="no flight"):
+        room.plot([Flight(None)])
+
+
+def test_the_track_is_in_degrees():
+    found = case1.track({"longitude": np.array([0.0, math.pi / 2]), "latitude": np.array([0.0, math.pi / 6])})
+    assert {name: values.tolist() for name, values in found.items()} == {
+        "longitude [deg]": [0.0, pytest.approx(90.0)], "latitude [deg]": [0.0, pytest.approx(30.0)]
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("data", [{"final_time": 4000.0}, {"final_time": 10.0}, {"mass": 10.0}, {"mass": 1e9}, {"lag_gain": 100.0}])
+def test_any_data_make_a_problem(data):
+    """Where the nominal law leads nowhere, the guess stays within bounds."""
+    nlp = DFET(3, 1).transcribe(load("reentry_case1", **data))
+    Z = nlp.first_guess(nlp.guess[None])
+    assert np.isfinite(nlp.evaluate(Z)[1]).all()
+
+
+def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():
+    """What stands for the absolute values is what they are, once a candidate is flown."""
+    nlp = DFET(8, 2).transcribe(load("reentry_case1"))
+    Z = nlp.march(nlp.first_guess(nlp.guess[None]))
+    phase, flight = nlp.problem.phases[0], nlp.unpack(Z[0])["entry"]
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    total = 0.0
+    for j in range(8):
+        x, u = flight.state.on_element(j, nodes), flight.controls_on(j, nodes)
+        total += 125.0 * weights @ np.array([by_hand(*pair)[0][4] for pair in zip(x, u, strict=True)]).__abs__()
+    assert nlp.evaluate(Z)[0][0, 2] == pytest.approx(total, rel=1e-3)
+    assert phase.sized == (1,)
