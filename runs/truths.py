@@ -41,7 +41,7 @@ CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
 NARROWER, NEARER = 0.98, 0.7
 """Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, times the case's own: what the mesh leaves open
 between its nodes."""
-ALIKE = 3e-3
+ALIKE = 1e-2
 """Flights whose objectives differ by less than this part of their ranges are one."""
 ALLOWED = 0.01
 """What a flight may exceed of a limit, or of a tolerance at the end."""
@@ -49,6 +49,7 @@ DIGITS = 2
 """Of the commands, in degrees."""
 DIVISIONS, BEYOND = 12, 1.3
 """Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
+RTOL = 1e-8
 SIDES = 2
 """From how many ways past the zones a place is gone down from."""
 
@@ -103,7 +104,7 @@ class Truth:
                 best = min([inside.min(), solved.F[j] if solved.status == CONVERGED else np.inf])
                 reached[j] = min(reached[j], best + 1e-6 * abs(best))
             F = np.array([solved.F for solved in self.found])
-            within = np.flatnonzero((F <= reached + 1e-5 * np.abs(reached)).all(axis=1))
+            within = np.flatnonzero((F - reached <= 1e-5 * np.abs(reached)).all(axis=1))
             rows.append(F[within[-1]] if len(within) else F[np.argmin(np.maximum(F - reached, 0.0).sum(axis=1))])
         return np.array(rows)
 
@@ -117,7 +118,7 @@ class Truth:
         tried = np.empty((0, 4))
         for _ in range(count):
             F = np.array([solved.F for solved in self.found])
-            F = F[(F <= ceiling + 1e-9).all(axis=1)]
+            F = F[(F - ceiling <= 1e-9).all(axis=1)]
             known = np.vstack([projected((F - ideal) / ranges), tried])
             place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
             tried = np.vstack([tried, place])
@@ -139,11 +140,12 @@ class Truth:
         """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
         F = np.array([solved.F for solved in self.found])
         kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
+        kept = kept[apart(F[kept])]
         told, broken = [], 0
         for k in kept:
             steps.begin(f"flight {k}")
             trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
-            flown = simulate(self.case, trajectory)
+            flown = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
             if self.feasible(flown):
                 told.append([*flown.objectives.values(), *commands])
             else:
@@ -151,7 +153,7 @@ class Truth:
         print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
         table = np.array(told)
         table = table[nondominated(table[:, :4] * SIGNS)]
-        return apart(table[np.argsort(-table[:, 0])])
+        return table[np.argsort(-table[:, 0])]
 
     def feasible(self, flown: Simulation) -> bool:
         """Whether a flight exceeds no limit by more than is allowed."""
@@ -164,14 +166,14 @@ class Truth:
 SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
 
 
-def apart(table: np.ndarray) -> np.ndarray:
-    """Rows (k, 4 + n) without those that are like another one before them; the best of each objective come first."""
-    y = table[:, :4] / np.maximum(np.ptp(table[:, :4], axis=0), 1e-9)
-    kept = list(dict.fromkeys(np.argmin(table[:, :4] * SIGNS, axis=0).tolist()))
+def apart(F: np.ndarray) -> np.ndarray:
+    """Rows (k, 4), minimised, without those that are like another one; the best of each objective come before others. Their indices."""
+    y = F / np.maximum(np.ptp(F, axis=0), 1e-9)
+    kept = list(dict.fromkeys(np.argmin(F, axis=0).tolist()))
     for k in range(len(y)):
         if np.linalg.norm(y[kept] - y[k], axis=1).min() > ALIKE:
             kept.append(k)
-    return table[np.sort(kept)]
+    return np.sort(kept)
 
 
 def projected(y: np.ndarray) -> np.ndarray:
@@ -234,7 +236,7 @@ def text(case: str, rows: np.ndarray) -> str:
         f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
         "flown again by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
         "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
-        f"angle of attack and bank angle at the beginning and the end of each of {METHOD.elements} equal parts of the time, linear between.",
+        f"angle of attack and bank angle at both ends of each of {METHOD.elements} equal parts of the time, linear between.",
     ]
 
     def shown(row: np.ndarray) -> str:

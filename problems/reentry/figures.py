@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PHASE = "entry"
 SAMPLES = 801
 GREY, RED = "#666666", "#D55E00"
-STATES = {
+ALONG = {
     "altitude": ("altitude [km]", 1e-3),
     "longitude": ("longitude [deg]", degrees(1.0)),
     "latitude": ("latitude [deg]", degrees(1.0)),
@@ -25,6 +25,8 @@ STATES = {
     "heading": ("heading [deg]", degrees(1.0)),
     "angle of attack": ("angle of attack [deg]", degrees(1.0)),
     "bank angle": ("bank angle [deg]", degrees(1.0)),
+    "angle of attack command": ("angle of attack command [deg]", degrees(1.0)),
+    "bank angle command": ("bank angle command [deg]", degrees(1.0)),
 }
 PATHS = {"heating rate": "Btu/ft2/s", "dynamic pressure": "lbf/ft2", "load factor": "g"}
 """The others are distances in degrees."""
@@ -41,7 +43,7 @@ def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def flights_figure(flights: Sequence[Any]) -> Figure:
-    """A panel for each state, and each limited quantity with its limit, over time; a line for each flight, coloured by its cross-range.
+    """A panel for each state and command, and each limited quantity with its limit, over time; a line for each flight, coloured by its cross-range.
 
     Parameters
     ----------
@@ -50,17 +52,17 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     """
     phases = _phases(flights)
     limits = phases[0].path_limits
-    panels = [*STATES, *(limit.name for limit in limits)]
-    figure, colors = _new_figure(7.2, 1.35 * -(-len(panels) // 3) + 0.5), _colors(phases)
+    panels = [*ALONG, *(limit.name for limit in limits)]
+    figure, colors = _new_figure(7.2, 1.45 * -(-len(panels) // 3) + 0.3), _colors(phases)
     grid = figure.subplots(-(-len(panels) // 3), 3, sharex=True).ravel()
     for ax, name in zip(grid, panels, strict=False):
-        text, unit = STATES.get(name) or (f"{name} [{PATHS.get(name, 'deg')}]", 1.0)
+        text, unit = ALONG.get(name) or (f"{name} [{PATHS.get(name, 'deg')}]", 1.0)
         for phase, color in zip(phases, colors, strict=True):
-            times, values = _along(phase, name) if name in STATES else (phase.time, phase[name])
+            times, values = _along(phase, name) if name in ALONG else (phase.time, phase[name])
             ax.plot(times, unit * values, color=color, lw=0.9 if len(phases) > 1 else 1.3)
-        ax.set_ylabel(text)
+        ax.set_title(text, loc="left")
         ax.margins(x=0.0)
-    for ax, limit in zip(grid[len(STATES) :], limits, strict=False):
+    for ax, limit in zip(grid[len(ALONG) :], limits, strict=False):
         for bound in (limit.lower, limit.upper):
             if np.isfinite(bound):
                 ax.axhline(bound, color=RED, lw=0.9, ls=(0, (4, 2)))
@@ -69,7 +71,6 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     for ax in grid[len(panels) - 3 : len(panels)]:
         ax.tick_params(labelbottom=True)
     figure.supxlabel("time [s]")
-    figure.align_ylabels(grid[: len(panels)])
     _bar(figure, phases, grid[: len(panels)].tolist())
     return figure
 
