@@ -5,14 +5,15 @@
 Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
 commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
 are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
-1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume.
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. Flights of the first case that are
+feasible in a harder one are optimal there too, and are taken over: then all places lie in that corner.
 """
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from itertools import product
+from importlib.resources import files
 from pathlib import Path
 
 import moocore
@@ -35,6 +36,7 @@ from transcription.trajectory import Trajectory
 from .steps import Steps
 
 CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
+EASIEST = "reentry_case1"
 METHOD = DFET(60, 2, control_order=1, basis="bernstein")
 CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
 """Where the paper measures hypervolume from, minimised."""
@@ -50,6 +52,8 @@ DIGITS = 2
 DIVISIONS, BEYOND = 12, 1.3
 """Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
 RTOL = 1e-8
+SIDE_STARTS = ((-1, -1, -1), (-1, 1, 1), (1, 1, 1), (1, -1, -1))
+"""Of the zones, which the flights to begin with pass: south (-1) or north (1) of each."""
 SIDES = 2
 """From how many ways past the zones a place is gone down from."""
 
@@ -83,29 +87,26 @@ class Truth:
         return solved
 
     def begin(self, steps: Steps) -> None:
-        """The best of each objective from a start on either side of each zone."""
-        for sides in product((-1, 1), repeat=len(self.zones)):
+        """The best of each objective; where there are zones the greatest cross-range, from starts on either side of these."""
+        for sides in SIDE_STARTS if self.zones else [()]:
             start = around(self.nlp, self.zones, sides)
-            for i in range(4):
+            for i in (0,) if self.zones else range(4):
                 steps.begin(f"sides {sides}, objective {i + 1}")
                 self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
 
     def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
-        """The best of each objective within a ceiling, and then of the others in their order: objectives (4, 4)."""
+        """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4)."""
         rows = []
         for i in range(4):
             steps.begin(f"end {i + 1}")
-            reached = ceiling.copy()
-            for j in [i, *(k for k in range(4) if k != i)]:
-                F = np.array([solved.F for solved in self.found])
-                inside = np.where(np.maximum(F - reached, 0.0).sum(axis=1) > 0, np.inf, F[:, j])
-                nearest = int(np.argmin(inside)) if np.isfinite(inside).any() else int(np.argmin(np.maximum(F - reached, 0.0).sum(axis=1)))
-                solved = self.solve(self.found[nearest].z, np.where(np.arange(4) == j, 0.0, np.inf), np.eye(4)[j], reached)
-                best = min([inside.min(), solved.F[j] if solved.status == CONVERGED else np.inf])
-                reached[j] = min(reached[j], best + 1e-6 * abs(best))
             F = np.array([solved.F for solved in self.found])
-            within = np.flatnonzero((F - reached <= 1e-5 * np.abs(reached)).all(axis=1))
-            rows.append(F[within[-1]] if len(within) else F[np.argmin(np.maximum(F - reached, 0.0).sum(axis=1))])
+            nearest = int(np.lexsort((F[:, i], np.maximum(F - ceiling, 0.0).sum(axis=1)))[0])
+            alone = np.where(np.arange(4) == i, 0.0, np.inf)
+            first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
+            limit = np.where(np.arange(4) == i, first.F[i] + 1e-6 * abs(first.F[i]), ceiling)
+            others = np.where(np.arange(4) == i, np.inf, first.F)
+            second = self.solve(first.z, others, np.maximum(np.ptp(F, axis=0), 1e-3), limit)
+            rows.append(second.F if second.status == CONVERGED else first.F)
         return np.array(rows)
 
     def fill(self, steps: Steps, count: int, ceiling: np.ndarray) -> None:
@@ -136,7 +137,7 @@ class Truth:
             best.setdefault(self.ways[k], int(k))
         return [self.found[k].z for k in list(best.values())[:SIDES]]
 
-    def rows(self, steps: Steps) -> np.ndarray:
+    def rows(self, steps: Steps) -> list[np.ndarray]:
         """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
         F = np.array([solved.F for solved in self.found])
         kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
@@ -147,13 +148,11 @@ class Truth:
             trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
             flown = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
             if self.feasible(flown):
-                told.append([*flown.objectives.values(), *commands])
+                told.append(np.array([*flown.objectives.values(), *commands]))
             else:
                 broken += 1
         print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
-        table = np.array(told)
-        table = table[nondominated(table[:, :4] * SIGNS)]
-        return table[np.argsort(-table[:, 0])]
+        return told
 
     def feasible(self, flown: Simulation) -> bool:
         """Whether a flight exceeds no limit by more than is allowed."""
@@ -206,10 +205,15 @@ def around(nlp: NLP, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndar
 
 def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:
     """A flight with commands of as many digits as the table has, and these: (elements, both ends, both angles) in a row."""
+    commands = np.round(np.degrees(flight["entry"].control.coefficients), DIGITS).ravel()
+    return with_commands(flight, commands), commands
+
+
+def with_commands(flight: Trajectory, commands: np.ndarray) -> Trajectory:
+    """A flight with other commands, in degrees."""
     phase = flight["entry"]
-    commands = np.round(np.degrees(phase.control.coefficients), DIGITS)
-    control = replace(phase.control, coefficients=np.radians(commands))
-    return replace(flight, phases=(replace(phase, control=control),)), commands.ravel()
+    control = replace(phase.control, coefficients=np.radians(commands).reshape(phase.control.coefficients.shape))
+    return replace(flight, phases=(replace(phase, control=control),))
 
 
 def volume(front: np.ndarray) -> float:
@@ -220,13 +224,36 @@ def volume(front: np.ndarray) -> float:
 def made(case: str, points: int) -> np.ndarray:
     """The table of a case; see the module."""
     truth = Truth(case)
-    starts = 4 * 2 ** len(truth.zones)
-    with Steps(case, starts + 8 + points) as steps:
+    easier = [] if case == EASIEST else inherited(truth)
+    windows = [CORNER] if len(easier) else [np.full(4, np.inf), CORNER]
+    with Steps(case, 4 + 4 * len(windows) + points) as steps:
         truth.begin(steps)
-        truth.fill(steps, points - points // 2, np.full(4, np.inf))
-        truth.fill(steps, points // 2, CORNER)
+        for window in windows:
+            truth.fill(steps, points // len(windows), window)
     with Steps(f"{case}, flown", len(truth.found)) as steps:
-        return truth.rows(steps)
+        return united([*easier, *truth.rows(steps)])
+
+
+def inherited(truth: Truth) -> list[np.ndarray]:
+    """The flights of the easiest case that are feasible in a harder one, where they are optimal too."""
+    with files("problems.reentry").joinpath(f"{EASIEST.removeprefix('reentry_')}.csv").open() as file:
+        rows = np.loadtxt(file, delimiter=",", ndmin=2)
+    template, found = truth.nlp.unpack(truth.nlp.first_guess(truth.nlp.guess[None])[0]), []
+    with Steps("flights of the easiest case", len(rows)) as steps:
+        for row in rows:
+            steps.begin(f"cross-range {row[0]:.2f}")
+            flown = simulate(truth.case, with_commands(template, row[4:]), rtol=RTOL, atol=RTOL)
+            if truth.feasible(flown):
+                found.append(row)
+    print(f"{len(found)} of {len(rows)} flights of {EASIEST} are feasible")
+    return found
+
+
+def united(rows: list[np.ndarray]) -> np.ndarray:
+    """The rows that none dominates, by their cross-range."""
+    table = np.array(rows)
+    table = table[nondominated(table[:, :4] * SIGNS)]
+    return table[np.argsort(-table[:, 0])]
 
 
 def text(case: str, rows: np.ndarray) -> str:

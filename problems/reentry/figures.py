@@ -43,7 +43,7 @@ def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def flights_figure(flights: Sequence[Any]) -> Figure:
-    """A panel for each state and command, and each limited quantity with its limit, over time; a line for each flight, coloured by its cross-range.
+    """Panels over time: states, commands, and limited quantities with their limits. A line for each flight, coloured by its cross-range.
 
     Parameters
     ----------
