@@ -63,6 +63,7 @@ class Truth:
 
     def __init__(self, case: str) -> None:
         limits, zones = CASES[case]
+        self.limits = limits
         tolerances = {"altitude_tolerance": 3000 * FOOT, "speed_tolerance": 350 * FOOT, "angle_tolerance": np.radians(1.0)}
         strict = statement.reentry(
             case,
@@ -242,6 +243,8 @@ def inherited(truth: Truth) -> list[np.ndarray]:
     with Steps("flights of the easiest case", len(rows)) as steps:
         for row in rows:
             steps.begin(f"cross-range {row[0]:.2f}")
+            if row[3] > (1 + ALLOWED) * truth.limits.heating_rate:
+                continue
             flown = simulate(truth.case, with_commands(template, row[4:]), rtol=RTOL, atol=RTOL)
             if truth.feasible(flown):
                 found.append(row)
