@@ -52,7 +52,7 @@ DIGITS = 2
 DIVISIONS, BEYOND = 12, 1.3
 """Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
 RTOL = 1e-8
-SIDE_STARTS = ((-1, -1, -1), (-1, 1, 1), (1, 1, 1), (1, -1, -1))
+SIDE_STARTS = ((-1, 1, 1), (1, 1, 1))
 """Of the zones, which the flights to begin with pass: south (-1) or north (1) of each."""
 SIDES = 2
 """From how many ways past the zones a place is gone down from."""
@@ -73,6 +73,7 @@ class Truth:
         )
         self.case, self.zones = load(case).compile(), zones
         self.nlp = METHOD.transcribe(strict)
+        self.template = self.nlp.unpack(self.nlp.first_guess(self.nlp.guess[None])[0])
         self.descents = Descents(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
         self.found: list[Solved] = []
         self.ways: list[tuple[int, ...]] = []
@@ -87,13 +88,22 @@ class Truth:
             self.ways.append(way(self.nlp.unpack(solved.z), self.zones))
         return solved
 
-    def begin(self, steps: Steps) -> None:
-        """The best of each objective; where there are zones the greatest cross-range, from starts on either side of these."""
-        for sides in SIDE_STARTS if self.zones else [()]:
-            start = around(self.nlp, self.zones, sides)
-            for i in (0,) if self.zones else range(4):
-                steps.begin(f"sides {sides}, objective {i + 1}")
+    def begin(self, steps: Steps, rows: np.ndarray) -> None:
+        """The best of each objective from the guess; in a harder case, down from flights of the easiest one (k, 4 + n) instead."""
+        if not len(rows):
+            start = self.nlp.first_guess(self.nlp.guess[None])[0]
+            for i in range(4):
+                steps.begin(f"objective {i + 1}")
                 self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
+            return
+        F = rows[:, :4] * SIGNS
+        inside = np.flatnonzero((F - CORNER < 0).all(axis=1))
+        for k in dict.fromkeys(inside[np.argmin(F[inside], axis=0)].tolist()):
+            steps.begin(f"from {np.round(F[k], 2).tolist()}")
+            flown = simulate(self.case, with_commands(self.template, rows[k, 4:]), rtol=RTOL, atol=RTOL)
+            z = self.nlp.interpolate(flown.trajectory)
+            for sides in SIDE_STARTS if self.zones else [()]:
+                self.solve(around(self.nlp, z, self.zones, sides), F[k], np.ptp(F, axis=0), np.full(4, np.inf))
 
     def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
         """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4)."""
@@ -155,6 +165,18 @@ class Truth:
         print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
         return told
 
+    def inherited(self, steps: Steps, rows: np.ndarray) -> list[np.ndarray]:
+        """The flights of the easiest case that are feasible in this one, where they are optimal too."""
+        found = []
+        for row in rows:
+            steps.begin(f"cross-range {row[0]:.2f}")
+            if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
+                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
+                if self.feasible(flown):
+                    found.append(row)
+        print(f"{len(found)} of {len(rows)} flights of {EASIEST} are feasible")
+        return found
+
     def feasible(self, flown: Simulation) -> bool:
         """Whether a flight exceeds no limit by more than is allowed."""
         phase = flown.trajectory["entry"]
@@ -188,9 +210,9 @@ def way(flight: Trajectory, zones: tuple[Zone, ...]) -> tuple[int, ...]:
     return tuple(int(np.sign(np.interp(zone.longitude, east, north) - zone.latitude)) * (east[-1] > zone.longitude) for zone in zones)
 
 
-def around(nlp: NLP, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndarray:
-    """The guess, its latitudes moved to one side of each zone."""
-    z = nlp.first_guess(nlp.guess[None])[0]
+def around(nlp: NLP, z: np.ndarray, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndarray:
+    """A vector (n,), its latitudes moved to one side of each zone."""
+    z = z.copy()
     names = {v.name: i for i, v in enumerate(nlp.variables)}
     for name, i in names.items():
         if not name.startswith("entry.longitude"):
@@ -225,31 +247,22 @@ def volume(front: np.ndarray) -> float:
 def made(case: str, points: int) -> np.ndarray:
     """The table of a case; see the module."""
     truth = Truth(case)
-    easier = [] if case == EASIEST else inherited(truth)
+    easier = np.empty((0, 4)) if case == EASIEST else easiest()
     windows = [CORNER] if len(easier) else [np.full(4, np.inf), CORNER]
     with Steps(case, 4 + 4 * len(windows) + points) as steps:
-        truth.begin(steps)
+        truth.begin(steps, easier)
         for window in windows:
             truth.fill(steps, points // len(windows), window)
     with Steps(f"{case}, flown", len(truth.found)) as steps:
-        return united([*easier, *truth.rows(steps)])
+        own = truth.rows(steps)
+    with Steps(f"{case}, flights of the easiest case", len(easier)) as steps:
+        return united([*truth.inherited(steps, easier), *own])
 
 
-def inherited(truth: Truth) -> list[np.ndarray]:
-    """The flights of the easiest case that are feasible in a harder one, where they are optimal too."""
+def easiest() -> np.ndarray:
+    """The table of the easiest case (k, 4 + n)."""
     with files("problems.reentry").joinpath(f"{EASIEST.removeprefix('reentry_')}.csv").open() as file:
-        rows = np.loadtxt(file, delimiter=",", ndmin=2)
-    template, found = truth.nlp.unpack(truth.nlp.first_guess(truth.nlp.guess[None])[0]), []
-    with Steps("flights of the easiest case", len(rows)) as steps:
-        for row in rows:
-            steps.begin(f"cross-range {row[0]:.2f}")
-            if row[3] > (1 + ALLOWED) * truth.limits.heating_rate:
-                continue
-            flown = simulate(truth.case, with_commands(template, row[4:]), rtol=RTOL, atol=RTOL)
-            if truth.feasible(flown):
-                found.append(row)
-    print(f"{len(found)} of {len(rows)} flights of {EASIEST} are feasible")
-    return found
+        return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
 def united(rows: list[np.ndarray]) -> np.ndarray:
