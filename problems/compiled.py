@@ -97,6 +97,12 @@ class CompiledPhase:
     finals: ca.Function
     integrands: ca.Function
     peaks: ca.Function
+    sizes: ca.Function
+    """Expressions whose absolute values are integrands, ..."""
+    sized: tuple[int, ...]
+    """... and which rows of `integrands` these are, as far as they are minimised or bounded above only; ..."""
+    size_scales: tuple[float, ...] = ()
+    """... and how large they mostly are within the bounds."""
 
     @property
     def n_quantities(self) -> int:

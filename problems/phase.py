@@ -137,7 +137,11 @@ class Phase:
         return self._quantity("final", expr)
 
     def integral(self, expr: Any) -> ca.MX:
-        """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints."""
+        """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints.
+
+        One of `casadi.fabs(...)` as it stands, minimised or bounded above, is no obstacle to gradients: a transcription may write it with
+        bounds on both signs, which are smooth.
+        """
         return self._quantity("integral", expr)
 
     def peak(self, expr: Any) -> ca.MX:
@@ -218,6 +222,8 @@ class Phase:
         def function(name: str, expressions: list[ca.MX]) -> ca.Function:
             return vector_function(name, groups, expressions)
 
+        sizes = {row: expr.dep(0) for row, (_, expr) in enumerate(self._quantities["integral"]) if expr.is_op(ca.OP_FABS)}
+
         return CompiledPhase(
             name=self.name,
             time_unit=self._time_unit,
@@ -236,4 +242,6 @@ class Phase:
             finals=function("finals", [expr for _, expr in self._quantities["final"]]),
             integrands=function("integrands", [expr for _, expr in self._quantities["integral"]]),
             peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
+            sizes=function("sizes", list(sizes.values())),
+            sized=tuple(sizes),
         )

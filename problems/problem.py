@@ -12,6 +12,7 @@ import casadi as ca
 from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .functions import vector_function
+from .peaks import with_sizes
 from .phase import Phase
 from .sanity import check_numbers
 
@@ -187,7 +188,7 @@ class Problem:
             data=dict(self.data),
         )
         check_numbers(compiled, [phase._labels() for phase in self._phases.values()])
-        return compiled
+        return with_sizes(compiled)
 
     def _resolved(self, link: Link) -> Link:
         """The link with all states that are common by now, unless its user named them."""

@@ -43,23 +43,25 @@ class Assembly:
         for i in problem.order_in_time:
             self._writers[i] = writer(problem.phases[i], self.layout, self._ends(i))
         self._peaks = [self._add_peaks(phase) for phase in problem.phases]
+        self._least = np.concatenate([*self._peaks, *(self._writers[i].magnitudes for i in range(len(problem.phases)))])
 
     def nlp(self, transcription: Transcription) -> NLP:
         """The whole NLP."""
         z = ca.MX.sym("z", len(self.layout.variables) + self.layout.hidden)
         extended = self.layout.extended_symbol(z)
         rows = Rows()
-        quantities, largest = [], []
+        quantities, largest, magnitudes = [], [], []
         for i in range(len(self.problem.phases)):
-            q, peaks = self._write_phase(i, extended, rows)
+            q, peaks, sizes = self._write_phase(i, extended, rows)
             quantities.append(q)
             largest.append(peaks)
+            magnitudes.append(sizes)
         self._write_problem(extended, quantities, rows)
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
         g = ca.densify(ca.vertcat(*rows.expressions))
         scores = ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])
-        largest_peaks = ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest))], ["z"], ["peaks"])
+        largest_peaks = ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest, *magnitudes))], ["z"], ["peaks"])
         if not self.layout.hidden:
             largest_peaks = expanded(largest_peaks)
         self._largest = Batched(self._filled(largest_peaks))
@@ -143,7 +145,7 @@ class Assembly:
         return Reduced(
             self.layout,
             list(self._writers.values()),
-            (np.concatenate(self._peaks), peaks),
+            (self._least, peaks),
             (function, lower, upper, scale),
             # What hangs on hidden quantities is looked at where these are flown; elsewhere on demand.
             (scores, rows.left) if self.layout.hidden else None,
@@ -151,11 +153,10 @@ class Assembly:
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
         """See `NLP.tighten`."""
-        slots = np.concatenate(self._peaks)
-        if not len(slots):
+        if not len(self._least):
             return Z
         Z = Z.copy()
-        Z[:, slots] = self._largest(Z)[0]
+        Z[:, self._least] = self._largest(Z)[0]
         return Z
 
     def unpack(self, z: np.ndarray) -> Trajectory:
@@ -225,8 +226,8 @@ class Assembly:
         variables = [Variable(name, -np.inf, np.inf, "", float(scale or 1.0)) for name, scale in zip(names, scales, strict=True)]
         return np.array([self.layout.add(variable) for variable in variables])
 
-    def _write_phase(self, i: int, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
-        """Rows of phase i; its quantities q and the largest samples of its peaks."""
+    def _write_phase(self, i: int, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Rows of phase i; its quantities q, the largest samples of its peaks, and its magnitudes."""
         phase, writer, peaks = self.problem.phases[i], self._writers[i], self._peaks[i]
         written = writer.write(extended, rows)
         pick = self.layout.pick
@@ -240,7 +241,8 @@ class Assembly:
         initials = phase.initials(first, written.first_control, s[0], s)
         finals = phase.finals(last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
-        return ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak), ca.vertcat(*largest) if largest else ca.MX(0, 1)
+        q = ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak)
+        return q, ca.vertcat(*largest) if largest else ca.MX(0, 1), written.magnitudes
 
     def _write_problem(self, extended: ca.MX, quantities: list[ca.MX], rows: Rows) -> None:
         """Rows of durations, of links that could not be shared, and of the user's constraints."""

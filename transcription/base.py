@@ -98,7 +98,7 @@ class NLP:
     reduced : Reduced
         What propagation leaves to satisfy, as functions of the free variables alone.
     tighten : callable
-        Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound.
+        Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound, and what stands for absolute values to these.
     unpack : callable
         A vector (n,) -> Trajectory.
     interpolate : callable

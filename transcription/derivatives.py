@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from .base import NLP, expanded
+from .base import NLP
 
 SAMPLES = 31
 """Where the slopes of objectives are looked at to know their scales."""
@@ -28,6 +29,12 @@ def objective_scales(nlp: NLP) -> np.ndarray:
 @lru_cache(maxsize=8)
 def gradients(nlp: NLP) -> ca.Function:
     """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
-    z = ca.MX.sym("z", len(nlp.variables))
+    z = symbol(nlp, "z", len(nlp.variables))
     F, g = nlp.functions(z)
-    return expanded(ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"]))
+    return ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"])
+
+
+def symbol(nlp: NLP, name: str, size: int) -> Any:
+    """A column of symbols of the kind that the functions of an NLP are made of: derivatives of flat lists of scalar operations are best
+    made, and fastest, as such lists; a Callback allows none."""
+    return (ca.SX if nlp.functions.is_a("SXFunction") else ca.MX).sym(name, size)

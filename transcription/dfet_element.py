@@ -11,7 +11,7 @@ from .dfet_tables import Tables
 
 
 def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, peaks, controls at both ends)."""
+    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, peaks, controls at both ends, sizes)."""
     nx, nu = len(phase.states), len(phase.controls)
     X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
     left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
@@ -31,9 +31,10 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
     paths = over(phase.path, tables.points, closed @ ca.DM(tables.flown(tables.points)).T)
     peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown(tables.dense)).T)
+    sizes = over(phase.sizes, tables.tau, inside)
     ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
-    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends"]
-    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends], *names)
+    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends", "sizes"]
+    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends, sizes], *names)
 
 
 def unwrapped_law(U: ca.MX, phase: CompiledPhase) -> ca.MX:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase
+from problems.compiled import CompiledPhase, Variable
 
 from .base import expanded
 from .dfet_element import element_function
@@ -40,22 +41,46 @@ class DFETPhase(PhaseWriter):
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
+        self._sizes = [Variable(f"size[{k}]", -np.inf, np.inf, "", scale) for k, scale in enumerate(phase.size_scales)]
+        self.S = layout.add_table(prefix, self._sizes, elements, len(tables.tau))
+        self.magnitudes = self.S.ravel()
         self._element = expanded(element_function(tables, phase))
-        self._propagation = Propagation(elements, tables, phase)
-        self.compilable = self._propagation.quick
+
+    @cached_property
+    def _propagation(self) -> Propagation:
+        # Only where something is propagated: gradient solves of few starts never need what takes seconds to write out.
+        return Propagation(self.n, self.tables, self.phase)
+
+    @property
+    def compilable(self) -> bool:  # type: ignore[override]
+        """See `PhaseWriter.compilable`."""
+        return self._propagation.quick
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
         n, tables, phase, pick = self.n, self.tables, self.phase, self._layout.pick
         left, right, (U, *times) = pick(extended, self.B[:-1]), pick(extended, self.B[1:]), self._inputs(extended)
-        weak, integrals, paths, peaks, ends = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
+        weak, integrals, paths, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
         rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), marched=True)
         for k, limit in enumerate(phase.paths):
             rows.add(paths[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
-        nu = len(phase.controls)
-        return Written(ends[:nu, 0], ends[nu:, -1], ca.sum2(integrals), peaks)
+        nu, totals = len(phase.controls), ca.sum2(integrals)
+        if self._sizes:
+            totals = self._with_sizes(totals, pick(extended, self.S), sizes, times[1], rows)
+        return Written(ends[:nu, 0], ends[nu:, -1], totals, peaks, ca.vec(ca.fabs(sizes)))
+
+    def _with_sizes(self, totals: ca.MX, S: ca.MX, sizes: ca.MX, lengths: ca.MX, rows: Rows) -> ca.MX:
+        """The integrals, those of absolute values as sums of the variables S (sizes, n k), which are not to be less than these."""
+        scales = np.tile([v.scale for v in self._sizes], sizes.shape[1])
+        for sign in (1.0, -1.0):
+            rows.add(sign * sizes - S, -np.inf, 0.0, scales, f"absolute values in '{self.phase.name}'", marched=True)
+        entries = ca.vertsplit(totals)
+        for row, one in zip(self.phase.sized, ca.vertsplit(S), strict=True):
+            on_elements = ca.DM(self.tables.weights).T @ ca.reshape(one, -1, self.n)
+            entries[row] = ca.sum2(0.5 * lengths * on_elements)
+        return ca.vertcat(*entries)
 
     def guess(self, extended: np.ndarray) -> None:
         """See `PhaseWriter.guess`."""

@@ -64,12 +64,14 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a phase gives to objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k)."""
+    """What a phase gives to objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
+    and what the variables at `PhaseWriter.magnitudes` have to be at least (column)."""
 
     first_control: ca.MX
     last_control: ca.MX
     integrals: ca.MX
     peak_samples: ca.MX
+    magnitudes: ca.MX = field(default_factory=lambda: ca.MX(0, 1))
 
 
 class PhaseWriter(ABC):
@@ -81,6 +83,8 @@ class PhaseWriter(ABC):
     """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
     compilable: bool
     """Whether what `march` does fast, and `sensitivity`, can be written in C."""
+    magnitudes: np.ndarray = np.empty(0, dtype=int)
+    """Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known."""
     wide: bool = False
     """Whether `march` takes several extended vectors side by side."""
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from problems.peaks import refuse_peaks
 
-from .base import NLP, expanded
-from .derivatives import objective_scales
+from .base import NLP
+from .derivatives import objective_scales, symbol
 from .programs import CONVERGED, FAILED, INFEASIBLE, SAID, TIMEOUT, back_in_bounds, origin, quiet, scaled_bounds
 from .stopping import stopping
 
@@ -267,17 +267,26 @@ def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], 
     """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)
     n, m = len(nlp.variables), len(nlp.problem.goals)
-    x, p = ca.MX.sym("x", n + 1), ca.MX.sym("p", 3 * m)
+    x, p = symbol(nlp, "x", n + 1), symbol(nlp, "p", 3 * m)
     shift, inverse, slope = ca.vertsplit(p, m)
     F, g = nlp.functions(origin(nlp) + x[:n] * nlp.scale)
     above = (F - shift) * inverse
-    rows = ca.vertcat(g / nlp.g_scale, above - x[n] * slope, above)
-    parts = expanded(ca.Function("program", [x, p], [x[n], rows], ["x", "p"], ["f", "g"]))
+    blocks = g / nlp.g_scale, above - x[n] * slope, above
+    rows = ca.vertcat(*blocks)
+    # Block by block: a row of an integral is dense, and one sweep for many columns is lost where there is such a row among sparse ones.
+    jacobian = ca.Function("jac_g", [x, p], [rows, ca.vertcat(*(ca.jacobian(block, x) for block in blocks))], ["x", "p"], ["g", "jac_g_x"])
+    lam_f, lam_g = symbol(nlp, "lam_f", 1), symbol(nlp, "lam_g", rows.numel())
+    # The objective is linear.
+    curvature = ca.triu(ca.hessian(ca.dot(lam_g, rows), x)[0])
+    hessian = ca.Function("hess_lag", [x, p, lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"])
+    parts = {"x": x, "p": p, "f": x[n], "g": rows}
     options = quiet(settings.seconds, settings.max_iterations) | {
         "ipopt.tol": ACCURACY,
         "ipopt.acceptable_tol": 100 * ACCURACY,
         "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
         "ipopt.nlp_scaling_method": "none",
         "ipopt.bound_relax_factor": 0.0,
+        "jac_g": jacobian,
+        "hess_lag": hessian,
     }
     return ca.nlpsol("scalarized", "ipopt", parts, options | {f"ipopt.{name}": value for name, value in strategy})

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import importlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +75,8 @@ def room(case: str) -> ModuleType:
 
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
     - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, what it is by;
-    - `track(values) -> {label: values, label: values}`: where a flight goes, across and up, from its states by name.
+    - `track(values) -> {label: values, label: values}`: where a flight goes, across and up, from its states by name;
+    - `plot(flights) -> {name: Figure}`: its own pictures of one flight or many, of whatever has a `trajectory`.
 
     Parameters
     ----------
@@ -93,9 +95,15 @@ def room(case: str) -> ModuleType:
         raise ValueError(f"there is no problem '{case}'; there are {', '.join(CASES)}") from error
 
 
-def closed_form(case: str) -> np.ndarray:
-    """The true front (k, m) of a case, see `room`. Raises ValueError if there is no such case, or its front is not known."""
+def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:
+    """The true front (k, m) of a case, see `room`; of one with other `data` than its own, none is known.
+
+    Raises ValueError if there is no such case, or its front is not known.
+    """
     module = room(case)
+    if data:
+        changed = ", ".join(f"{name} = {value!r}" for name, value in data.items())
+        raise ValueError(f"no true front of '{case}' with {changed} is known; measure against a file or the union")
     if not hasattr(module, "reference"):
         raise ValueError(
             f"no true front of '{case}' is known: '{module.__name__}' has no function 'reference'; measure against a file or the union"

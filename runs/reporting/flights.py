@@ -21,12 +21,14 @@ from ..measures.indicators import pieces, truth
 from ..measures.references import room
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .ground import Ground, Reference
+from .paper import style
 from .plots import front_figure
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MANY = 100
 LAW, ALONE = "known law", "single objective"
 """What dashed and dotted lines are; a case may have a `LAW` of its own."""
 OBLONG = 4.0
@@ -44,6 +46,8 @@ class Flights:
     solver : str
         Whose front they are of: that of the first solver that found any, all its runs together.
     points : tuple of Point
+    many : sequence of Point
+        Up to a hundred of that front, for pictures of a population.
     room : module or None
         Where the problem comes from, see `references.room`.
     laws : name -> as many flights, None where there is none
@@ -57,6 +61,7 @@ class Flights:
     reference: Reference
     solver: str
     points: tuple[Point, ...]
+    many: Sequence[Point]
     room: ModuleType | None
     laws: Mapping[str, Sequence[Law | None]]
     ends: Front
@@ -69,13 +74,13 @@ class Flights:
             fronts = [run.front for run in runs if len(run.front)]
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
-                points = tuple(front[i] for i in representatives(front, 4))
+                points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
                 source = front.source
                 named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
                 place = room(source.address) if source is not None and named else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
-                return cls(ground, reference, solver, points, place, laws, ends, note)
+                return cls(ground, reference, solver, points, many, place, laws, ends, note)
         return None
 
     def table(self) -> Table:
@@ -111,6 +116,10 @@ class Flights:
             ),
             "flights": flights_figure(self.points, laws=self.laws, solver=self.solver),
         }
+        plot = getattr(self.room, "plot", None)
+        if plot is not None and self.many:
+            with style():
+                found |= plot(self.many)
         track = getattr(self.room, "track", None)
         if track is not None:
             tracks = [track(flown(point)) for point in self.points]

@@ -95,9 +95,10 @@ class Ground:
         if given == "union":
             return self.union()
         if given is None or given == "truth":
-            address = self.known.source.address if self.known.source is not None else ""
+            source = self.known.source
             try:
-                return Reference(foreign(closed_form(address), self.known.goals, "truth"), "the true front", True)
+                known = closed_form(source.address, source.data) if source is not None else closed_form("")
+                return Reference(foreign(known, self.known.goals, "truth"), "the true front", True)
             except ValueError:
                 if given is not None:
                     raise

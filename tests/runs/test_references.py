@@ -95,6 +95,9 @@ def test_closed_forms():
     assert closed_form("problems.goddard:problem").shape == (2001, 2)
     with pytest.raises(ValueError, match="there is no problem 'godard'"):
         closed_form("godard")
+    assert closed_form("betts_heating").tolist() == [[30.6255]]
+    with pytest.raises(ValueError, match=r"'landing_site' with landers = 2"):
+        closed_form("landing_site", {"landers": 2})
     with pytest.raises(ValueError, match=r"no true front of 'problems\.sanity:"):
         closed_form("problems.sanity:problem")
 

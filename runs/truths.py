@@ -1,0 +1,307 @@
+"""The true fronts of the re-entry cases, as far as gradients find them: how the tables beside the cases were made.
+
+    python -m runs.truths reentry_case1 [--points 120] [--out FILE.csv]
+
+Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
+commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
+are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. Flights of the first case that are
+feasible in a harder one are optimal there too, and are taken over: then all places lie in that corner.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import moocore
+import numpy as np
+
+from macs.descents import Descents
+from macs.directions import simplex_lattice
+from macs.dominance import nondominated
+from macs.evaluation import CONVERGED
+from macs.storage import write_whole
+from problems import load
+from problems.reentry import case1, case2, statement
+from problems.reentry.case3 import ZONES
+from problems.reentry.statement import FOOT, Limits, Zone
+from transcription import DFET, NLP
+from transcription.scalarized import Solved
+from transcription.simulate import Simulation, simulate
+from transcription.trajectory import Trajectory
+
+from .steps import Steps
+
+CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
+EASIEST = "reentry_case1"
+METHOD = DFET(60, 2, control_order=1, basis="bernstein")
+CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
+"""Where the paper measures hypervolume from, minimised."""
+NARROWER, NEARER = 0.98, 0.7
+"""Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, times the case's own: what the mesh leaves open
+between its nodes."""
+ALIKE = 1e-2
+"""Flights whose objectives differ by less than this part of their ranges are one."""
+ALLOWED = 0.01
+"""What a flight may exceed of a limit, or of a tolerance at the end."""
+DIGITS = 2
+"""Of the commands, in degrees."""
+DIVISIONS, BEYOND = 12, 1.3
+"""Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
+RTOL = 1e-8
+SIDE_STARTS = ((-1, 1, 1), (1, 1, 1))
+"""Of the zones, which the flights to begin with pass: south (-1) or north (1) of each."""
+SIDES = 2
+"""From how many ways past the zones a place is gone down from."""
+
+
+class Truth:
+    """The front of a case as it becomes known."""
+
+    def __init__(self, case: str) -> None:
+        limits, zones = CASES[case]
+        self.limits = limits
+        tolerances = {"altitude_tolerance": 3000 * FOOT, "speed_tolerance": 350 * FOOT, "angle_tolerance": np.radians(1.0)}
+        strict = statement.reentry(
+            case,
+            Limits(NARROWER * limits.heating_rate, NARROWER * limits.dynamic_pressure, NARROWER**2 * limits.load_factor),
+            [replace(zone, radius=zone.radius / NARROWER**0.5) for zone in zones],
+            **{name: NEARER * value for name, value in tolerances.items()},
+        )
+        self.case, self.zones = load(case).compile(), zones
+        self.nlp = METHOD.transcribe(strict)
+        self.template = self.nlp.unpack(self.nlp.first_guess(self.nlp.guess[None])[0])
+        self.descents = Descents(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
+        self.found: list[Solved] = []
+        self.ways: list[tuple[int, ...]] = []
+        # The tolerance of each state at the end, where it has one.
+        self._open = dict(zip(statement.END, tolerances.values(), strict=True))
+
+    def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
+        """One solve, remembered if it converges."""
+        solved = self.descents.from_vector(start, reference, weights, ceiling)
+        if solved.status == CONVERGED:
+            self.found.append(solved)
+            self.ways.append(way(self.nlp.unpack(solved.z), self.zones))
+        return solved
+
+    def begin(self, steps: Steps, rows: np.ndarray) -> None:
+        """The best of each objective from the guess; in a harder case, down from flights of the easiest one (k, 4 + n) instead."""
+        if not len(rows):
+            start = self.nlp.first_guess(self.nlp.guess[None])[0]
+            for i in range(4):
+                steps.begin(f"objective {i + 1}")
+                self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
+            return
+        F = rows[:, :4] * SIGNS
+        inside = np.flatnonzero((F - CORNER < 0).all(axis=1))
+        for k in dict.fromkeys(inside[np.argmin(F[inside], axis=0)].tolist()):
+            steps.begin(f"from {np.round(F[k], 2).tolist()}")
+            flown = simulate(self.case, with_commands(self.template, rows[k, 4:]), rtol=RTOL, atol=RTOL)
+            z = self.nlp.interpolate(flown.trajectory)
+            for sides in SIDE_STARTS if self.zones else [()]:
+                self.solve(around(self.nlp, z, self.zones, sides), F[k], np.ptp(F, axis=0), np.full(4, np.inf))
+
+    def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
+        """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4)."""
+        rows = []
+        for i in range(4):
+            steps.begin(f"end {i + 1}")
+            F = np.array([solved.F for solved in self.found])
+            nearest = int(np.lexsort((F[:, i], np.maximum(F - ceiling, 0.0).sum(axis=1)))[0])
+            alone = np.where(np.arange(4) == i, 0.0, np.inf)
+            first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
+            limit = np.where(np.arange(4) == i, first.F[i] + 1e-6 * abs(first.F[i]), ceiling)
+            others = np.where(np.arange(4) == i, np.inf, first.F)
+            second = self.solve(first.z, others, np.maximum(np.ptp(F, axis=0), 1e-3), limit)
+            rows.append(second.F if second.status == CONVERGED else first.F)
+        return np.array(rows)
+
+    def fill(self, steps: Steps, count: int, ceiling: np.ndarray) -> None:
+        """Go down from places that are far from all that is known."""
+        ends = self.ends(steps, ceiling)
+        ideal, ranges = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-6)
+        lattice = simplex_lattice(4, DIVISIONS)
+        middle = np.full((1, 4), 0.25)
+        places = projected(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
+        tried = np.empty((0, 4))
+        for _ in range(count):
+            F = np.array([solved.F for solved in self.found])
+            F = F[(F - ceiling <= 1e-9).all(axis=1)]
+            known = np.vstack([projected((F - ideal) / ranges), tried])
+            place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+            tried = np.vstack([tried, place])
+            reference = ideal + ranges * place
+            steps.begin(f"place {np.round(reference, 2).tolist()}")
+            for start in self.starts(reference, ranges, ceiling):
+                self.solve(start, reference, ranges, ceiling)
+
+    def starts(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> list[np.ndarray]:
+        """The best that is known for a place, of each of the best ways past the zones."""
+        F = np.array([solved.F for solved in self.found])
+        merit = np.max((F - reference) / ranges, axis=1) + (np.maximum(F - ceiling, 0.0) / ranges).sum(axis=1)
+        best: dict[tuple[int, ...], int] = {}
+        for k in np.argsort(merit):
+            best.setdefault(self.ways[k], int(k))
+        return [self.found[k].z for k in list(best.values())[:SIDES]]
+
+    def rows(self, steps: Steps) -> list[np.ndarray]:
+        """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
+        F = np.array([solved.F for solved in self.found])
+        kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
+        kept = kept[apart(F[kept])]
+        told, broken = [], 0
+        for k in kept:
+            steps.begin(f"flight {k}")
+            trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
+            flown = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
+            if self.feasible(flown):
+                told.append(np.array([*flown.objectives.values(), *commands]))
+            else:
+                broken += 1
+        print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
+        return told
+
+    def inherited(self, steps: Steps, rows: np.ndarray) -> list[np.ndarray]:
+        """The flights of the easiest case that are feasible in this one, where they are optimal too."""
+        found = []
+        for row in rows:
+            steps.begin(f"cross-range {row[0]:.2f}")
+            if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
+                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
+                if self.feasible(flown):
+                    found.append(row)
+        print(f"{len(found)} of {len(rows)} flights of {EASIEST} are feasible")
+        return found
+
+    def feasible(self, flown: Simulation) -> bool:
+        """Whether a flight exceeds no limit by more than is allowed."""
+        phase = flown.trajectory["entry"]
+        end = dict(zip((v.name for v in phase.state_variables), phase.states[-1], strict=True))
+        ends = [abs(end[name] - statement.END[name]) <= (1 + ALLOWED) * value for name, value in self._open.items()]
+        return all(ends) and all(value <= ALLOWED for name, value in flown.violations.items() if not name.startswith("final"))
+
+
+SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
+
+
+def apart(F: np.ndarray) -> np.ndarray:
+    """Rows (k, 4), minimised, without those that are like another one; the best of each objective come before others. Their indices."""
+    y = F / np.maximum(np.ptp(F, axis=0), 1e-9)
+    kept = list(dict.fromkeys(np.argmin(F, axis=0).tolist()))
+    for k in range(len(y)):
+        if np.linalg.norm(y[kept] - y[k], axis=1).min() > ALIKE:
+            kept.append(k)
+    return np.sort(kept)
+
+
+def projected(y: np.ndarray) -> np.ndarray:
+    """Points (k, m) on the plane that is square to the way down."""
+    return y - y.mean(axis=1, keepdims=True)
+
+
+def way(flight: Trajectory, zones: tuple[Zone, ...]) -> tuple[int, ...]:
+    """For each zone whether a flight passes south of it (-1), north (1), or does not get there (0)."""
+    phase = flight["entry"]
+    east, north = (np.degrees(phase[name]) for name in ("longitude", "latitude"))
+    return tuple(int(np.sign(np.interp(zone.longitude, east, north) - zone.latitude)) * (east[-1] > zone.longitude) for zone in zones)
+
+
+def around(nlp: NLP, z: np.ndarray, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndarray:
+    """A vector (n,), its latitudes moved to one side of each zone."""
+    z = z.copy()
+    names = {v.name: i for i, v in enumerate(nlp.variables)}
+    for name, i in names.items():
+        if not name.startswith("entry.longitude"):
+            continue
+        j = names[name.replace("longitude", "latitude")]
+        for zone, side in zip(zones, sides, strict=True):
+            apart = np.degrees(z[i]) - zone.longitude
+            if abs(apart) < 1.2 * zone.radius:
+                edge = np.radians(zone.latitude + side * 1.1 * np.sqrt(max(zone.radius**2 - apart**2, 0.0)))
+                z[j] = max(z[j], edge) if side > 0 else min(z[j], edge)
+    return nlp.tighten(z[None])[0]
+
+
+def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:
+    """A flight with commands of as many digits as the table has, and these: (elements, both ends, both angles) in a row."""
+    commands = np.round(np.degrees(flight["entry"].control.coefficients), DIGITS).ravel()
+    return with_commands(flight, commands), commands
+
+
+def with_commands(flight: Trajectory, commands: np.ndarray) -> Trajectory:
+    """A flight with other commands, in degrees."""
+    phase = flight["entry"]
+    control = replace(phase.control, coefficients=np.radians(commands).reshape(phase.control.coefficients.shape))
+    return replace(flight, phases=(replace(phase, control=control),))
+
+
+def volume(front: np.ndarray) -> float:
+    """Hypervolume in the paper's units, from the paper's corner, of objectives (k, 4) as the user sees them."""
+    return float(moocore.hypervolume(np.ascontiguousarray(front[:, :4] * SIGNS), ref=CORNER))
+
+
+def made(case: str, points: int) -> np.ndarray:
+    """The table of a case; see the module."""
+    truth = Truth(case)
+    easier = np.empty((0, 4)) if case == EASIEST else easiest()
+    windows = [CORNER] if len(easier) else [np.full(4, np.inf), CORNER]
+    with Steps(case, 4 + 4 * len(windows) + points) as steps:
+        truth.begin(steps, easier)
+        for window in windows:
+            truth.fill(steps, points // len(windows), window)
+    with Steps(f"{case}, flown", len(truth.found)) as steps:
+        own = truth.rows(steps)
+    with Steps(f"{case}, flights of the easiest case", len(easier)) as steps:
+        return united([*truth.inherited(steps, easier), *own])
+
+
+def easiest() -> np.ndarray:
+    """The table of the easiest case (k, 4 + n)."""
+    with files("problems.reentry").joinpath(f"{EASIEST.removeprefix('reentry_')}.csv").open() as file:
+        return np.loadtxt(file, delimiter=",", ndmin=2)
+
+
+def united(rows: list[np.ndarray]) -> np.ndarray:
+    """The rows that none dominates, by their cross-range."""
+    table = np.array(rows)
+    table = table[nondominated(table[:, :4] * SIGNS)]
+    return table[np.argsort(-table[:, 0])]
+
+
+def text(case: str, rows: np.ndarray) -> str:
+    """The table with a header that says what it is."""
+    head = [
+        f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
+        f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
+        "flown again by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
+        "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
+        f"angle of attack and bank angle at both ends of each of {METHOD.elements} equal parts of the time, linear between.",
+    ]
+
+    def shown(row: np.ndarray) -> str:
+        commands = (f"{value + 0.0:.{DIGITS}f}".rstrip("0").rstrip(".") for value in row[4:])
+        return ",".join([*(f"{value:.7g}" for value in row[:4]), *commands])
+
+    return "\n".join([*(f"# {line}" for line in head), *map(shown, rows)]) + "\n"
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="Make the table of a re-entry case's true front again.")
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("--points", type=int, default=120)
+    parser.add_argument("--out", default=None)
+    given = parser.parse_args()
+    rows = made(given.case, given.points)
+    write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
+    print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
+    for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
+        print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")
+
+
+if __name__ == "__main__":
+    main()
