@@ -88,7 +88,7 @@ class Foreign(InnerSolver):
         return InnerResult(found.z, found.F, found.violation, found.status, found.moved, found.iterations)
 
 
-@pytest.mark.parametrize("inner", ["march", "auto", Foreign()], ids=str)
+@pytest.mark.parametrize("inner", ["march", "auto", Foreign()], ids=["march", "auto", "own"])
 def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
     nlp = DFET(2, 3).transcribe(load("orbit_rise"))
     evaluator = Bilevel(nlp, inner_solver(inner), 1e-6)
