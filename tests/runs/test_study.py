@@ -45,6 +45,10 @@ def numbers(summary) -> dict:
     }
 
 
+LATE = 12.0
+"""Seconds after which a run is late: one that does not hang never is, however busy the machine."""
+
+
 class Inline(Executor):
     """Makes runs here and now: no process has to start."""
 
@@ -151,7 +155,7 @@ def troubled(tmp_path_factory):
         "once": Dying(lives=str(lives)),
         "plain": Plain(),
     }
-    trouble = study(solvers=solvers, runs=1, time_limit=5.0)
+    trouble = study(solvers=solvers, runs=1, time_limit=LATE)
     return trouble, folder / "out", trouble.run(folder / "out")
 
 
@@ -169,8 +173,8 @@ def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(troubl
     }
     run = {run.cell.solver: run for run in summary.runs}
     assert run["crash"].message == "ArithmeticError: the root of all evil" and "misbehaving.py" in run["crash"].traceback
-    assert "more than 5 s" in run["hang"].message and "misbehaving.py" in run["hang"].traceback
-    assert 5.0 <= run["hang"].wall_time < 30.0
+    assert f"more than {LATE:g} s" in run["hang"].message and "misbehaving.py" in run["hang"].traceback
+    assert run["hang"].wall_time >= LATE
     assert "SIGKILL" in run["dead"].message and "memory" in run["dead"].message
     with pytest.raises(FileNotFoundError):
         _ = run["dead"].front
