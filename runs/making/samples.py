@@ -86,6 +86,7 @@ class Samples:
 def _read(path: Path | None) -> dict[str, list[Any]] | None:
     """What a file holds; None if there is none, or it is damaged: then the history begins where the run goes on."""
     try:
-        return None if path is None else json.loads(path.read_text(encoding="utf-8"))
+        columns = None if path is None else json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+    return columns if isinstance(columns, dict) and columns.keys() == {*COUNTS, "elapsed", "F"} else None

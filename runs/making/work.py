@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 import time
 import traceback
@@ -31,7 +32,7 @@ Payload = tuple[bytes, bytes]
 class Task:
     """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled.
 
-    `checkpoint` is the file that it is kept in while it lasts, where whoever makes it can see that file's folder, as on this machine or on
+    `checkpoint` is the file that it is kept in while it lasts, where whoever makes it can write to that folder, as on this machine or on
     a cluster with one file system.
     """
 
@@ -101,7 +102,7 @@ def samples_path(checkpoint: Path) -> Path:
 
 def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, Samples]:
     """The front, and how it came about. A checkpoint that is of no use any more is begun anew."""
-    kept = task.checkpoint if task.checkpoint and task.checkpoint.parent.is_dir() and keeps(solver) else None
+    kept = task.checkpoint if task.checkpoint and os.access(task.checkpoint.parent, os.W_OK | os.X_OK) and keeps(solver) else None
     while True:
         samples = Samples(task.evaluations, report, samples_path(kept) if kept else None)
         try:

@@ -23,7 +23,7 @@ ROW = ("problem", "by")
 def check(papers: Any) -> None:
     """Raise ValueError that names what a study's `[[paper]]` sections hold and should not, or lack."""
     if isinstance(papers, str | Mapping) or not isinstance(papers, Sequence):
-        raise ValueError(f"paper must be a list of tables, [[paper]], not {papers!r}")
+        raise ValueError(f"paper must be a list of tables, [[paper]], not a {type(papers).__name__}")
     for paper in papers:
         if not isinstance(paper, Mapping):
             raise ValueError(f"paper: each must be a table, not {paper!r}")
@@ -36,6 +36,9 @@ def check(papers: Any) -> None:
         for key in kind.needs:
             if key not in paper:
                 raise ValueError(f"paper: of {paper['of']} it needs {key}")
+        point = paper.get("point", [])
+        if not isinstance(point, Sequence) or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in point):
+            raise ValueError(f"paper: point must be a list of numbers, one for each objective, not {point!r}")
         for key in TEXTS:
             if not isinstance(paper.get(key, ""), str):
                 raise ValueError(f"paper: {key} must be a text, not {paper[key]!r}")

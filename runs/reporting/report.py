@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from macs.front import Front
 from macs.storage import write_whole
 
+from .. import studyfile
 from ..measures.attainment import attainment
 from ..measures.references import read
 from ..measures.scale import Scale
@@ -24,7 +25,7 @@ from .flights import Flights
 from .ground import Ground, Reference, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
-from .published import published_tables
+from .published import check, published_tables
 from .statistics_tables import comparison_table, overall_table, summary_table
 from .tables import Cell, Column, Table, table
 
@@ -84,6 +85,9 @@ def report(
     summary = store.summary()
     if not summary.finished:
         raise ValueError(f"there is nothing to report on yet\n{summary_text(summary)}")
+    papers = store.definition.get("paper") or []
+    with studyfile.told(f"'{out}' holds a study of an earlier MACS, or a damaged one; run the study again, which keeps what is finished"):
+        check(papers)
     found = grounds(store, {})
     others = {name: [_foreign(path, found) for path in paths] for name, paths in (foreign or {}).items()}
     if others:
@@ -92,7 +96,7 @@ def report(
     sections = [summary_text(summary)]
     for ground in _told(found) if progress else found:
         sections += _section(ground, ground.reference(store.definition.get("reference")), writer, figures)
-    sections += [writer.table(name, one) for name, one in published_tables(found, store.definition.get("paper") or []).items()]
+    sections += [writer.table(name, one) for name, one in published_tables(found, papers).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
     return Report(text, tuple(writer.files))

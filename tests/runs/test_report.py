@@ -154,6 +154,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
         ([{"of": "indicators", "source": 3}], "source must be a text"),
         ([{"of": "indicators", "sauce": "3"}], "sauce"),
         ([{"of": "hypervolume", "rows": [ROW]}], "it needs point"),
+        ([{"of": "hypervolume", "point": "R", "rows": [ROW]}], "point must be a list of numbers"),
         ([{"of": "indicators", "rows": []}], "rows must be a list of tables"),
         ([{"of": "indicators", "rows": [{"by": "glide"}]}], "with problem and by"),
         ([{"of": "indicators", "rows": [{**ROW, "gd": 3.0}]}], "unknown key 'gd'"),

@@ -56,7 +56,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(scheduler, tmp_pat
     with cluster(address) as executor:
         summary = slow().run(tmp_path / "out", executor=executor)
     killer.join()
-    assert summary.finished == 5 and first.wait(timeout=5) == -signal.SIGKILL
+    assert summary.finished == slow().runs and first.wait(timeout=5) == -signal.SIGKILL
     assert numbers(summary) == numbers(slow().run(tmp_path / "here", executor=Inline()))
 
 
@@ -77,7 +77,7 @@ def test_a_scheduler_that_is_killed_loses_nothing_that_is_finished(scheduler, tm
     assert time.monotonic() - began < 90
     before = stamps(tmp_path)
     assert before
-    assert slow().run(tmp_path / "out", executor=Inline()).finished == 5 and before.items() <= stamps(tmp_path).items()
+    assert slow().run(tmp_path / "out", executor=Inline()).finished == slow().runs and before.items() <= stamps(tmp_path).items()
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://here", "127.0.0.1:notaport"])
