@@ -8,9 +8,9 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem
 
+from .flying import Arcs
 from .polynomials import gauss_legendre, legendre_coefficients
 from .sampling import DENSE, excess_by_element
-from .simulate import fly_element
 from .trajectory import PhaseTrajectory, Trajectory
 
 STEEP = 3.0
@@ -95,8 +95,9 @@ def local_defects(
     s = np.concatenate([[flown.t0, flown.tf], parameters])
     nothing = np.zeros(phase.integrands.size1_out(0))
     tolerances = atol * np.concatenate([span, np.ones(len(nothing))])
-    starts = [np.concatenate([start, nothing]) for start in flown.edge_states[:-1]]
-    reached = np.array([fly_element(phase, flown, j, starts[j], s, rtol, tolerances, method)[-1] for j in range(elements)])
+    starts = np.array([np.concatenate([start, nothing]) for start in flown.edge_states[:-1]])
+    arcs = Arcs.of(phase, [(flown, j, parameters) for j in range(elements)])
+    reached = arcs.fly(starts, rtol, tolerances, method)[:, -1]
     defect = (np.abs(reached[:, : len(span)] - flown.edge_states[1:]) / span).max(axis=1)
     if not len(nothing):
         return _or_infinite(defect), np.zeros(elements)

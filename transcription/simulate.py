@@ -1,24 +1,20 @@
-"""The independent check of a trajectory: its controls, flown by an integrator that knows nothing of the transcription."""
+"""The independent check of trajectories: their controls, flown by an integrator that knows nothing of the transcription."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import expanded
+from .flying import METHODS, Arcs
 from .sampling import DENSE, excess
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
-
-METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
-MOST_CALLS = 200_000
-"""Evaluations of the dynamics on one element after which the integration counts as broken down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +78,50 @@ def simulate(
     ValueError
         For an unknown method or a tolerance that is not positive.
     """
+    return simulate_all(problem, [trajectory], rtol=rtol, atol=atol, method=method)[0]
+
+
+def simulate_all(
+    problem: CompiledProblem, trajectories: Sequence[Trajectory], *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
+) -> list[Simulation]:
+    """Fly several trajectories; see `simulate`.
+
+    Those whose phases have as many elements and controls of the same degree are flown side by side, which takes far less time than one
+    after the other. Each is flown within the same tolerances, but by other steps than alone, so that its last digits differ.
+    """
     if method not in METHODS:
         raise ValueError(f"unknown integration method {method!r}; there are {', '.join(METHODS)}")
     if not (rtol > 0 and atol > 0):
         raise ValueError(f"rtol and atol must be positive, not {rtol!r} and {atol!r}")
-    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    flights: dict[int, _Flight] = {}
-    violations: dict[str, float] = {}
+    groups: dict[Hashable, list[int]] = {}
+    for k, trajectory in enumerate(trajectories):
+        shape = tuple((phase.control.coefficients.shape, phase.control.basis) for phase in trajectory.phases)
+        groups.setdefault(shape, []).append(k)
+    found: dict[int, Simulation] = {}
+    for rows in groups.values():
+        found |= zip(rows, _side_by_side(problem, [trajectories[k] for k in rows], rtol, atol, method), strict=True)
+    return [found[k] for k in range(len(trajectories))]
+
+
+def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
+    """Fly trajectories of one shape."""
+    parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]
+    flights: list[dict[int, _Flight]] = [{} for _ in trajectories]
+    violations: list[dict[str, float]] = [{} for _ in trajectories]
     for i in problem.order_in_time:
-        phase, planned = problem.phases[i], trajectory[problem.phases[i].name]
-        start = _start(problem, i, planned, flights, violations)
-        flights[i] = _fly(phase, planned, start, parameters, rtol, atol, method)
-        violations |= flights[i].violations(phase)
+        phase = problem.phases[i]
+        planned = [one[phase.name] for one in trajectories]
+        starts = np.array([_start(problem, i, *one) for one in zip(planned, flights, violations, strict=True)])
+        for k, flight in enumerate(_fly(phase, planned, starts, parameters, rtol, atol, method)):
+            flights[k][i] = flight
+            violations[k] |= flight.violations(phase)
+    return [_judged(problem, *one) for one in zip(flights, violations, trajectories, parameters, strict=True)]
+
+
+def _judged(
+    problem: CompiledProblem, flights: Mapping[int, _Flight], violations: dict[str, float], planned: Trajectory, parameters: np.ndarray
+) -> Simulation:
+    """What came of one trajectory, whose phases are flown."""
     quantities = [flights[i].quantities for i in range(len(problem.phases))]
     objectives = np.array(problem.objectives(*quantities, parameters)).ravel() * problem.signs
     constraints = np.array(problem.constraints(*quantities, parameters)).reshape(1, -1)
@@ -103,7 +131,7 @@ def simulate(
         defect={phase.name: flights[i].defect(phase) for i, phase in enumerate(problem.phases)},
         violations=violations,
         objectives={goal.name: float(value) for goal, value in zip(problem.goals, objectives, strict=True)},
-        trajectory=Trajectory(tuple(flights[i].trajectory for i in range(len(problem.phases))), trajectory.parameters),
+        trajectory=Trajectory(tuple(flights[i].trajectory for i in range(len(problem.phases))), planned.parameters),
     )
 
 
@@ -156,23 +184,35 @@ def _start(
 
 
 def _fly(
-    phase: CompiledPhase, planned: PhaseTrajectory, start: np.ndarray, parameters: np.ndarray, rtol: float, atol: float, method: str
-) -> _Flight:
+    phase: CompiledPhase,
+    planned: Sequence[PhaseTrajectory],
+    starts: np.ndarray,
+    parameters: Sequence[np.ndarray],
+    rtol: float,
+    atol: float,
+    method: str,
+) -> list[_Flight]:
+    """Fly one phase of n trajectories of one shape from their `starts` (n, nx)."""
+    integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
+    y, elements = np.hstack([starts, integrals]), []
+    tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+    for j in range(len(planned[0].state.edges) - 1):
+        arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
+        elements.append(arcs.fly(y, rtol, tolerances, method))
+        y = elements[-1][:, -1]
+    return [_flight(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
+
+
+def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _Flight:
+    """What is to be known of a flown phase, of which there are states and integrals (N, len(DENSE), ny) on its elements."""
     edges, nx = planned.state.edges, len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
-    span = np.array([v.span for v in phase.states])
-    y = np.concatenate([start, np.zeros(phase.integrands.size1_out(0))])
-    tolerances = atol * np.concatenate([span, np.ones(len(y) - nx)])
-    elements = []
-    for j in range(len(edges) - 1):
-        dense = fly_element(phase, planned, j, y, s, rtol, tolerances, method)
-        y = dense[-1]
-        elements.append(dense[:, :nx])
     times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in range(len(elements))])
-    states = np.concatenate(elements)
+    states = elements[:, :, :nx].reshape(-1, nx)
     controls = np.concatenate([planned.controls_on(j, DENSE) for j in range(len(elements))])
     inputs = states.T, controls.T, times[None], s
-    paths = np.array(phase.path(*inputs)).T.reshape(len(times), len(phase.paths))
+    path, peak = _looked_at(phase)
+    paths = np.array(path(*inputs)).T.reshape(len(times), len(phase.paths))
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
     trajectory = replace(
@@ -181,90 +221,19 @@ def _fly(
         states=states[kept],
         controls=controls[kept],
         paths=paths[kept],
-        state=PiecewisePolynomial(edges, np.array(elements), "lobatto"),
+        state=PiecewisePolynomial(edges, elements[:, :, :nx], "lobatto"),
     )
-    peaks = np.array(phase.peaks(*inputs)).max(axis=1, initial=-np.inf) if phase.peaks.size1_out(0) else []
+    peaks = np.array(peak(*inputs)).max(axis=1, initial=-np.inf) if phase.peaks.size1_out(0) else []
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
-    quantities = np.concatenate([s[:2], initials, finals, y[nx:], peaks])
+    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks])
     return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
 
 
-def fly_element(
-    phase: CompiledPhase, planned: PhaseTrajectory, j: int, y: np.ndarray, s: np.ndarray, rtol: float, atol: np.ndarray, method: str
-) -> np.ndarray:
-    """Fly element j of a phase.
-
-    Parameters
-    ----------
-    phase : CompiledPhase
-    planned : PhaseTrajectory
-        Whose controls are flown.
-    j : int
-    y : array (ny,)
-        States and integrals at the beginning of the element.
-    s : array
-        t0, tf and the parameters.
-    rtol : float
-    atol : array (ny,)
-    method : str
-        Of `scipy.integrate.solve_ivp`.
-
-    Returns
-    -------
-    array (len(DENSE), ny)
-        States and integrals at the local coordinates `DENSE`; NaN if the integration breaks down.
-    """
-    t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
-    times = t0 + 0.5 * (1.0 + DENSE) * (t1 - t0)
-    times[-1] = t1
-    if not (np.diff(times) > 0).all():
-        # An element of no length, or of one that rounding swallows.
-        return np.broadcast_to(y, (len(DENSE), len(y)))
-    nowhere = np.full((len(DENSE), len(y)), np.nan)
-    right_hand_side = _right_hand_side(phase, planned, j, s)
-    if not (np.isfinite(y).all() and np.isfinite(right_hand_side(t0, y)).all()):
-        return nowhere
-    try:
-        solution = solve_ivp(right_hand_side, (t0, t1), y, method=method, rtol=max(rtol, 3e-14), atol=atol, t_eval=times)
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
-        # The implicit methods raise where rates are no numbers; so do ours where an integrator gets nowhere.
-        return nowhere
-    return solution.y.T if solution.success else nowhere
-
-
-def _right_hand_side(phase: CompiledPhase, planned: PhaseTrajectory, j: int, s: np.ndarray) -> Callable[[float, np.ndarray], np.ndarray]:
-    """Rates of states and integrals on element j, called through buffers: some thousand calls a trajectory."""
-    t0, t1 = planned.state.edges[j], planned.state.edges[j + 1]
-    nx, function = len(phase.states), _rates(phase)
-    calls = 0
-    x, u, time, out = np.zeros(nx), np.zeros(len(phase.controls)), np.zeros(1), np.zeros(function.size1_out(0))
-    arguments = x, u, time, np.array(s, dtype=float)
-    buffer, trigger = function.buffer()
-    for i, argument in enumerate(arguments):
-        buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
-    buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
-
-    def rates(t: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
-        # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
-        nonlocal calls
-        calls += 1
-        if calls > MOST_CALLS:
-            raise ArithmeticError("the integrator gets nowhere")
-        x[:], time[0] = y[:nx], t
-        u[:] = planned.controls_on(j, np.array([2.0 * (t - t0) / (t1 - t0) - 1.0]))[0]
-        trigger()
-        return out.copy()
-
-    return rates
-
-
 @lru_cache(maxsize=64)
-def _rates(phase: CompiledPhase) -> ca.Function:
-    """(x, u, t, s) -> rates of the states and of the integrals."""
-    inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
-    rates = ca.vertcat(phase.dynamics(*inputs), phase.integrands(*inputs))
-    return expanded(ca.Function("rates", inputs, [ca.densify(rates)]))
+def _looked_at(phase: CompiledPhase) -> tuple[ca.Function, ca.Function]:
+    """Path constraints and peaks, fast."""
+    return expanded(phase.path), expanded(phase.peaks)
 
 
 def _or_infinite(value: float) -> float:

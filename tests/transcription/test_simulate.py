@@ -11,7 +11,7 @@ from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
 from transcription.inner import inner_solver
 from transcription.sampling import excursions
-from transcription.simulate import simulate
+from transcription.simulate import simulate, simulate_all
 
 
 def fly(nlp, z, **options):
@@ -304,3 +304,55 @@ def test_simulations_leave_no_trace_in_each_other():
     assert alone.objectives == again.objectives and alone.defect == again.defect
     with np.errstate(all="raise"):
         simulate(nlp.problem, first)
+
+
+# Several at once
+
+
+def bursting() -> Problem:
+    """x' = x^2: beyond all bounds at t = 1 / x(0)."""
+    problem = Problem("bursting")
+    phase = problem.phase("fall", t0=0.0, tf=(0.5, 2.0))
+    x = phase.state("x", bounds=(0, 100), initial=(0.1, 1.0))
+    phase.dynamics(x=x**2)
+    problem.minimize("area", phase.integral(x))
+    return problem
+
+
+def planned(nlp, x0: float, tf: float) -> Trajectory:
+    """A flight of `bursting`, as the transcription has it."""
+    C = [[tf if nlp.variables[i].name == "fall.tf" else x0 for i in nlp.free]]
+    return nlp.unpack(nlp.march(nlp.first_guess(np.array(C)))[0])
+
+
+def test_several_are_flown_as_each_is_alone():
+    nlp = DFET(4, 4).transcribe(oscillator())
+    flights = [nlp.unpack(z) for z in nlp.march(nlp.first_guess(candidates(nlp, 6)))]
+    other = DFET(3, 5).transcribe(oscillator())
+    flights[2:2] = [other.unpack(z) for z in other.march(other.first_guess(candidates(other, 2)))]
+    together = simulate_all(nlp.problem, flights)
+    assert len(together) == len(flights)
+    for flight, check in zip(flights, together, strict=True):
+        alone = simulate(nlp.problem, flight)
+        assert check.objectives == pytest.approx(alone.objectives, rel=1e-8)
+        assert check.violations == pytest.approx(alone.violations, abs=1e-8)
+        np.testing.assert_allclose(check.trajectory["swing"].states, alone.trajectory["swing"].states, atol=1e-8)
+
+
+def test_one_that_breaks_down_takes_no_other_with_it():
+    nlp = DFET(2, 3).transcribe(bursting())
+    cases = [(0.2, 2.0), (1.0, 1.8), (0.5, 1.0), (0.9, 2.0), (0.3, 1.5)]
+    checks = simulate_all(nlp.problem, [planned(nlp, *case) for case in cases])
+    for (x0, tf), check in zip(cases, checks, strict=True):
+        if x0 * tf < 1:
+            assert check.objectives["area"] == pytest.approx(-np.log(1 - x0 * tf), rel=1e-7)
+        else:
+            assert not np.isfinite(check.objectives["area"]) and check.max_defect == np.inf and check.violation == np.inf
+
+
+@pytest.mark.parametrize("method", ["Radau", "LSODA"])
+def test_several_by_an_implicit_method(method):
+    nlp = DFET(4, 4).transcribe(oscillator())
+    flights = [nlp.unpack(z) for z in nlp.march(nlp.first_guess(candidates(nlp, 2)))]
+    for flight, check in zip(flights, simulate_all(nlp.problem, flights, method=method), strict=True):
+        assert check.objectives == pytest.approx(simulate(nlp.problem, flight).objectives, rel=1e-5)
