@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+    from problems import Problem
     from transcription.trajectory import Trajectory
 
 
@@ -257,6 +258,42 @@ class Front:
         from .refining import refine_mesh
 
         return refine_mesh(self, tolerance, limit, progress)
+
+    def flown(
+        self,
+        problem: Problem | CompiledProblem | None = None,
+        *,
+        tolerance: float = 1e-2,
+        rtol: float = 1e-6,
+        atol: float = 1e-7,
+        method: str = "DOP853",
+    ) -> Front:
+        """The same points as an independent integrator flies them: `Point.simulate` for all of them at once, as a front.
+
+        Parameters
+        ----------
+        problem : Problem or CompiledProblem, optional
+            Fly them under other data, such as another mass: a problem with the same phases, variables and objectives. Each flight begins
+            where it began here, and its controls are as functions of time what they were. Default: the front's own.
+        tolerance : float
+            How much a flight may violate, in the constraints' scales, and still count as converged.
+        rtol, atol, method
+            Of the integrator; see `Point.simulate`.
+
+        Returns
+        -------
+        Front
+            In the same order, with `objectives`, `violation`, `status` and trajectories as flown. `Front.merge([front.flown()])` are those
+            that are feasible in the air, without what is dominated there.
+
+        Raises
+        ------
+        ValueError
+            For a black box, a problem that cannot be found, and one of which the points cannot be.
+        """
+        from .flown import flown
+
+        return flown(self, problem, tolerance, rtol, atol, method)[0]
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.

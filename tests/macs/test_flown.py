@@ -1,0 +1,107 @@
+"""A front as an independent integrator flies it, as stated and under other data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import NSGA2, Front
+from macs.flown import best
+from problems import Problem
+from transcription import DFET, SingleShooting
+
+
+def push(mass: float = 2.0, unit: str = "m", drag: float = 0.0, **more) -> Problem:
+    """v' = u / mass, from rest: under a constant u on each second, everything is a sum."""
+    problem = Problem("push")
+    phase = problem.phase("run", t0=0.0, tf=4.0)
+    x = phase.state("x", bounds=(0, 100), initial=0, unit=unit)
+    v = phase.state("v", bounds=(0, 50), initial=0)
+    u = phase.control("u", bounds=(0, 2))
+    phase.dynamics(x=v, v=u / mass - drag * v)
+    for name, upper in more.items():
+        phase.path(name, v, upper=upper, scale=1.0)
+    problem.maximize("distance", phase.final(x), unit=unit)
+    problem.minimize("effort", phase.integral(u))
+    return problem
+
+
+@pytest.fixture(scope="module")
+def front() -> Front:
+    return NSGA2(population=12).solve(push(), SingleShooting(5), evaluations=48, seed=1, inner="march")
+
+
+def by_hand(point, mass: float) -> tuple[float, float]:
+    """Distance and effort of constant controls on four seconds."""
+    x, v, thrust = 0.0, 0.0, point.trajectory["run"].control.coefficients.ravel()
+    for u in thrust:
+        x, v = x + v + 0.5 * u / mass, v + u / mass
+    return x, thrust.sum()
+
+
+def test_as_stated(front):
+    again = front.flown()
+    assert len(again) == len(front) and (again.status == "converged").all()
+    np.testing.assert_allclose(again.F, front.F, rtol=1e-6)
+    for point, flight in zip(front, again, strict=True):
+        assert list(flight.objectives.values()) == pytest.approx(by_hand(point, 2.0), rel=1e-5)
+        assert flight.trajectory["run"].edge_states[-1, 0] == pytest.approx(flight.objectives["distance"])
+        assert flight.violations["bounds of run.x"] == 0
+
+
+def test_under_other_data(front):
+    heavy = push(mass=4.0)
+    other = front.flown(heavy)
+    assert other.problem.fingerprint == heavy.compile().fingerprint != front.problem.fingerprint
+    for point, flight in zip(front, other, strict=True):
+        assert list(flight.objectives.values()) == pytest.approx(by_hand(point, 4.0), rel=1e-5)
+    np.testing.assert_allclose(other.objectives[:, 0], 0.5 * front.objectives[:, 0], rtol=1e-5)
+    np.testing.assert_array_equal([p.decision for p in other], [p.decision for p in front])
+
+
+def test_what_becomes_infeasible_says_so_and_does_not_merge(front):
+    speeds = np.array([point.trajectory["run"]["v"][-1] for point in front])
+    limit = float(np.median(speeds)) + 0.013
+    limited = front.flown(push(gate=limit), tolerance=1e-3)
+    assert (limited.violation > 1e-3).tolist() == (speeds > limit + 1e-3).tolist()
+    assert set(limited.status[speeds > limit + 1e-3]) == {"infeasible"}
+    assert len(Front.merge([limited])) == (speeds <= limit + 1e-3).sum()
+    assert best(limited).tolist() == [k for k in range(len(front)) if speeds[k] <= limit + 1e-3]
+    assert (front.flown(push(gate=limit), tolerance=100.0).status == "converged").all()
+
+
+def test_what_is_dominated_in_the_air_is_not_the_best():
+    """A coarse mesh promises what does not come true."""
+    front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="march")
+    again = front.flown(tolerance=1.0)
+    kept = best(again)
+    merged = Front.merge([again])
+    np.testing.assert_array_equal(again.F[kept], merged.F)
+    assert (np.abs(again.F - front.F).max() > 1e-3) and len(kept) <= len(front)
+
+
+def test_flown_fronts_are_saved_like_others(front, tmp_path):
+    front.save(tmp_path / "front.nc")
+    loaded = Front.load(tmp_path / "front.nc", push())
+    np.testing.assert_allclose(loaded.flown().F, front.flown().F, rtol=1e-9)
+    again = front.flown()
+    again.save(tmp_path / "flown.nc")
+    back = Front.load(tmp_path / "flown.nc", push())
+    np.testing.assert_array_equal(back.F, again.F)
+    np.testing.assert_allclose(back[0].trajectory["run"].at(2.2)["x"], again[0].trajectory["run"].at(2.2)["x"])
+
+
+def test_other_problems_are_refused_by_what_differs(front):
+    problem = Problem("pull")
+    phase = problem.phase("run", t0=0.0, tf=4.0)
+    phase.state("x", bounds=(0, 100), initial=0)
+    phase.dynamics(x=phase.control("u", bounds=(0, 2)))
+    problem.minimize("effort", phase.final(phase["x"]))
+    with pytest.raises(ValueError, match="'push' cannot be flown under 'pull': objectives are minimize effort"):
+        front.flown(problem)
+    with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* there and maximize distance \[m\]"):
+        front.flown(push(unit="ft"))
+    with pytest.raises(ValueError, match="tolerance must not be negative"):
+        front.flown(tolerance=-1.0)
+    with pytest.raises(ValueError, match="black box"):
+        NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).flown()
