@@ -31,7 +31,7 @@ def flown(
         compiled = known
     else:
         compiled = problem if isinstance(problem, CompiledProblem) else problem.compile()
-        _check(known, compiled)
+        check_alike(known, compiled)
     missing = [point.index for point in front if point.trajectory is None]
     if missing:
         raise ValueError(f"point {missing[0]} has no trajectory to fly: its status is '{front[missing[0]].status}'")
@@ -62,7 +62,7 @@ def best(front: Front) -> np.ndarray:
     return kept[np.argsort(front.objectives[kept, 0], kind="stable")]
 
 
-def _check(known: CompiledProblem, other: CompiledProblem) -> None:
+def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
     """Raise ValueError unless what one problem decides can be flown under the other."""
 
     def parts(problem: CompiledProblem) -> dict[str, list[str]]:

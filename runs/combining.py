@@ -19,8 +19,11 @@ from .making.work import Payload
 from .studyfile import plain, told
 
 
-def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) -> list[tuple[Cell, Payload]]:
-    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
+def combine(
+    problems: Any, transcriptions: Any, solvers: Any, evaluations: Any
+) -> tuple[dict[str, CompiledProblem], list[tuple[Cell, Payload]]]:
+    """The problems by label, and the cells, problems first, each with its problem, transcription and solver pickled for the processes that
+    run them.
 
     Parameters are those of `Study`. Raises ValueError that names what makes no sense.
     """
@@ -28,9 +31,9 @@ def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) 
     methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers, _name_of_solver).items()}
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
+    known = {label: _compiled(label, problem) for label, problem in stated.items()}
     combined = []
-    for label, problem in stated.items():
-        compiled = _compiled(label, problem)
+    for label, compiled in known.items():
         for scheme_label, scheme in schemes[label].items():
             stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
             for method_label, method in methods.items():
@@ -41,7 +44,7 @@ def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) 
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
                 cell = Cell(label, scheme_label, method_label, budgets[label], plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
-    return combined
+    return known, combined
 
 
 def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from transcription.inner import NAMED
 
 from . import combining, studyfile
 from .cell import Cell
+from .reporting.changed import check as check_nominal
+from .reporting.goal import Goal
 from .reporting.published import check as check_paper
 from .store import Store, Summary
 
@@ -63,6 +65,13 @@ class Study:
         One line, for lists.
     paper : sequence of mappings
         Published tables to print beside ours; see `reporting.published`.
+    goal : mapping, optional
+        Of which objective reports draw the goal attainment, between which values; see `reporting.goal.Goal`.
+    nominal : str, optional
+        Label of the problem whose front reports fly under the data of all others, which have the same variables and objectives; see
+        `reporting.changed`.
+    note : str
+        What readers of the report should know beforehand.
 
     Raises
     ------
@@ -85,6 +94,9 @@ class Study:
     time_limit: float | None = None
     description: str = ""
     paper: Sequence[Mapping[str, Any]] = ()
+    goal: Mapping[str, Any] | None = None
+    nominal: str | None = None
+    note: str = ""
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
@@ -95,7 +107,11 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
-            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+            known, combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+            if self.goal is not None:
+                Goal.of(self.goal, known)
+            if self.nominal is not None:
+                check_nominal(self.nominal, known)
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
@@ -202,6 +218,9 @@ class Study:
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
             "paper": studyfile.plain(self.paper),
+            "goal": studyfile.plain(self.goal),
+            "nominal": self.nominal,
+            "note": self.note,
             "cells": [cell.to_dict() for cell in self.cells],
         }
 
@@ -216,5 +235,6 @@ class Study:
         if self.inner not in NAMED:
             raise ValueError(unknown("inner level", self.inner, NAMED))
         check_paper(self.paper)
-        if not isinstance(self.description, str):
-            raise ValueError(f"description must be a line of text, not {self.description!r}")
+        for name in ("description", "note"):
+            if not isinstance(getattr(self, name), str):
+                raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")

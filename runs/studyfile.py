@@ -28,6 +28,9 @@ KEYS = (
     "start",
     "time_limit",
     "paper",
+    "goal",
+    "nominal",
+    "note",
 )
 """What a file may say: what `Study` takes."""
 NEEDED = ("problems", "solvers", "runs", "seed")

@@ -21,7 +21,9 @@ from ..measures.statistics import summarise
 from ..standing import summary_text
 from ..steps import Steps
 from ..store import Store
+from .changed import changes
 from .flights import Flights
+from .goal import attained
 from .ground import Ground, Reference, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
@@ -93,9 +95,13 @@ def report(
     if others:
         found = grounds(store, others)
     writer = _Writer(Path(out) / FOLDER)
-    sections = [summary_text(summary)]
+    sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
     for ground in _told(found) if progress else found:
         sections += _section(ground, ground.reference(store.definition.get("reference")), writer, figures)
+    for part in (*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))):
+        sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
+        for name, figure in (part.figures() if figures else {}).items():
+            writer.figure(_plain(name), figure)
     sections += [writer.table(name, one) for name, one in published_tables(found, papers).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
@@ -136,7 +142,12 @@ def _foreign(path: str | PathLike[str], found: Sequence[Ground]) -> Front:
 
 
 def _stem(ground: Ground) -> str:
-    return re.sub(r"[^A-Za-z0-9.]+", "-", f"{ground.problem}-{ground.transcription}").strip("-")
+    return _plain(f"{ground.problem}-{ground.transcription}")
+
+
+def _plain(name: str) -> str:
+    """For a file."""
+    return re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
 
 
 def _left_out(ground: Ground) -> list[str]:

@@ -1,0 +1,220 @@
+"""Changed data: what becomes of the nominal problem's front when its points are flown under other data, beside the fronts found under those.
+
+Section VI B of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an extended evolutionary algorithm",
+IEEE Transactions on Cybernetics 50(4), 2020, does so for another mass and another gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from macs.evaluation import CONVERGED
+from macs.flown import check_alike
+from macs.front import Front
+from macs.inputs import unknown
+from macs.plotting import COLORS, GREY, better
+
+from ..studyfile import told
+from .flight_plots import representatives
+from .ground import Ground
+from .paper import COLUMN, PAGE, legend, new_figure, style
+from .tables import Cell, Column, Table, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from problems.compiled import CompiledProblem
+
+MANY, FEW = 60, 4
+"""How many points of a front are flown and drawn, and how many of them are told one by one."""
+
+
+def check(nominal: Any, problems: Mapping[str, CompiledProblem]) -> None:
+    """Raise ValueError unless `nominal` is the label of one of several problems whose points can be flown under all the others."""
+    if not isinstance(nominal, str) or nominal not in problems:
+        raise ValueError(f"nominal: {unknown('problem', nominal, problems)}")
+    if len(problems) == 1:
+        raise ValueError(f"nominal: '{nominal}' is the only problem; there are no other data to fly its front under")
+    for name, problem in problems.items():
+        with told(f"nominal: problem '{name}'"):
+            check_alike(problems[nominal], problem)
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What one solver found on one transcription.
+
+    Attributes
+    ----------
+    transcription, solver : str
+        Labels.
+    found : problem -> Front
+        The union of all runs, of the nominal problem first.
+    flown : problem -> Front
+        Up to `MANY` points that stand for the nominal front, as flown under the data of each problem, in one order; of the nominal problem
+        first. Empty where there is no nominal front or its problem is not to be had, which `note` says.
+    note : str
+    """
+
+    transcription: str
+    solver: str
+    found: Mapping[str, Front]
+    flown: Mapping[str, Front] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def nominal(self) -> Front:
+        """The nominal points as flown under their own data."""
+        return next(iter(self.flown.values()))
+
+    def shifts(self, problem: str) -> np.ndarray:
+        """How much each objective (n, m) of the nominal points is more under other data, in the user's units; of those that fly to the end."""
+        shifts = self.flown[problem].objectives - self.nominal.objectives
+        return shifts[np.isfinite(shifts).all(axis=1)]
+
+
+@dataclass(frozen=True, eq=False)
+class Changed:
+    """Tables and figures of all solvers and transcriptions; `nominal` is the label of the nominal problem."""
+
+    nominal: str
+    changes: Sequence[Change]
+
+    def tables(self) -> dict[str, Table]:
+        """Name of a file -> table."""
+        found = {"changed-data": self._shifts(), "changed-data-points": self._points(), "changed-data-best": self._best()}
+        return {name: one for name, one in found.items() if one.rows or one.notes}
+
+    def figures(self) -> dict[str, Figure]:
+        """Name of a file -> figure, one for each transcription and solver."""
+        drawn = [one for one in self.changes if one.flown and len(self._goals) > 1]
+        return {f"changed-data-{one.transcription}-{one.solver}": changed_figure(one) for one in drawn}
+
+    @property
+    def _goals(self) -> Any:
+        return next(iter(self.changes[0].found.values())).goals
+
+    def _shifts(self) -> Table:
+        heads: list[Column | str] = [*_WHOSE, "data", "points", "feasible"]
+        for goal in self._goals:
+            heads += [Column(f"{goal.name}: mean shift", goal.unit), Column("largest", goal.unit)]
+        rows: list[list[Cell]] = []
+        for one in self.changes:
+            for problem, front in one.flown.items():
+                shifts = one.shifts(problem)
+                told: list[Cell] = [None] * (2 * shifts.shape[1])
+                if problem != self.nominal and len(shifts):
+                    largest = shifts[np.abs(shifts).argmax(axis=0), range(shifts.shape[1])]
+                    told = np.column_stack([shifts.mean(axis=0), largest]).ravel().tolist()
+                rows.append([one.transcription, one.solver, problem, len(front), int((front.status == CONVERGED).sum()), *told])
+        notes = [
+            f"Up to {MANY} points that stand for the union of all runs on {self.nominal}, flown with the same commands by an independent "
+            "integrator; feasible: within 1 % of each limit. A shift is against the same flight under the nominal data."
+        ]
+        return table(heads, rows, f"The front of {self.nominal} under changed data.", [*notes, *self._notes()])
+
+    def _points(self) -> Table:
+        heads: list[Column | str] = [*_WHOSE, Column("point", grouped=True), "data", "feasible", *_columns(self._goals)]
+        rows: list[list[Cell]] = []
+        for one in self.changes:
+            for number, k in enumerate(representatives(one.nominal, FEW) if one.flown else [], 1):
+                for problem, front in one.flown.items():
+                    holds = "yes" if front.status[k] == CONVERGED else "no"
+                    rows.append([one.transcription, one.solver, f"point {number}", problem, holds, *front.objectives[k].tolist()])
+        return table(heads, rows, f"Points of the front of {self.nominal}, each under changed data with the same commands.")
+
+    def _best(self) -> Table:
+        heads: list[Column | str] = [*_WHOSE, "optimised under", "points", *_columns(self._goals)]
+        rows: list[list[Cell]] = []
+        for one in self.changes:
+            for problem, front in one.found.items():
+                signs = np.array([goal.sign for goal in front.goals])
+                best = (front.F.min(axis=0) * signs).tolist() if len(front) else [None] * len(signs)
+                rows.append([one.transcription, one.solver, problem, len(front), *best])
+        return table(heads, rows, "The best of each objective that was found under each data, all runs together.")
+
+    def _notes(self) -> list[str]:
+        return [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
+
+
+_WHOSE = (Column("transcription", grouped=True), Column("solver", grouped=True))
+
+
+def _columns(goals: Sequence[Any]) -> list[Column]:
+    return [Column(goal.name, goal.unit, digits=5) for goal in goals]
+
+
+def changes(grounds: Sequence[Ground], nominal: str | None) -> list[Changed]:
+    """The nominal front of each solver and transcription, flown under the data of all other problems; nothing without a nominal problem."""
+    if nominal is None:
+        return []
+    labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
+    found = []
+    for ground in grounds:
+        if ground.problem == nominal:
+            for solver, runs in ground.runs.items():
+                if runs:
+                    found.append(_change(grounds, ground.transcription, solver, labels))
+    return [Changed(nominal, found)] if found else []
+
+
+def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str]) -> Change:
+    here = {ground.problem: ground.fronts[solver] for ground in grounds if ground.transcription == transcription and ground.runs.get(solver)}
+    union = {label: Front.merge(here[label]) for label in labels if label in here}
+    own = union[labels[0]]
+    if not len(own):
+        return Change(transcription, solver, union, note="nothing feasible was found under the nominal data, so there is nothing to fly")
+    some = own[representatives(own, MANY)]
+    try:
+        problems = {label: _problem(grounds, label) for label in labels}
+    except ValueError as error:
+        return Change(transcription, solver, union, note=f"nothing was flown: {error}")
+    return Change(transcription, solver, union, {label: some.flown(problem) for label, problem in problems.items()})
+
+
+def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:
+    """A problem of the study, from the first front of it. Raises ValueError if it was stated in a script."""
+    fronts = (front for ground in grounds if ground.problem == label for solver in ground.runs for front in ground.fronts[solver])
+    return next(fronts).compiled()
+
+
+def changed_figure(change: Change) -> Figure:
+    """The nominal front, the same points under other data (hollow; a cross where they are not feasible any more), and the fronts found under
+    those (filled). Of more than two objectives, a panel for the first with each of the others."""
+    goals = change.nominal.goals
+    m = len(goals)
+    columns = min(3, m - 1)
+    rows = -(-(m - 1) // columns)
+    with style():
+        figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.4 * rows + 0.3)
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, j in zip(grid, range(1, m), strict=False):
+            _draw(ax, change, j)
+            ax.set_xlabel(better(goals[0]))
+            ax.set_ylabel(better(goals[j]))
+        for ax in grid[m - 1 :]:
+            ax.remove()
+        if any((front.status != CONVERGED).any() for front in change.flown.values()):
+            grid[0].plot([], [], "x", color=GREY, ms=3, mew=0.6, label="not feasible")
+        legend(figure, grid[0], None)
+    return figure
+
+
+def _draw(ax: Any, change: Change, j: int) -> None:
+    """The first and the j-th objective."""
+    nominal, *others = change.flown
+    ax.plot(*change.nominal.objectives[:, [0, j]].T, "o", color="black", ms=2.6, mew=0, zorder=4, label=nominal)
+    for color, problem in zip(COLORS * (len(others) // len(COLORS) + 1), others, strict=False):
+        front = change.flown[problem]
+        holds = front.status == CONVERGED
+        look = {"color": color, "ls": "", "zorder": 3}
+        ax.plot(*front.objectives[holds][:, [0, j]].T, "o", ms=4, mfc="none", mew=0.7, label=f"{nominal} under {problem}", **look)
+        ax.plot(*front.objectives[~holds][:, [0, j]].T, "x", ms=3, mew=0.6, alpha=0.7, **look)
+        again = change.found.get(problem)
+        if again is not None and len(again):
+            drawn = again[representatives(again, MANY)]
+            ax.plot(*drawn.objectives[:, [0, j]].T, "s", ms=3, mec="white", mew=0.3, label=f"optimised under {problem}", **look)
