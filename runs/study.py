@@ -57,6 +57,9 @@ class Study:
     start : "uniform", "smooth", Smooth or mapping, optional
         How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: each
         variable by itself, after the problem's guess.
+    verify : float, optional
+        Fly the points of each run's front, see `Front.flown`, and have reports count only those that violate nothing by more than this, in
+        the constraints' scales, with their objectives as flown. Default: points are what the solver says.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -82,6 +85,7 @@ class Study:
     inner: str = "auto"
     tolerance: float = 1e-6
     start: Any = None
+    verify: float | None = None
     time_limit: float | None = None
     description: str = ""
     paper: Sequence[Mapping[str, Any]] = ()
@@ -199,6 +203,7 @@ class Study:
             "inner": self.inner,
             "tolerance": float(self.tolerance),
             "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
+            "verify": self.verify,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
             "paper": studyfile.plain(self.paper),
@@ -209,8 +214,9 @@ class Study:
         check_count("runs", self.runs, 1)
         check_count("seed", self.seed, 0)
         check_positive("tolerance", self.tolerance)
-        if self.time_limit is not None:
-            check_positive("time_limit", self.time_limit)
+        for name in ("time_limit", "verify"):
+            if getattr(self, name) is not None:
+                check_positive(name, getattr(self, name))
         if self.sampling is None and self.start is not None:
             raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
         if self.inner not in NAMED:

@@ -35,8 +35,8 @@ class NormalisedState(State):
 class NSGA3(Baseline):
     """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), that of pymoo; see `Baseline`. For two objectives or more.
 
-    The front are the non-dominated points nearest to the reference directions, or with `whole` all there are. Where two infeasible candidates tie, the winner is drawn
-    from the run's own generator; pymoo's draws from one that no seed governs.
+    The front are the non-dominated points nearest to the reference directions, or with `whole` all there are. Where two infeasible
+    candidates tie, the winner is drawn from the run's own generator; pymoo's draws from one that no seed governs.
 
     Parameters
     ----------
