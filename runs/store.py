@@ -55,6 +55,8 @@ class Run:
     history : mapping
         Of a finished run: "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" (a list of objectives, all minimised) at
         about thirty counts, the last being its front's. Empty if its file is gone.
+    flown : mapping
+        Of a finished run whose points were flown: see `Outcome.flown`.
     path : Path
         Where its front is, or would be.
     """
@@ -67,6 +69,7 @@ class Run:
     traceback: str = field(repr=False)
     wall_time: float
     history: Mapping[str, Any] = field(repr=False)
+    flown: Mapping[str, Any] = field(repr=False)
     path: Path
 
     @property
@@ -246,6 +249,7 @@ class Store:
             traceback=str(record.get("traceback", "")),
             wall_time=record["wall_time"] if isinstance(record.get("wall_time"), float) else 0.0,
             history=record["history"] if isinstance(record.get("history"), dict) else {},
+            flown=record["flown"] if isinstance(record.get("flown"), dict) else {},
             path=path,
         )
 
@@ -272,7 +276,7 @@ class Store:
         OSError if that cannot be written."""
         front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
         about = {"status": outcome.status, "message": outcome.message, "seed": cell.seed(self.definition["seed"], number)}
-        about |= {"wall_time": outcome.wall_time, "traceback": outcome.traceback, "history": outcome.history}
+        about |= {"wall_time": outcome.wall_time, "traceback": outcome.traceback, "history": outcome.history, "flown": outcome.flown}
         about |= {"crc32": crc32(outcome.front)} if outcome.status == FINISHED else {}
         write_whole(record, json.dumps(about).encode())
         if outcome.status == FINISHED:

@@ -59,6 +59,9 @@ class Study:
     start : "uniform", "smooth", Smooth or mapping, optional
         How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: each
         variable by itself, after the problem's guess.
+    verify : float, optional
+        Fly the points of each run's front, see `Front.flown`, and have reports count only those that violate nothing by more than this, in
+        the constraints' scales, with their objectives as flown. Default: points are what the solver says.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -91,6 +94,7 @@ class Study:
     inner: str = "auto"
     tolerance: float = 1e-6
     start: Any = None
+    verify: float | None = None
     time_limit: float | None = None
     description: str = ""
     paper: Sequence[Mapping[str, Any]] = ()
@@ -107,11 +111,11 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
-            known, combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
             if self.goal is not None:
-                Goal.of(self.goal, known)
+                Goal.of(self.goal, combining.problems(combined))
             if self.nominal is not None:
-                check_nominal(self.nominal, known)
+                check_nominal(self.nominal, combining.problems(combined))
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
@@ -215,6 +219,7 @@ class Study:
             "inner": self.inner,
             "tolerance": float(self.tolerance),
             "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
+            "verify": self.verify,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
             "paper": studyfile.plain(self.paper),
@@ -228,8 +233,9 @@ class Study:
         check_count("runs", self.runs, 1)
         check_count("seed", self.seed, 0)
         check_positive("tolerance", self.tolerance)
-        if self.time_limit is not None:
-            check_positive("time_limit", self.time_limit)
+        for name in ("time_limit", "verify"):
+            if getattr(self, name) is not None:
+                check_positive(name, getattr(self, name))
         if self.sampling is None and self.start is not None:
             raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
         if self.inner not in NAMED:

@@ -26,6 +26,7 @@ KEYS = (
     "inner",
     "tolerance",
     "start",
+    "verify",
     "time_limit",
     "paper",
     "goal",

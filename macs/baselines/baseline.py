@@ -69,6 +69,10 @@ class Baseline(PopulationSolver):
         """The first population, of which some were given, each in a place that suits it."""
         return members
 
+    def _best(self, algorithm: Any) -> Any:
+        """Which of its individuals are the front, as far as they are feasible and not dominated."""
+        return algorithm.opt
+
     def _cut(self, algorithm: Any, count: int) -> None:
         """Prepare the algorithm for being told of only the first `count` of those that it has asked for."""
 
@@ -180,7 +184,7 @@ class Baseline(PopulationSolver):
         """Read the algorithm back into the state."""
         state.members = table.take(rows_of(algorithm.pop))
         self._keep(algorithm, state, table)
-        state.show(evaluator.tolerance, seen, table.take(rows_of(algorithm.opt)), state.members)
+        state.show(evaluator.tolerance, seen, table.take(rows_of(self._best(algorithm))), state.members)
 
 
 def rows_of(people: Any) -> np.ndarray:

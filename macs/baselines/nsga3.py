@@ -35,8 +35,8 @@ class NormalisedState(State):
 class NSGA3(Baseline):
     """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), that of pymoo; see `Baseline`. For two objectives or more.
 
-    The front are the non-dominated points nearest to the reference directions. Where two infeasible candidates tie, the winner is drawn
-    from the run's own generator; pymoo's draws from one that no seed governs.
+    The front are the non-dominated points nearest to the reference directions, or with `whole` all there are. Where two infeasible
+    candidates tie, the winner is drawn from the run's own generator; pymoo's draws from one that no seed governs.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ class NSGA3(Baseline):
         Distribution indices of crossover and of polynomial mutation, in [1, 100]: the higher, the nearer are children to their parents.
     handling, penalty, degree
         As for `NSGA2`. With "objective", directions are of one more objective.
+    whole : bool, default False
+        Whether the front is everything in the population that no other dominates. It changes nothing of how the population evolves.
 
     Raises
     ------
@@ -67,8 +69,11 @@ class NSGA3(Baseline):
     handling: str = "feasible-first"
     penalty: float = 1000.0
     degree: str = "largest"
+    whole: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.whole, bool):
+            raise ValueError(f"NSGA3: whole must be True or False, not {self.whole!r}")
         counts = {"population": 2, "divisions": 1}
         self._check(counts, {"crossover": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})
 
@@ -96,6 +101,9 @@ class NSGA3(Baseline):
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:
         m = members.F.shape[1] + (self.handling == "objective")
         return NormalisedState(**common, ideal=np.full(m, np.inf), worst=np.full(m, -np.inf), extreme_points=np.empty((0, m)))
+
+    def _best(self, algorithm: Any) -> Any:
+        return algorithm.pop if self.whole else algorithm.opt
 
     def _restore(self, algorithm: Any, state: NormalisedState, people: Any) -> None:
         algorithm.pop = people

@@ -46,8 +46,8 @@ BOUNDS = {
     "angle of attack": (0.0, radians(40.0)),
     "bank angle": (radians(-90.0), radians(1.0)),
 }
-SCALES = {"altitude": 1e4, "speed": 1e3, "flight-path angle": 0.1}
-"""What counts as one: some ten times what is left open at the end."""
+SCALES = {state: abs(value) for state, value in END.items()}
+"""What counts as one: for all that is limited its limit, so that a violation of 0.01 is 1 % of it."""
 UNITS = {"altitude": "m", "speed": "m/s"}
 """The others are in rad."""
 ANGLES = ("angle of attack", "bank angle")

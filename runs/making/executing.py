@@ -100,6 +100,7 @@ def _task(study: Study, store: Store, run: Run) -> Task:
         tolerance=float(study.tolerance),
         time_limit=study.time_limit,
         start=study.sampling,
+        verify=study.verify,
         checkpoint=store.checkpoint_path(run.cell, run.number),
     )
 

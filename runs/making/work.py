@@ -43,6 +43,7 @@ class Task:
     tolerance: float
     time_limit: float | None
     start: Smooth | str | None = None
+    verify: float | None = None
     checkpoint: Path | None = None
 
 
@@ -63,6 +64,9 @@ class Outcome:
     history : dict
         "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
         minimised. The last sample is the front itself.
+    flown : dict
+        If the points of the front were to be flown: "F" (n, m), all minimised, and "violation" (n,), as flown, and the states at the end of
+        each phase, "ends": {phase: {state: n values}}.
     """
 
     status: str
@@ -71,6 +75,7 @@ class Outcome:
     front: bytes = field(default=b"", repr=False)
     wall_time: float = 0.0
     history: dict[str, list[Any]] = field(default_factory=dict, repr=False)
+    flown: dict[str, Any] = field(default_factory=dict, repr=False)
 
 
 def perform(task: Task, report: Report | None = None) -> Outcome:
@@ -89,7 +94,8 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         samples.add(front.stats, front.stats["wall_time"], front.F)
         # What was spent before it was taken up again is known to the front alone.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns)
+        checked = {} if task.verify is None else _flown(front, task.verify)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=checked)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
@@ -123,6 +129,19 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
             kept.unlink()
         else:
             return front, samples
+
+
+def _flown(front: Front, tolerance: float) -> dict[str, Any]:
+    """What the points turn out to be in the air; see `Outcome.flown`."""
+    flights = front.flown(tolerance=tolerance)
+    ends = {
+        phase.name: {
+            v.name: [float(point.trajectory[phase.name].edge_states[-1, k]) for point in flights if point.trajectory is not None]
+            for k, v in enumerate(phase.states)
+        }
+        for phase in front.compiled().phases
+    }
+    return {"F": flights.F.tolist(), "violation": flights.violation.tolist(), "ends": ends}
 
 
 @lru_cache(maxsize=8)

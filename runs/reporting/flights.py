@@ -70,8 +70,8 @@ class Flights:
     @classmethod
     def of(cls, ground: Ground, reference: Reference) -> Flights | None:
         """Those of a ground; None where nobody found any."""
-        for solver, runs in ground.runs.items():
-            fronts = [run.front for run in runs if len(run.front)]
+        for solver in ground.runs:
+            fronts = [front for front in ground.fronts[solver] if len(front)]
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
@@ -109,7 +109,7 @@ class Flights:
         """Name of a file -> figure."""
         found = {
             "representatives": front_figure(
-                {self.solver: [run.front for run in self.ground.runs[self.solver]]},
+                {self.solver: self.ground.fronts[self.solver]},
                 reference=self.reference.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,

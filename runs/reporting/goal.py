@@ -137,7 +137,8 @@ class Attained:
         unit = f" {self.objective.unit}" if self.objective.unit else ""
         notes = [
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
-            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: so many runs have not got there."
+            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: so many runs have not got there. "
+            "Values are what the transcription says of points, not what is flown."
         ]
         return {f"{self.problem}-goal-attainment": table(heads, rows, f"{self.problem}: goal attainment of {self.objective.name}.", notes)}
 
@@ -162,7 +163,7 @@ def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None) -> list
         here = [ground for ground in grounds if ground.problem == problem]
         goals = here[0].known.goals
         cells = {
-            (ground.transcription, solver): (runs, ground.failures.get(solver, 0))
+            (runs[0].cell.transcription if runs else ground.transcription, solver): (runs, ground.failures.get(solver, 0))
             for ground in here
             for solver, runs in ground.runs.items()
             if len(runs) + ground.failures.get(solver, 0)

@@ -12,6 +12,7 @@ from macs.front import Front
 from ..making.work import CRASHED, MEMORY, TIMEOUT
 from ..measures.references import closed_form, foreign, read, union
 from ..store import Run, Store
+from .verified import Verified
 
 FAILED = (CRASHED, TIMEOUT, MEMORY)
 """What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""
@@ -42,7 +43,8 @@ class Ground:
     problem, transcription : str
         Labels.
     runs : solver -> its finished runs
-    fronts : solver -> the front of each of them, and of foreign solvers those that were given
+    fronts : solver -> what counts of each of them, and of foreign solvers the fronts that were given
+    verified : solver -> the same of each of them with what was found out about it
     failures : solver -> how many of its runs failed
     left_out : solver -> how many others have no front
     """
@@ -51,6 +53,7 @@ class Ground:
     transcription: str
     runs: Mapping[str, Sequence[Run]]
     fronts: Mapping[str, Sequence[Front]]
+    verified: Mapping[str, Sequence[Verified]]
     failures: Mapping[str, int]
     left_out: Mapping[str, int]
 
@@ -116,12 +119,13 @@ def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]
     found = []
     for (problem, transcription), solvers in cells.items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}
-        fronts: dict[str, Sequence[Front]] = {solver: [run.front for run in runs] for solver, runs in finished.items()}
+        verified = {solver: [Verified.of(run, store.definition.get("verify")) for run in runs] for solver, runs in finished.items()}
+        fronts: dict[str, Sequence[Front]] = {solver: [one.front for one in ones] for solver, ones in verified.items()}
         if not any(fronts.values()):
             continue
         goals = next(front for one in fronts.values() for front in one).goals
         fronts |= {name: given for name, given in others.items() if all(front.goals == goals for front in given)}
         failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
         left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
-        found.append(Ground(problem, transcription, finished, fronts, failures, left_out))
+        found.append(Ground(problem, transcription, finished, fronts, verified, failures, left_out))
     return found

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from macs.front import Front
+from macs.inputs import unknown
 
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
@@ -16,9 +17,11 @@ from ..measures.statistics import summarise
 from .ground import Ground
 from .measuring import samples, spent
 from .tables import Cell, Column
+from .verified import Ends
 
 Figures = Mapping[str, Cell]
 """A row's figures by key."""
+OVER_ALL = "over the points of all runs; deviation and variance with divisor n - 1."
 STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
     "greatest": np.max,
     "least": np.min,
@@ -32,23 +35,23 @@ STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
 class Kind:
     """Attributes
     ----------
-    columns : mapping
-        Key of a figure -> head of its column; None where the keys are names of objectives.
+    columns : callable
+        the published table -> {key of a figure: head of its column}; None where the keys are names of objectives.
     ours : callable
         (ground, the published table) -> solver -> rows of figures.
     note : callable
         (ground, the published table) -> what there is to say of ours.
     statistics : bool
         Whether each row is one of `STATISTICS`, named by its key "statistic".
-    needs : tuple of str
-        What else the published table has to say.
+    needs : mapping
+        What else the published table has to say -> what raises ValueError if that makes no sense.
     """
 
-    columns: Mapping[str, Column] | None
+    columns: Callable[[Mapping[str, Any]], Mapping[str, Column] | None]
     ours: Callable[[Ground, Mapping[str, Any]], Mapping[str, Sequence[Figures]]]
     note: Callable[[Ground, Mapping[str, Any]], str]
     statistics: bool = False
-    needs: tuple[str, ...] = ()
+    needs: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)
 
 
 def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
@@ -90,15 +93,11 @@ def _point(ground: Ground, paper: Mapping[str, Any]) -> str:
 
 def _objectives(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """Statistics of each objective over the points of all runs."""
-    rows: dict[str, list[Figures]] = {}
-    for solver, fronts in ground.fronts.items():
-        values = _together(fronts)
-        if len(values):
-            rows[solver] = [
-                {"statistic": name, **{goal.name: float(of(column)) for goal, column in zip(ground.known.goals, values.T, strict=True)}}
-                for name, of in STATISTICS.items()
-            ]
-    return rows
+    return {
+        solver: _statistics({goal.name: column for goal, column in zip(ground.known.goals, values.T, strict=True)})
+        for solver, fronts in ground.fronts.items()
+        if len(values := _together(fronts))
+    }
 
 
 def _together(fronts: Sequence[Front]) -> np.ndarray:
@@ -106,9 +105,80 @@ def _together(fronts: Sequence[Front]) -> np.ndarray:
     return np.concatenate([front.objectives for front in fronts if len(front)] or [np.empty((0, 0))])
 
 
+def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
+    """Rows of what there is to say of samples by name."""
+    return [{"statistic": name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
+
+
+def _ends(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+    """Statistics, over the points of all runs, of how far states are at the end from where they were to be."""
+    rows: dict[str, list[Figures]] = {}
+    for solver, runs in ground.verified.items():
+        found = [one for one in runs if len(one.front)]
+        if found:
+            errors = {}
+            for end in paper["ends"]:
+                values = np.concatenate([_end(one.ends, end) for one in found])
+                errors[end["name"]] = end.get("factor", 1.0) * np.abs(values - end["at"])
+            rows[solver] = _statistics(errors)
+    return rows
+
+
+def _end(ends: Ends, end: Mapping[str, Any]) -> np.ndarray:
+    """A state at the end of the last phase that has it."""
+    found = [states[end["state"]] for states in ends.values() if end["state"] in states]
+    if not found:
+        known = ", ".join(dict.fromkeys(name for states in ends.values() for name in states))
+        raise ValueError(f"paper: ends: there is no state '{end['state']}'; there are {known}")
+    return found[-1]
+
+
+def _check_ends(ends: Any) -> None:
+    """Raise ValueError unless a published table says whose ends it has."""
+    keys = ("name", "state", "at", "unit", "factor")
+    if not isinstance(ends, Sequence) or isinstance(ends, str) or not ends:
+        raise ValueError(f"paper: ends must be a list of tables, not {ends!r}")
+    for end in ends:
+        if not isinstance(end, Mapping) or not all(key in end for key in ("name", "state", "at")):
+            raise ValueError(f"paper: each of ends must be a table with name, state and at, not {end!r}")
+        for key, value in end.items():
+            if key not in keys:
+                raise ValueError(f"paper: ends: {unknown('key', key, keys)}")
+            number = key in ("at", "factor")
+            if isinstance(value, bool) or not isinstance(value, (int, float) if number else str):
+                raise ValueError(f"paper: ends: {key} must be a {'number' if number else 'text'}, not {value!r}")
+
+
+def _check_point(point: Any) -> None:
+    """Raise ValueError unless a point is a list of numbers."""
+    if not isinstance(point, Sequence) or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in point):
+        raise ValueError(f"paper: point must be a list of numbers, one for each objective, not {point!r}")
+
+
+def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+    """In which generation one, and all of a population were feasible, and how many points were found; of solvers with a population."""
+    rows: dict[str, list[Figures]] = {}
+    for solver, runs in ground.runs.items():
+        told = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
+        if not told:
+            continue
+        figures: dict[str, Cell] = {}
+        for key in ("first_feasible", "all_feasible"):
+            reached = [one[key] for one in told if one[key] is not None]
+            figures[key] = float(np.mean(reached)) if reached else None
+            # A run that never got there is later than any other.
+            middle = float(np.median([np.inf if one[key] is None else one[key] for one in told]))
+            figures[f"{key}_median"] = middle if np.isfinite(middle) else None
+            figures[f"{key}_never"] = len(told) - len(reached)
+        figures["points"] = float(np.mean([one["nondominated"] for one in told]))
+        figures["held"] = float(np.mean([len(one.front) for one in ground.verified[solver]]))
+        rows[solver] = [figures]
+    return rows
+
+
 KINDS: Mapping[str, Kind] = {
     "indicators": Kind(
-        {
+        lambda paper: {
             "gd_mean": Column("mean GD", digits=4),
             "gd_variance": Column("variance", digits=4),
             "igd_mean": Column("mean IGD", digits=4),
@@ -118,8 +188,32 @@ KINDS: Mapping[str, Kind] = {
         _indicators,
         _against_union,
     ),
-    "hypervolume": Kind({key: Column(key, digits=5) for key in ("best", "median", "worst")}, _hypervolume, _point, needs=("point",)),
-    "objectives": Kind(
-        None, _objectives, lambda ground, paper: "over the points of all runs; deviation and variance with divisor n - 1.", statistics=True
+    "hypervolume": Kind(
+        lambda paper: {key: Column(key, digits=5) for key in ("best", "median", "worst")},
+        _hypervolume,
+        _point,
+        needs={"point": _check_point},
+    ),
+    "objectives": Kind(lambda paper: None, _objectives, lambda ground, paper: OVER_ALL, statistics=True),
+    "ends": Kind(
+        lambda paper: {end["name"]: Column(end["name"], end.get("unit", ""), digits=4) for end in paper["ends"]},
+        _ends,
+        lambda ground, paper: OVER_ALL,
+        statistics=True,
+        needs={"ends": _check_ends},
+    ),
+    "feasibility": Kind(
+        lambda paper: {
+            "first_feasible": Column("first feasible, mean", digits=4),
+            "first_feasible_median": Column("median", digits=4),
+            "first_feasible_never": Column("never"),
+            "all_feasible": Column("all feasible, mean", digits=4),
+            "all_feasible_median": Column("median", digits=4),
+            "all_feasible_never": Column("never"),
+            "points": Column("not dominated, claimed", digits=4),
+            "held": Column("points of a front that count", digits=4),
+        },
+        _feasibility,
+        lambda ground, paper: "generations from 1, the first population; means of the runs that got there; points are means of a run.",
     ),
 }

@@ -36,16 +36,15 @@ def check(papers: Any) -> None:
         for key in kind.needs:
             if key not in paper:
                 raise ValueError(f"paper: of {paper['of']} it needs {key}")
-        point = paper.get("point", [])
-        if not isinstance(point, Sequence) or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in point):
-            raise ValueError(f"paper: point must be a list of numbers, one for each objective, not {point!r}")
+        for key, checked in kind.needs.items():
+            checked(paper[key])
         for key in TEXTS:
             if not isinstance(paper.get(key, ""), str):
                 raise ValueError(f"paper: {key} must be a text, not {paper[key]!r}")
         if not isinstance(paper.get("rows"), Sequence) or not paper["rows"]:
             raise ValueError("paper: rows must be a list of tables")
         for row in paper["rows"]:
-            _check_row(row, kind)
+            _check_row(row, kind, kind.columns(paper))
 
 
 def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, Any]]) -> dict[str, Table]:
@@ -58,14 +57,14 @@ def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, An
     return found
 
 
-def _check_row(row: Any, kind: Kind) -> None:
+def _check_row(row: Any, kind: Kind, columns: Mapping[str, Column] | None) -> None:
     if not isinstance(row, Mapping) or not all(isinstance(row.get(key), str) for key in ROW):
         raise ValueError(f"paper: each of rows must be a table with problem and by, not {row!r}")
     if kind.statistics and row.get("statistic") not in STATISTICS:
         raise ValueError(f"paper: statistic must be one of {', '.join(STATISTICS)}, not {row.get('statistic')!r}")
     for key in _figures(row):
-        if kind.columns is not None and key not in kind.columns:
-            raise ValueError(f"paper: {unknown('key', key, tuple(kind.columns))}")
+        if columns is not None and key not in columns:
+            raise ValueError(f"paper: {unknown('key', key, tuple(columns))}")
         if isinstance(row[key], bool) or not isinstance(row[key], int | float):
             raise ValueError(f"paper: {key} must be a number, not {row[key]!r}")
 
@@ -76,7 +75,8 @@ def _figures(row: Mapping[str, Any]) -> list[str]:
 
 def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> Table | None:
     """One published table and ours; None if there are no runs of its problems."""
-    keys = list(kind.columns or dict.fromkeys(key for row in paper["rows"] for key in _figures(row)))
+    columns = kind.columns(paper)
+    keys = list(columns or dict.fromkeys(key for row in paper["rows"] for key in _figures(row)))
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for problem in dict.fromkeys(row["problem"] for row in paper["rows"]):
@@ -100,7 +100,7 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
     ]
     heads += ["statistic"] if kind.statistics else []
     units = {goal.name: goal.unit for ground in grounds for goal in ground.known.goals}
-    heads += [kind.columns[key] if kind.columns else Column(key, units.get(key, ""), digits=4) for key in keys]
+    heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper['source']}" if "source" in paper else "Beside published figures"
     told = [f"{word}: {paper[key]}." for key, word in (("note", "The paper"), ("differs", "What differs")) if key in paper]

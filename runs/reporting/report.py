@@ -30,6 +30,7 @@ from .plots import attainment_figure, convergence_figure, front_figure
 from .published import check, published_tables
 from .statistics_tables import comparison_table, overall_table, summary_table
 from .tables import Cell, Column, Table, table
+from .verified import claims_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,7 +98,7 @@ def report(
     writer = _Writer(Path(out) / FOLDER)
     sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
     for ground in _told(found) if progress else found:
-        sections += _section(ground, ground.reference(store.definition.get("reference")), writer, figures)
+        sections += _section(ground, ground.reference(store.definition.get("reference")), store.definition.get("verify"), writer, figures)
     for part in (*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))):
         sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
@@ -116,10 +117,10 @@ def _told(found: Sequence[Ground]) -> Iterator[Ground]:
             yield ground
 
 
-def _section(ground: Ground, reference: Reference, writer: _Writer, drawn: bool) -> list[str]:
+def _section(ground: Ground, reference: Reference, verify: float | None, writer: _Writer, drawn: bool) -> list[str]:
     """Write what there is of a ground; returns its tables as text."""
     told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
-    tables, figures = _tables(ground, reference), _figures(ground, reference) if drawn else {}
+    tables, figures = _tables(ground, reference, verify), _figures(ground, reference) if drawn else {}
     flights = Flights.of(ground, reference)
     if flights is not None:
         tables["representatives"] = flights.table()
@@ -156,9 +157,11 @@ def _left_out(ground: Ground) -> list[str]:
     return ["\n".join(told)] if told else []
 
 
-def _tables(ground: Ground, reference: Reference) -> dict[str, Table]:
+def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[str, Table]:
     """Name of a file -> table."""
     found: dict[str, Table] = {}
+    if verify is not None:
+        found["claims"] = claims_table(ground.verified, verify, f"{ground.name}: what was claimed, and what holds.")
     for name, against in {"indicators": reference, "indicators-union": ground.union()}.items():
         if name != "indicators" and not reference.true:
             continue

@@ -373,6 +373,7 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: NSGA2(crossover=1.5), r"NSGA2: crossover must be in \[0, 1\], not 1.5"),
         (lambda: NSGA2(penalty=-1.0), "NSGA2: penalty must be a number of at least 0"),
         (lambda: NSGA3(divisions=0), "NSGA3: divisions"),
+        (lambda: NSGA3(whole=1), "NSGA3: whole must be True or False, not 1"),  # type: ignore[arg-type]
         (lambda: NSGA3(mutation_eta="x"), "NSGA3: mutation_eta"),  # type: ignore[arg-type]
         (lambda: MOEAD(neighbors=1), "MOEAD: neighbors"),
         (lambda: MOEAD(decomposition="sum"), "MOEAD: decomposition"),
@@ -435,3 +436,11 @@ def test_pymoo_s_changes_of_warnings_do_not_stay() -> None:
     before = list(warnings.filters)
     NSGA3().minimize(schaffer, [(-2, 2)] * 3, evaluations=300, seed=1)
     assert warnings.filters == before
+
+
+def test_the_whole_front_of_a_population_holds_the_nearest_to_the_directions_and_changes_nothing_else():
+    function, bounds, _ = dtlz(2, 3)
+    one, other = (NSGA3(population=20, divisions=4, whole=whole) for whole in (False, True))
+    nearest, whole = (solver.minimize(function, bounds, evaluations=400, seed=4) for solver in (one, other))
+    assert whole.stats["population"] == nearest.stats["population"] and len(whole) == whole.stats["population"]["nondominated"]
+    assert len(nearest) < len(whole) and {tuple(F) for F in nearest.F} <= {tuple(F) for F in whole.F}

@@ -1,0 +1,149 @@
+"""Studies whose points are flown: what counts in their reports, and the published tables that need it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_study import Inline
+
+from macs import MACS, NSGA2, Front
+from problems import Problem
+from runs import Study
+from runs.reporting.ground import grounds
+from runs.reporting.published import check, published_tables
+from runs.store import Store
+
+ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
+ROW = {"problem": "braking", "by": "the paper"}
+PAPER = [
+    {"of": "ends", "ends": ENDS, "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]},
+    {"of": "feasibility", "rows": [{**ROW, "first_feasible": 19, "points": 50}]},
+    {"of": "hypervolume", "point": [0.0, 20.0], "rows": [{**ROW, "best": 3.0}]},
+]
+
+
+def braking() -> Problem:
+    """v' = u - 3 v, which one element of degree one gets wrong by some percent, which is to be at 0.6 or more at the end."""
+    problem = Problem("braking")
+    phase = problem.phase("run", t0=0.0, tf=2.0)
+    x = phase.state("x", bounds=(0, 10), initial=0, unit="m")
+    v = phase.state("v", bounds=(-5, 5), initial=0, unit="m/s")
+    u = phase.control("u", bounds=(0, 5))
+    phase.dynamics(x=v, v=u - 3.0 * v)
+    problem.constraint("pace", phase.final(v), lower=0.6, scale=1.0)
+    problem.maximize("distance", phase.final(x), unit="m")
+    problem.minimize("effort", phase.integral(u**2))
+    problem.default_transcription = "dfet:1x2"
+    return problem
+
+
+def study(**more) -> Study:
+    solvers = {"nsga2": NSGA2(population=16), "macs": MACS(agents=4, archive=6, refine=False)}
+    given = {"problems": braking(), "solvers": solvers, "evaluations": 160, "runs": 2, "seed": 1, "inner": "march"}
+    return Study("brakes", **given | {"verify": 0.01, "paper": PAPER} | more)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("brakes") / "out"
+    assert study().run(out, executor=Inline()).finished == 4
+    return out
+
+
+def test_only_what_holds_counts_and_as_it_is_flown(folder):
+    ground = grounds(Store.open(folder), {})[0]
+    problem = braking()
+    claimed = held = 0
+    for solver, runs in ground.runs.items():
+        for run, front, verified in zip(runs, ground.fronts[solver], ground.verified[solver], strict=True):
+            flown = Front.load(run.path, problem).flown(tolerance=0.01)
+            best = Front.merge([flown])
+            np.testing.assert_allclose(front.F, best.F, rtol=1e-9)
+            assert (front.status == "converged").all() and (front.violation <= 0.01).all()
+            ends = [point.trajectory["run"].edge_states[-1] for point in best]
+            np.testing.assert_allclose(np.transpose([verified.ends["run"][name] for name in "xv"]), ends, rtol=1e-9)
+            assert (verified.claimed, verified.held) == (len(flown), (flown.status == "converged").sum())
+            claimed, held = claimed + len(flown), held + verified.held
+    assert 0 < held < claimed, "some of them lie"
+
+
+def test_the_report_says_how_many_were_claimed(folder):
+    text = str(study().report(folder, figures=False))
+    assert "what was claimed, and what holds" in text and "flown by DOP853" in text
+    ground = grounds(Store.open(folder), {})[0]
+    with (folder / "report" / "braking-dfet-1x2-claims.csv").open() as file:
+        rows = {row["solver"]: row for row in csv.DictReader(file)}
+    for solver, runs in ground.verified.items():
+        assert int(rows[solver]["points claimed"]) == sum(one.claimed for one in runs)
+        assert int(rows[solver]["hold as flown"]) == sum(one.held for one in runs)
+
+
+def test_published_ends_and_feasibility_beside_ours(folder):
+    study().report(folder, figures=False)
+    ground = grounds(Store.open(folder), {})[0]
+    x = np.concatenate([one.ends["run"]["x"] for one in ground.verified["nsga2"]])
+    with (folder / "report" / "published-1.csv").open() as file:
+        rows = {(row["by"], row["statistic"]): row for row in csv.DictReader(file)}
+    assert rows["the paper", "mean"]["miss [cm]"] == "5.0"
+    for statistic, value in (("greatest", np.max), ("mean", np.mean), ("standard deviation", lambda v: np.std(v, ddof=1))):
+        assert float(rows["nsga2, dfet:1x2", statistic]["miss [cm]"]) == pytest.approx(value(100 * np.abs(x - 2.0)), rel=1e-9)
+    with (folder / "report" / "published-2.csv").open() as file:
+        rows = {row["by"]: list(row.values()) for row in csv.DictReader(file)}
+    told = [run.front.stats["population"] for run in ground.runs["nsga2"]]
+    ours = rows["nsga2, dfet:1x2"]
+    assert float(ours[3]) == np.mean([one["first_feasible"] for one in told]) and ours[5] == "0"
+    assert float(ours[-2]) == np.mean([one["nondominated"] for one in told])
+    assert float(ours[-1]) == np.mean([len(front) for front in ground.fronts["nsga2"]])
+    assert "macs, dfet:1x2" not in rows, "it has no population"
+
+
+def test_without_flights_points_are_what_the_solver_says(tmp_path):
+    given = study(verify=None)
+    given.run(tmp_path / "out", executor=Inline())
+    ground = grounds(Store.open(tmp_path / "out"), {})[0]
+    for run, verified in zip(ground.runs["macs"], ground.verified["macs"], strict=True):
+        np.testing.assert_array_equal(verified.front.F, run.front.F)
+        np.testing.assert_array_equal(verified.ends["run"]["x"], [p.trajectory["run"].edge_states[-1, 0] for p in run.front])
+    assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")
+
+
+def test_a_record_that_does_not_say_how_points_fly_is_named(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "out")
+    record = next((tmp_path / "out").glob("*/0002.json"))
+    data = json.loads(record.read_text())
+    record.write_text(json.dumps({**data, "flown": {}}))
+    with pytest.raises(ValueError, match=r"0002\.json does not say how the points of run 2 of braking, dfet:1x2"):
+        study().report(tmp_path / "out")
+
+
+@pytest.mark.parametrize(("value", "message"), [(0.0, "verify must be a positive number"), ("much", "verify must be a positive number")])
+def test_how_much_may_be_violated_is_a_number(value, message):
+    with pytest.raises(ValueError, match=message):
+        study(verify=value)
+
+
+@pytest.mark.parametrize(
+    ("ends", "message"),
+    [
+        ([], "ends must be a list of tables"),
+        ("x", "ends must be a list of tables"),
+        ([{"name": "miss"}], "each of ends must be a table with name, state and at"),
+        ([{**ENDS[0], "at": "2"}], "ends: at must be a number"),
+        ([{**ENDS[0], "unit": 2}], "ends: unit must be a text"),
+        ([{**ENDS[0], "units": "m"}], "units"),
+    ],
+)
+def test_ends_that_make_no_sense_are_refused(ends, message):
+    with pytest.raises(ValueError, match=message):
+        check([{"of": "ends", "ends": ends, "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}])
+
+
+def test_a_state_that_does_not_exist_is_named(folder):
+    paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean"}]}
+    with pytest.raises(ValueError, match="there is no state 'y'; there are x, v"):
+        published_tables(grounds(Store.open(folder), {}), [paper])
