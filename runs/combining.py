@@ -17,9 +17,12 @@ from transcription import Transcription, parse, word
 from .cell import Cell
 from .making.work import Payload
 from .studyfile import plain, told
+from .terms import check as check_terms
 
 
-def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) -> list[tuple[Cell, Payload]]:
+def combine(
+    problems: Any, transcriptions: Any, solvers: Any, evaluations: Any, terms: Mapping[str, Mapping[str, Any]]
+) -> list[tuple[Cell, Payload]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
 
     Parameters are those of `Study`. Raises ValueError that names what makes no sense.
@@ -28,18 +31,29 @@ def combine(problems: Any, transcriptions: Any, solvers: Any, evaluations: Any) 
     methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers, _name_of_solver).items()}
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
+    check_terms(terms, methods)
     combined = []
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
-        for scheme_label, scheme in schemes[label].items():
+        common = [one for one in methods if "transcription" not in terms.get(one, {})]
+        offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
+        offered += [
+            (name, scheme, [method_label])
+            for method_label in methods
+            if method_label not in common
+            for name, scheme in _named_schemes(terms[method_label]["transcription"]).items()
+        ]
+        for scheme_label, scheme, method_labels in offered:
             stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
-            for method_label, method in methods.items():
+            for method_label in method_labels:
+                method, own = methods[method_label], dict(terms.get(method_label, {}))
                 place = f"{label}, {scheme_label}, {method_label}"
                 with told(place):
                     method.check_objectives(len(compiled.goals))
                     method.check_transcription(scheme)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
-                cell = Cell(label, scheme_label, method_label, budgets[label], plain(details))
+                details |= {"terms": own} if own else {}
+                cell = Cell(label, scheme_label, method_label, own.get("evaluations", budgets[label]), plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
     return combined
 

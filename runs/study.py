@@ -8,14 +8,14 @@ from dataclasses import KW_ONLY, asdict, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.inputs import check_count, check_positive, drawing, unknown
+from macs.inputs import check_count, check_positive
 from transcription import Smooth
-from transcription.inner import NAMED
 
 from . import combining, studyfile
 from .cell import Cell
 from .reporting.published import check as check_paper
 from .store import Store, Summary
+from .terms import check_inner, sampling
 
 if TYPE_CHECKING:
     from .reporting.report import Report
@@ -42,6 +42,9 @@ class Study:
         Default: the problem's own.
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
+    terms : mapping, optional
+        {label of a solver: what it works with where that is not what the others do}: any of transcription (one), evaluations, inner and
+        start. Reports compare it with the others on each of their transcriptions.
     evaluations : int, or mapping, optional
         Budget of each run, or {label of a problem: budget}. Default: the problem's own.
     runs : int
@@ -78,6 +81,7 @@ class Study:
     problems: Any
     transcriptions: Any = None
     solvers: Any
+    terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     evaluations: Any = None
     runs: int
     seed: int
@@ -99,7 +103,7 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
-            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms)
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
@@ -178,23 +182,30 @@ class Study:
         Store.open(out).check(self.definition())
         return report(out, foreign=foreign, figures=figures, progress=progress)
 
-    @property
-    def sampling(self) -> Smooth | str | None:
-        """What `solve` gets as its `start`. Raises ValueError if ours makes no sense."""
-        if not isinstance(self.start, Mapping):
-            return drawing(self.start)
-        for key in self.start:
-            if key not in Smooth.__dataclass_fields__:
-                raise ValueError(unknown("setting of start", key, Smooth.__dataclass_fields__))
-        return Smooth(**self.start)
+    def inner_of(self, cell: Cell) -> str:
+        """The inner level of a cell's runs, by name."""
+        return self.terms.get(cell.solver, {}).get("inner", self.inner)
+
+    def sampling_of(self, cell: Cell) -> Smooth | str | None:
+        """What `solve` gets as its `start` in a cell's runs."""
+        return sampling(self.terms.get(cell.solver, {}).get("start", self.start))
 
     def quick(self) -> Study:
         """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
-        budgets = {cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells}
-        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets)
+        budgets = {
+            cell.problem: min(cell.evaluations, QUICK_EVALUATIONS)
+            for cell in self.cells
+            if "evaluations" not in self.terms.get(cell.solver, {})
+        }
+        own = {
+            label: {**terms, "evaluations": min(terms["evaluations"], QUICK_EVALUATIONS)} if "evaluations" in terms else terms
+            for label, terms in self.terms.items()
+        }
+        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:
         """All that decides the numbers, and what reports print, as plain data."""
+        start = sampling(self.start)
         return {
             "name": self.name,
             "description": self.description,
@@ -202,7 +213,7 @@ class Study:
             "runs": int(self.runs),
             "inner": self.inner,
             "tolerance": float(self.tolerance),
-            "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
+            "start": asdict(start) if isinstance(start, Smooth) else start,
             "verify": self.verify,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
@@ -217,10 +228,8 @@ class Study:
         for name in ("time_limit", "verify"):
             if getattr(self, name) is not None:
                 check_positive(name, getattr(self, name))
-        if self.sampling is None and self.start is not None:
-            raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
-        if self.inner not in NAMED:
-            raise ValueError(unknown("inner level", self.inner, NAMED))
+        sampling(self.start)
+        check_inner(self.inner)
         check_paper(self.paper)
         if not isinstance(self.description, str):
             raise ValueError(f"description must be a line of text, not {self.description!r}")
