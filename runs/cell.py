@@ -41,6 +41,11 @@ class Cell:
         return self.problem, self.transcription, self.solver
 
     @property
+    def apart(self) -> bool:
+        """Whether its solver works on a transcription of its own, unlike the other solvers of the study."""
+        return "transcription" in self.details.get("terms", {})
+
+    @property
     def name(self) -> str:
         """For people: goddard, dfet:4x6, macs."""
         return ", ".join(self.labels)

@@ -8,9 +8,8 @@ from dataclasses import KW_ONLY, asdict, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.inputs import check_count, check_positive, drawing, unknown
+from macs.inputs import check_count, check_positive
 from transcription import Smooth
-from transcription.inner import NAMED
 
 from . import combining, studyfile
 from .cell import Cell
@@ -18,6 +17,7 @@ from .reporting.changed import check as check_nominal
 from .reporting.goal import Goal
 from .reporting.published import check as check_paper
 from .store import Store, Summary
+from .terms import check_inner, sampling
 
 if TYPE_CHECKING:
     from .reporting.report import Report
@@ -44,6 +44,9 @@ class Study:
         Default: the problem's own.
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
+    terms : mapping, optional
+        {label of a solver: what it works with where that is not what the others do}: any of transcription (one), evaluations, inner and
+        start. Reports compare it with the others on each of their transcriptions.
     evaluations : int, or mapping, optional
         Budget of each run, or {label of a problem: budget}. Default: the problem's own.
     runs : int
@@ -87,6 +90,7 @@ class Study:
     problems: Any
     transcriptions: Any = None
     solvers: Any
+    terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     evaluations: Any = None
     runs: int
     seed: int
@@ -111,7 +115,7 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
-            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations)
+            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms)
             if self.goal is not None:
                 Goal.of(self.goal, combining.problems(combined))
             if self.nominal is not None:
@@ -194,23 +198,30 @@ class Study:
         Store.open(out).check(self.definition())
         return report(out, foreign=foreign, figures=figures, progress=progress)
 
-    @property
-    def sampling(self) -> Smooth | str | None:
-        """What `solve` gets as its `start`. Raises ValueError if ours makes no sense."""
-        if not isinstance(self.start, Mapping):
-            return drawing(self.start)
-        for key in self.start:
-            if key not in Smooth.__dataclass_fields__:
-                raise ValueError(unknown("setting of start", key, Smooth.__dataclass_fields__))
-        return Smooth(**self.start)
+    def inner_of(self, cell: Cell) -> str:
+        """The inner level of a cell's runs, by name."""
+        return self.terms.get(cell.solver, {}).get("inner", self.inner)
+
+    def sampling_of(self, cell: Cell) -> Smooth | str | None:
+        """What `solve` gets as its `start` in a cell's runs."""
+        return sampling(self.terms.get(cell.solver, {}).get("start", self.start))
 
     def quick(self) -> Study:
         """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
-        budgets = {cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells}
-        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets)
+        budgets = {
+            cell.problem: min(cell.evaluations, QUICK_EVALUATIONS)
+            for cell in self.cells
+            if "evaluations" not in self.terms.get(cell.solver, {})
+        }
+        own = {
+            label: {**terms, "evaluations": min(terms["evaluations"], QUICK_EVALUATIONS)} if "evaluations" in terms else terms
+            for label, terms in self.terms.items()
+        }
+        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:
         """All that decides the numbers, and what reports print, as plain data."""
+        start = sampling(self.start)
         return {
             "name": self.name,
             "description": self.description,
@@ -218,7 +229,7 @@ class Study:
             "runs": int(self.runs),
             "inner": self.inner,
             "tolerance": float(self.tolerance),
-            "start": asdict(self.sampling) if isinstance(self.sampling, Smooth) else self.sampling,
+            "start": asdict(start) if isinstance(start, Smooth) else start,
             "verify": self.verify,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
@@ -236,10 +247,8 @@ class Study:
         for name in ("time_limit", "verify"):
             if getattr(self, name) is not None:
                 check_positive(name, getattr(self, name))
-        if self.sampling is None and self.start is not None:
-            raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {self.start!r}")
-        if self.inner not in NAMED:
-            raise ValueError(unknown("inner level", self.inner, NAMED))
+        sampling(self.start)
+        check_inner(self.inner)
         check_paper(self.paper)
         for name in ("description", "note"):
             if not isinstance(getattr(self, name), str):

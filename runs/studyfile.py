@@ -19,6 +19,7 @@ KEYS = (
     "problems",
     "transcriptions",
     "solvers",
+    "terms",
     "evaluations",
     "runs",
     "seed",

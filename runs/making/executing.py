@@ -96,10 +96,10 @@ def _task(study: Study, store: Store, run: Run) -> Task:
         payload=study.payloads[run.cell.labels],
         evaluations=run.cell.evaluations,
         seed=run.seed,
-        inner=study.inner,
+        inner=study.inner_of(run.cell),
         tolerance=float(study.tolerance),
         time_limit=study.time_limit,
-        start=study.sampling,
+        start=study.sampling_of(run.cell),
         verify=study.verify,
         checkpoint=store.checkpoint_path(run.cell, run.number),
     )

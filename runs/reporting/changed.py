@@ -153,17 +153,17 @@ def changes(grounds: Sequence[Ground], nominal: str | None) -> list[Changed]:
     if nominal is None:
         return []
     labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
-    found = []
-    for ground in grounds:
-        if ground.problem == nominal:
-            for solver, runs in ground.runs.items():
-                if runs:
-                    found.append(_change(grounds, ground.transcription, solver, labels))
+    cells = {
+        (ground.place(solver), solver): None for ground in grounds if ground.problem == nominal for solver, runs in ground.runs.items() if runs
+    }
+    found = [_change(grounds, *cell, labels) for cell in cells]
     return [Changed(nominal, found)] if found else []
 
 
 def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str]) -> Change:
-    here = {ground.problem: ground.fronts[solver] for ground in grounds if ground.transcription == transcription and ground.runs.get(solver)}
+    here = {
+        ground.problem: ground.fronts[solver] for ground in grounds if ground.runs.get(solver) and ground.place(solver) == transcription
+    }
     union = {label: Front.merge(here[label]) for label in labels if label in here}
     own = union[labels[0]]
     if not len(own):

@@ -98,7 +98,7 @@ class Flights:
             rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
         for goal, end in zip(goals, self.ends, strict=False):
             rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
-        told = [f"Of {self.solver}, all runs together. Alone: one objective optimised by gradients on {self.ground.transcription}."]
+        told = [f"Of {self.solver}, all runs together. Alone: one objective optimised by gradients on {self.ground.place(self.solver)}."]
         if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
             told.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."

@@ -163,7 +163,7 @@ def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None) -> list
         here = [ground for ground in grounds if ground.problem == problem]
         goals = here[0].known.goals
         cells = {
-            (runs[0].cell.transcription if runs else ground.transcription, solver): (runs, ground.failures.get(solver, 0))
+            (ground.place(solver), solver): (runs, ground.failures.get(solver, 0))
             for ground in here
             for solver, runs in ground.runs.items()
             if len(runs) + ground.failures.get(solver, 0)

@@ -14,6 +14,8 @@ from ..measures.references import closed_form, foreign, read, union
 from ..store import Run, Store
 from .verified import Verified
 
+EACH = "each on its own"
+"""What is said for the transcription of a ground without a common one."""
 FAILED = (CRASHED, TIMEOUT, MEMORY)
 """What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""
 
@@ -61,6 +63,11 @@ class Ground:
     def name(self) -> str:
         """For people."""
         return f"{self.problem}, {self.transcription}"
+
+    def place(self, solver: str) -> str:
+        """The transcription that a solver works on."""
+        runs = self.runs.get(solver)
+        return runs[0].cell.transcription if runs else self.transcription
 
     @property
     def every(self) -> list[Front]:
@@ -114,8 +121,15 @@ class Ground:
 def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]:
     """The grounds of a study with at least one front; `others` are fronts of foreign solvers, on the problem whose objectives they have."""
     cells: dict[tuple[str, str], dict[str, list[Run]]] = {}
+    apart: dict[str, dict[str, list[Run]]] = {}
     for run in store.runs():
-        cells.setdefault(run.cell.labels[:2], {}).setdefault(run.cell.solver, []).append(run)
+        problem, transcription, solver = run.cell.labels
+        here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
+        here.setdefault(solver, []).append(run)
+    for problem, solvers in apart.items():
+        # Solvers on terms of their own are compared with the others wherever these are; if there are none, among themselves.
+        for place in [place for place in cells if place[0] == problem] or [(problem, EACH)]:
+            cells[place] = cells.get(place, {}) | solvers
     found = []
     for (problem, transcription), solvers in cells.items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}

@@ -89,7 +89,7 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
         for ground in here:
             for solver, figures in kind.ours(ground, paper).items():
                 runs = len(ground.fronts[solver]) + ground.failures.get(solver, 0)
-                rows += [[problem, f"{solver}, {ground.transcription}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
+                rows += [[problem, f"{solver}, {ground.place(solver)}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
         notes.append(f"{problem}: {kind.note(here[0], paper)}")
     if not rows:
         return None

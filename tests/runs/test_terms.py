@@ -1,0 +1,83 @@
+"""Solvers that work on terms of their own beside others in one study."""
+
+from __future__ import annotations
+
+import pytest
+from misbehaving import Plain, glide
+from test_study import Inline
+
+from macs import NSGA2
+from runs import Study
+from runs.reporting.ground import EACH, grounds
+from runs.store import Store
+
+APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
+SOLVERS = {"macs": Plain(agents=4), "nsga2": NSGA2(population=10)}
+MARCHED = {"inner": "march", "transcriptions": ["shooting:5", "shooting:9"]}
+
+
+def study(**more) -> Study:
+    given = {"problems": glide(), "solvers": SOLVERS, "terms": APART, "evaluations": 60, "runs": 2, "seed": 1, **MARCHED}
+    return Study("both", **given | more)
+
+
+def test_cells():
+    cells = {cell.labels: cell for cell in study().cells}
+    assert set(cells) == {("glide", "shooting:5", "nsga2"), ("glide", "shooting:9", "nsga2"), ("glide", "dfet:3x2", "macs")}
+    assert cells["glide", "dfet:3x2", "macs"].evaluations == 40 and cells["glide", "shooting:5", "nsga2"].evaluations == 60
+    plain = study(terms={}, solvers={"nsga2": SOLVERS["nsga2"]}).cells[0]
+    same = cells[plain.labels]
+    assert same.seed(1, 1) == plain.seed(1, 1) and same.to_dict() == plain.to_dict(), "others do not notice"
+
+
+def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
+    assert study().run(tmp_path / "out", executor=Inline()).finished == 6
+    found = grounds(Store.open(tmp_path / "out"), {})
+    assert [ground.transcription for ground in found] == ["shooting:5", "shooting:9"]
+    for ground in found:
+        assert list(ground.fronts) == ["nsga2", "macs"]
+        assert ground.place("macs") == "dfet:3x2" and ground.place("nsga2") == ground.transcription
+        for solver, budget in (("macs", 40), ("nsga2", 60)):
+            assert all(front.stats["evaluations"] == budget for front in ground.fronts[solver])
+    assert found[0].fronts["macs"][0].F.tolist() == found[1].fronts["macs"][0].F.tolist()
+    text = str(study().report(tmp_path / "out", figures=False))
+    assert "Mann-Whitney" in text
+    with pytest.raises(
+        ValueError, match=r"another study: glide, dfet:3x2, macs: details\.terms\.evaluations|evaluations is 40 there and 30"
+    ):
+        study(terms={"macs": {**APART["macs"], "evaluations": 30}}).run(tmp_path / "out", executor=Inline())
+
+
+def test_all_may_work_apart(tmp_path):
+    terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "march"}}
+    each = study(terms=terms, transcriptions=None, inner="auto", runs=1)
+    each.run(tmp_path / "out", executor=Inline())
+    (ground,) = grounds(Store.open(tmp_path / "out"), {})
+    assert ground.transcription == EACH and set(ground.fronts) == {"macs", "nsga2"}
+
+
+def test_quick_studies_keep_the_terms():
+    quick = study(terms={"macs": {**APART["macs"], "evaluations": 9000}}, evaluations=60_000).quick()
+    assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 500, "nsga2": 500}
+    assert quick.terms["macs"]["inner"] == "ipopt"
+
+
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [
+        ([], "terms must be a table of tables"),
+        ({"mac": {"inner": "ipopt"}}, "terms: there is no solver 'mac'; there are macs, nsga2"),
+        ({"macs": {}}, "terms of 'macs': there must be a table of transcription, evaluations, inner, start"),
+        ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'"),
+        ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be"),
+        ({"macs": {"inner": "outer"}}, "terms of 'macs': .*inner level 'outer'"),
+        ({"macs": {"start": "soft"}}, "terms of 'macs': unknown start 'soft'"),
+        ({"macs": {"start": 3}}, "terms of 'macs': start must be 'uniform', 'smooth'"),
+        ({"macs": {"start": {"spread": 2.0}}}, "spread must be in"),
+        ({"macs": {"transcription": ["dfet:2x2"]}}, "terms of 'macs': transcription must be one"),
+        ({"macs": {"transcription": "dfet:2"}}, "dfet"),
+    ],
+)
+def test_terms_that_make_no_sense_are_refused(terms, message):
+    with pytest.raises(ValueError, match=message):
+        study(terms=terms)
