@@ -76,6 +76,9 @@ class Study:
     nominal : str, optional
         Label of the problem whose front reports fly under the data of all others, which have the same variables and objectives; see
         `reporting.changed`.
+    alone : bool, default True
+        Whether reports optimise each objective alone, by gradients on the study's transcriptions, to stand beside what was found. On single
+        shooting with hundreds of nodes that takes many minutes.
     note : str
         What readers of the report should know beforehand.
 
@@ -104,6 +107,7 @@ class Study:
     paper: Sequence[Mapping[str, Any]] = ()
     goal: Mapping[str, Any] | None = None
     nominal: str | None = None
+    alone: bool = True
     note: str = ""
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
@@ -236,6 +240,7 @@ class Study:
             "paper": studyfile.plain(self.paper),
             "goal": studyfile.plain(self.goal),
             "nominal": self.nominal,
+            "alone": self.alone,
             "note": self.note,
             "cells": [cell.to_dict() for cell in self.cells],
         }
@@ -250,6 +255,8 @@ class Study:
         sampling(self.start)
         check_inner(self.inner)
         check_paper(self.paper)
+        if not isinstance(self.alone, bool):
+            raise ValueError(f"alone must be True or False, not {self.alone!r}")
         for name in ("description", "note"):
             if not isinstance(getattr(self, name), str):
                 raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")

@@ -32,6 +32,7 @@ KEYS = (
     "paper",
     "goal",
     "nominal",
+    "alone",
     "note",
 )
 """What a file may say: what `Study` takes."""

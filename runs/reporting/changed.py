@@ -1,4 +1,4 @@
-"""Changed data: what becomes of the nominal problem's front when its points are flown under other data, beside the fronts found under those.
+"""Changed data: what becomes of the nominal front when its points are flown under other data, beside the fronts found under those.
 
 Section VI B of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an extended evolutionary algorithm",
 IEEE Transactions on Cybernetics 50(4), 2020, does so for another mass and another gravity.
@@ -72,7 +72,7 @@ class Change:
         return next(iter(self.flown.values()))
 
     def shifts(self, problem: str) -> np.ndarray:
-        """How much each objective (n, m) of the nominal points is more under other data, in the user's units; of those that fly to the end."""
+        """By how much each objective (n, m) of the nominal points is more under other data, in the user's units, where both are numbers."""
         shifts = self.flown[problem].objectives - self.nominal.objectives
         return shifts[np.isfinite(shifts).all(axis=1)]
 
@@ -154,7 +154,11 @@ def changes(grounds: Sequence[Ground], nominal: str | None) -> list[Changed]:
         return []
     labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
     cells = {
-        (ground.place(solver), solver): None for ground in grounds if ground.problem == nominal for solver, runs in ground.runs.items() if runs
+        (ground.place(solver), solver): None
+        for ground in grounds
+        if ground.problem == nominal
+        for solver, runs in ground.runs.items()
+        if runs
     }
     found = [_change(grounds, *cell, labels) for cell in cells]
     return [Changed(nominal, found)] if found else []
@@ -183,8 +187,10 @@ def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:
 
 
 def changed_figure(change: Change) -> Figure:
-    """The nominal front, the same points under other data (hollow; a cross where they are not feasible any more), and the fronts found under
-    those (filled). Of more than two objectives, a panel for the first with each of the others."""
+    """The nominal front, its points under other data (hollow, or crosses where they are not feasible), and the fronts found under those.
+
+    Of more than two objectives, there is a panel for the first with each of the others.
+    """
     goals = change.nominal.goals
     m = len(goals)
     columns = min(3, m - 1)

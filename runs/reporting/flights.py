@@ -68,8 +68,8 @@ class Flights:
     note: str
 
     @classmethod
-    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
-        """Those of a ground; None where nobody found any."""
+    def of(cls, ground: Ground, reference: Reference, alone: bool = True) -> Flights | None:
+        """Those of a ground, with each objective optimised alone unless that is not wanted; None where nobody found any."""
         for solver in ground.runs:
             fronts = [front for front in ground.fronts[solver] if len(front)]
             if fronts and fronts[0][0].trajectory is not None:
@@ -78,7 +78,7 @@ class Flights:
                 source = front.source
                 named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
                 place = room(source.address) if source is not None and named else None
-                ends, note = _ends(front)
+                ends, note = _ends(front) if alone else (front[:0], "")
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(ground, reference, solver, points, many, place, laws, ends, note)
         return None
@@ -98,7 +98,9 @@ class Flights:
             rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
         for goal, end in zip(goals, self.ends, strict=False):
             rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
-        told = [f"Of {self.solver}, all runs together. Alone: one objective optimised by gradients on {self.ground.place(self.solver)}."]
+        told = [f"Of {self.solver}, all runs together."]
+        if len(self.ends):
+            told[0] += f" Alone: one objective optimised by gradients on {self.ground.place(self.solver)}."
         if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
             told.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from macs.front import Front
 from macs.storage import write_whole
@@ -98,7 +98,7 @@ def report(
     writer = _Writer(Path(out) / FOLDER)
     sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
     for ground in _told(found) if progress else found:
-        sections += _section(ground, ground.reference(store.definition.get("reference")), store.definition.get("verify"), writer, figures)
+        sections += _section(ground, store.definition, writer, figures)
     for part in (*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))):
         sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
@@ -117,11 +117,12 @@ def _told(found: Sequence[Ground]) -> Iterator[Ground]:
             yield ground
 
 
-def _section(ground: Ground, reference: Reference, verify: float | None, writer: _Writer, drawn: bool) -> list[str]:
-    """Write what there is of a ground; returns its tables as text."""
+def _section(ground: Ground, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
+    """Write what there is of a ground of a study with this definition; returns its tables as text."""
+    reference, verify = ground.reference(study.get("reference")), study.get("verify")
     told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
     tables, figures = _tables(ground, reference, verify), _figures(ground, reference) if drawn else {}
-    flights = Flights.of(ground, reference)
+    flights = Flights.of(ground, reference, study.get("alone", True))
     if flights is not None:
         tables["representatives"] = flights.table()
         figures |= flights.figures() if drawn else {}
