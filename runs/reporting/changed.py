@@ -21,7 +21,7 @@ from macs.plotting import COLORS, GREY, better
 from ..studyfile import told
 from .flight_plots import representatives
 from .ground import Ground
-from .paper import COLUMN, PAGE, legend, new_figure, style
+from .paper import COLUMN, PAGE, new_figure, style
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 
 MANY, FEW = 60, 4
 """How many points of a front are flown and drawn, and how many of them are told one by one."""
+FILLED: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0}
+HOLLOW: Mapping[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.7, "mfc": "none"}
+CROSS: Mapping[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.6}
 
 
 def check(nominal: Any, problems: Mapping[str, CompiledProblem]) -> None:
@@ -192,35 +195,41 @@ def changed_figure(change: Change) -> Figure:
     Of more than two objectives, there is a panel for the first with each of the others.
     """
     goals = change.nominal.goals
-    m = len(goals)
-    columns = min(3, m - 1)
-    rows = -(-(m - 1) // columns)
+    panels = len(goals) - 1
+    columns = min(3, panels)
+    rows = -(-panels // columns)
+    colors = dict(zip(change.flown, ("black", *COLORS * len(change.flown)), strict=False))
     with style():
-        figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.4 * rows + 0.3)
+        figure = new_figure(COLUMN if panels == 1 else PAGE, 3.1 if panels == 1 else 2.3 * rows + 0.4)
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, j in zip(grid, range(1, m), strict=False):
-            _draw(ax, change, j)
+        for ax, k in zip(grid, range(1, len(goals)), strict=False):
+            for problem, color in colors.items():
+                _draw(ax, change, problem, color, [0, k])
             ax.set_xlabel(better(goals[0]))
-            ax.set_ylabel(better(goals[j]))
-        for ax in grid[m - 1 :]:
+            ax.set_ylabel(better(goals[k]))
+        for ax in grid[panels:]:
             ax.remove()
-        if any((front.status != CONVERGED).any() for front in change.flown.values()):
-            grid[0].plot([], [], "x", color=GREY, ms=3, mew=0.6, label="not feasible")
-        legend(figure, grid[0], None)
+        _legend(figure, colors, 2 if panels == 1 else 4)
     return figure
 
 
-def _draw(ax: Any, change: Change, j: int) -> None:
-    """The first and the j-th objective."""
-    nominal, *others = change.flown
-    ax.plot(*change.nominal.objectives[:, [0, j]].T, "o", color="black", ms=2.6, mew=0, zorder=4, label=nominal)
-    for color, problem in zip(COLORS * (len(others) // len(COLORS) + 1), others, strict=False):
-        front = change.flown[problem]
-        holds = front.status == CONVERGED
-        look = {"color": color, "ls": "", "zorder": 3}
-        ax.plot(*front.objectives[holds][:, [0, j]].T, "o", ms=4, mfc="none", mew=0.7, label=f"{nominal} under {problem}", **look)
-        ax.plot(*front.objectives[~holds][:, [0, j]].T, "x", ms=3, mew=0.6, alpha=0.7, **look)
-        again = change.found.get(problem)
-        if again is not None and len(again):
-            drawn = again[representatives(again, MANY)]
-            ax.plot(*drawn.objectives[:, [0, j]].T, "s", ms=3, mec="white", mew=0.3, label=f"optimised under {problem}", **look)
+def _draw(ax: Any, change: Change, problem: str, color: str, pair: Sequence[int]) -> None:
+    """What there is of one problem, in two objectives; of the nominal one only what was found, as it flies."""
+    front = change.flown[problem]
+    holds, own = front.status == CONVERGED, front is change.nominal
+    values = front.objectives[:, pair]
+    ax.plot(*values[holds].T, ls="", color=color, zorder=4 if own else 3, **(FILLED if own else HOLLOW))
+    ax.plot(*values[~holds].T, ls="", color=color, zorder=3, **CROSS)
+    if not own and problem in change.found:
+        again = change.found[problem]
+        ax.plot(*again[representatives(again, MANY)].objectives[:, pair].T, ls="", color=color, zorder=2, **FILLED)
+
+
+def _legend(figure: Any, colors: Mapping[str, str], columns: int) -> None:
+    """Which colour is which data, and which mark is what."""
+    from matplotlib.lines import Line2D
+
+    marks = {"found under the data": FILLED, "nominal flights under the data": HOLLOW, "those not feasible": CROSS}
+    handles = [Line2D([], [], ls="", color=color, marker="s", ms=5, mew=0, label=problem) for problem, color in colors.items()]
+    handles += [Line2D([], [], ls="", color=GREY, label=name, **look) for name, look in marks.items()]
+    figure.legend(handles=handles, loc="outside upper left", ncols=columns, frameon=False, handletextpad=0.3)

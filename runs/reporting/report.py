@@ -21,9 +21,9 @@ from ..measures.statistics import summarise
 from ..standing import summary_text
 from ..steps import Steps
 from ..store import Store
-from .changed import changes
+from .changed import Changed, changes
 from .flights import Flights
-from .goal import attained
+from .goal import Attained, attained
 from .ground import Ground, Reference, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
@@ -99,7 +99,8 @@ def report(
     sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
     for ground in _told(found) if progress else found:
         sections += _section(ground, store.definition, writer, figures)
-    for part in (*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))):
+    across: list[Attained | Changed] = [*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))]
+    for part in across:
         sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(_plain(name), figure)
