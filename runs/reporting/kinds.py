@@ -56,7 +56,8 @@ class Kind:
 
 def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """GD and IGD to the points of the union of all runs, and the time of a run."""
-    found, times = samples(ground, ground.union(), curve=False), spent(ground)["time [s]"]
+    union, times = ground.union(), spent(ground)["time [s]"]
+    found = samples(ground, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
     rows: dict[str, list[Figures]] = {}
     for solver in ground.runs:
         if solver in found["GD"]:
@@ -69,6 +70,8 @@ def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figu
 
 def _against_union(ground: Ground, paper: Mapping[str, Any]) -> str:
     union = ground.union()
+    if not len(union.front):
+        return "no run found a point."
     scale = Scale.of(union.front, like=ground.known, what=union.what).describe().split(". Hypervolume")[0]
     return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
 

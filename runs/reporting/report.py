@@ -156,6 +156,7 @@ def _plain(name: str) -> str:
 def _left_out(ground: Ground) -> list[str]:
     told = [f"{solver}: {count} failed, which count as worse than any" for solver, count in ground.failures.items() if count]
     told += [f"{solver}: {count} missing, killed or unreadable, which are left out" for solver, count in ground.left_out.items() if count]
+    told += [] if any(map(len, ground.every)) else ["no run found a point that counts"]
     return ["\n".join(told)] if told else []
 
 
@@ -165,7 +166,7 @@ def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[
     if verify is not None:
         found["claims"] = claims_table(ground.verified, verify, f"{ground.name}: what was claimed, and what holds.")
     for name, against in {"indicators": reference, "indicators-union": ground.union()}.items():
-        if name != "indicators" and not reference.true:
+        if not len(against.front) or (name != "indicators" and not reference.true):
             continue
         measured = samples(ground, against)
         scale = Scale.of(against.front, like=ground.known, what=against.what).describe()
@@ -195,6 +196,8 @@ def _figures(ground: Ground, reference: Reference) -> dict[str, Figure]:
     """Name of a file -> figure."""
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = {}
+    if not len(reference.front):
+        return found
     if len(ground.known.goals) > 1:
         found["fronts"] = front_figure(ground.fronts, reference=reference.front, truth_name=name)
     # A failed run attains nothing, as an empty front does.

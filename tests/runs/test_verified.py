@@ -27,15 +27,15 @@ PAPER = [
 ]
 
 
-def braking() -> Problem:
-    """v' = u - 3 v, which one element of degree one gets wrong by some percent, which is to be at 0.6 or more at the end."""
+def braking(pace: float = 0.6) -> Problem:
+    """v' = u - 3 v, which one element gets wrong by some percent, and v is to be at `pace` or more at the end."""
     problem = Problem("braking")
     phase = problem.phase("run", t0=0.0, tf=2.0)
     x = phase.state("x", bounds=(0, 10), initial=0, unit="m")
     v = phase.state("v", bounds=(-5, 5), initial=0, unit="m/s")
     u = phase.control("u", bounds=(0, 5))
     phase.dynamics(x=v, v=u - 3.0 * v)
-    problem.constraint("pace", phase.final(v), lower=0.6, scale=1.0)
+    problem.constraint("pace", phase.final(v), lower=pace, scale=1.0)
     problem.maximize("distance", phase.final(x), unit="m")
     problem.minimize("effort", phase.integral(u**2))
     problem.default_transcription = "dfet:1x2"
@@ -147,3 +147,12 @@ def test_a_state_that_does_not_exist_is_named(folder):
     paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean"}]}
     with pytest.raises(ValueError, match="there is no state 'y'; there are x, v"):
         published_tables(grounds(Store.open(folder), {}), [paper])
+
+
+def test_where_nothing_is_found_the_report_says_so(tmp_path):
+    nothing = study(problems=braking(pace=100.0))
+    nothing.run(tmp_path / "out", executor=Inline())
+    text = str(nothing.report(tmp_path / "out"))
+    assert "no run found a point that counts" in text and "braking, dfet:1x2: what a run spent" in text
+    with (tmp_path / "out" / "report" / "published-3.csv").open() as file:
+        assert [row["best"] for row in csv.DictReader(file)] == ["3.0", "0.0", "0.0"]
