@@ -1,0 +1,176 @@
+"""Goal attainment: the formula, its history over runs, and what reports show of it."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from misbehaving import Plain, glide
+
+from macs import Front
+from problems.compiled import Objective
+from runs import Study
+from runs.cell import Cell
+from runs.cli import main
+from runs.reporting.goal import Attained, Goal, attained
+from runs.reporting.ground import Ground
+from runs.reporting.report import report
+from runs.store import Run
+
+GOALS = (Objective("cost", unit="kg"), Objective("range", unit="km", sense="maximize"))
+COST = {"objective": "cost", "best": 2.0, "worst": 10.0}
+RANGE = {"objective": "range", "best": 50.0, "worst": 0.0, "shares": [0.5, 1.0]}
+COUNTS = [10, 20, 30]
+
+
+def run(number: int, *F, transcription: str = "coarse", seconds: float = 1.0) -> Run:
+    """One whose archive was F at `COUNTS`."""
+    cell = Cell("p", transcription, "s", 30, {})
+    history = {"evaluations": COUNTS[: len(F)], "F": [list(map(list, rows)) for rows in F]}
+    return Run(
+        cell, number, 0, "finished", message="", traceback="", wall_time=seconds, history=history, flown={}, path=Path(f"{number}.nc")
+    )
+
+
+def ground(*runs: Run, failed: int = 0, transcription: str = "coarse") -> Ground:
+    front = Front(F=[], decision=[], violation=[], status=[], goals=GOALS)
+    return Ground("p", transcription, {"s": runs}, {"s": [front] * len(runs)}, {}, {"s": failed}, {"s": 0})
+
+
+RUNS = (
+    run(1, [(10, -10)], [(6, -10), (8, -30)], [(3, -50)], seconds=1.0),
+    run(2, [], [(4, -20)], [(4, -20), (2, 0)], seconds=2.0),
+    run(3, [(4, -5)], [(6, -40)], [], seconds=9.0),
+)
+"""Of costs, best so far: 10, 6, 3; nothing, 4, 2; 4, 4, 4."""
+
+
+def rows(found: Attained) -> list[dict[str, str]]:
+    (one,) = found.tables().values()
+    return list(csv.DictReader(one.csv().splitlines()))
+
+
+def test_one_at_the_best_nothing_at_the_worst():
+    goal = Goal(**COST)
+    np.testing.assert_allclose(goal.attained(np.array([10.0, 6.0, 2.0, 18.0, np.nan])), [0.0, 0.5, 1.0, -1.0, np.nan])
+    np.testing.assert_allclose(Goal(**RANGE).attained(np.array([0.0, 25.0, 50.0, 60.0])), [0.0, 0.5, 1.0, 1.2])
+
+
+def test_of_the_best_so_far_from_the_first_feasible_point_on():
+    found = [Goal(**COST).history(one, GOALS) for one in RUNS]
+    for x, _ in found:
+        np.testing.assert_array_equal(x, COUNTS)
+    np.testing.assert_allclose([y for _, y in found], [[0, 0.5, 0.875], [np.nan, 0.75, 1.0], [0.75, 0.75, 0.75]])
+    _, y = Goal(**RANGE).history(RUNS[0], GOALS)
+    np.testing.assert_allclose(y, [0.2, 0.6, 1.0])
+
+
+def test_the_table_says_what_the_median_run_attained_and_when():
+    (found,) = attained([ground(*RUNS)], COST)
+    (row,) = rows(found)
+    assert (row["transcription"], row["solver"], row["runs"]) == ("coarse", "s", "3")
+    # In the end 0.75, 0.875 and 1; quartiles are linear between them. Medians are 0, 0.75 and 0.875.
+    assert [float(row[key]) for key in ("median attained", "lower quartile", "upper quartile")] == [0.875, 0.8125, 0.9375]
+    assert (row["evaluations to 0.9"], row["evaluations to 0.95"], row["time of a run [s]"]) == ("", "", "2.0")
+    (found,) = attained([ground(*RUNS)], COST | {"shares": [0.0001, 0.75, 0.8]})
+    (row,) = rows(found)
+    assert [row[f"evaluations to {share}"] for share in ("0.0001", "0.75", "0.8")] == ["20", "20", "30"]
+
+
+def test_failed_runs_attain_nothing():
+    (found,) = attained([ground(*RUNS, failed=3)], COST)
+    (row,) = rows(found)
+    assert row["runs"] == "6" and row["median attained"] == "" and row["upper quartile"] != "" and row["lower quartile"] == ""
+    (found,) = attained([ground(*RUNS, failed=2)], COST)
+    assert float(rows(found)[0]["median attained"]) == 0.75
+    beside = Ground("p", "coarse", {"t": (), "s": RUNS}, {"t": [], "s": ground(*RUNS).every}, {}, {"t": 2}, {})
+    (found,) = attained([beside], COST)
+    assert [(row["runs"], row["median attained"], row["time of a run [s]"]) for row in rows(found)] == [
+        ("2", "", ""),
+        ("3", "0.875", "2.0"),
+    ]
+
+
+def test_a_line_for_each_transcription_from_where_the_median_run_has_something():
+    late = [run(k, [], [(6, 0)], [(4, 0)], transcription="fine") for k in (1, 2, 3)]
+    (found,) = attained([ground(*RUNS), ground(*late, transcription="fine")], COST)
+    ((name, figure),) = found.figures().items()
+    (ax,) = figure.axes
+    assert name == "p-goal-attainment" and ax.get_xlabel() == "evaluations" and "goal attainment of cost" in ax.get_ylabel()
+    lines = {line.get_label(): line.get_xydata() for line in ax.lines}
+    assert set(lines) == {"coarse, 3 runs", "fine, 3 runs"}
+    np.testing.assert_allclose(lines["coarse, 3 runs"], [[10, 0], [20, 0.75], [30, 0.875], [30, 0.875]])
+    np.testing.assert_allclose(lines["fine, 3 runs"], [[10, np.nan], [20, 0.5], [30, 0.75], [30, 0.75]])
+
+
+def test_each_problem_for_itself_and_nothing_without_a_goal():
+    other = Ground("q", "coarse", {"s": RUNS[:1]}, {"s": [ground(*RUNS).known]}, {}, {}, {"s": 0})
+    found = attained([ground(*RUNS), other], COST)
+    assert [one.problem for one in found] == ["p", "q"]
+    assert attained([ground(*RUNS)], None) == []
+    assert attained([ground(run(1))], COST) == []
+
+
+GLIDERS = """
+problems = {slow = {problem = "glide.py:glide", speed = 2.0}, fast = {problem = "glide.py:glide", speed = 4.0}}
+transcriptions = ["dfet:2x2", "dfet:1x2"]
+evaluations = 60
+runs = 2
+seed = 1
+note = "Gliders are slow."
+
+[solvers.plain]
+solver = "macs"
+refine = false
+
+[goal]
+objective = "distance"
+best = 20.0
+worst = 0.0
+shares = [0.25, 1.0]
+"""
+
+
+def test_reports_show_it_of_every_problem(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "glide.py").write_text((Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "gliders.toml").write_text(GLIDERS, encoding="utf-8")
+    assert main(["study", "run", "gliders.toml", "--out", "out"]) == 0
+    said = str(report("out"))
+    assert "Gliders are slow." in said and "slow: goal attainment of distance." in said
+    for problem, most in (("slow", 0.5), ("fast", 1.0)):
+        folder = tmp_path / "out" / "report"
+        assert (folder / f"{problem}-goal-attainment.png").read_bytes().startswith(b"\x89PNG")
+        assert (folder / f"{problem}-goal-attainment.pdf").read_bytes().startswith(b"%PDF")
+        with (folder / f"{problem}-goal-attainment.csv").open() as file:
+            table = list(csv.DictReader(file))
+        assert [row["transcription"] for row in table] == ["dfet:2x2", "dfet:1x2"]
+        # No glider gets farther than its speed times five seconds.
+        assert all(0 < float(row["median attained"]) <= most + 1e-6 and row["evaluations to 0.25"] for row in table)
+    assert main(["study", "report", "out", "--no-figures"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ("distance", "goal must be a table with objective, best, worst, shares, not 'distance'"),
+        ({"objective": "distance", "best": 1.0}, "goal: worst is missing"),
+        ({**RANGE, "objective": "distanse"}, "goal: problem 'glide': unknown objective 'distanse', did you mean distance?"),
+        ({**RANGE, "objective": ["distance"]}, "goal: objective must be the name of an objective"),
+        ({**RANGE, "objective": "distance", "best": 0.0}, "best and worst of 'distance' are both 0"),
+        ({**RANGE, "objective": "distance", "best": float("nan")}, "goal: best must be a finite number, not nan"),
+        ({**RANGE, "objective": "distance", "worst": True}, "goal: worst must be a finite number, not True"),
+        ({**RANGE, "objective": "distance", "worst": "1"}, "goal: worst must be a finite number, not '1'"),
+        ({**RANGE, "objective": "distance", "best": -5.0}, "'distance' is to maximize, so best must be more than worst, not -5 beside 0"),
+        ({**RANGE, "objective": "time"}, "'time' is to minimize, so best must be less than worst"),
+        ({**RANGE, "objective": "distance", "shares": [0.5, 1.5]}, "goal: shares must be a list of numbers above 0 and at most 1"),
+        ({**RANGE, "objective": "distance", "shares": 0.5}, "goal: shares must be a list"),
+        ({**RANGE, "objective": "distance", "share": [0.5]}, "goal: unknown key 'share', did you mean shares?"),
+    ],
+)
+def test_wrong_goals_are_one_line_when_the_study_is_made(goal, words):
+    with pytest.raises(ValueError) as error:
+        Study("gliders", problems=glide(), solvers=Plain(), evaluations=60, runs=1, seed=1, goal=goal)
+    assert words in str(error.value) and "\n" not in str(error.value)
