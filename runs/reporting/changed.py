@@ -16,7 +16,7 @@ from macs.evaluation import CONVERGED
 from macs.flown import check_alike
 from macs.front import Front
 from macs.inputs import unknown
-from macs.plotting import COLORS, GREY, better
+from macs.plotting import COLORS, better
 
 from ..studyfile import told
 from .flight_plots import representatives
@@ -31,9 +31,10 @@ if TYPE_CHECKING:
 
 MANY, FEW = 60, 4
 """How many points of a front are flown and drawn, and how many of them are told one by one."""
-FILLED: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0}
-HOLLOW: Mapping[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.7, "mfc": "none"}
-CROSS: Mapping[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.6}
+NOMINAL: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": "black", "zorder": 3}
+FLOWN: Mapping[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.7, "mfc": "none", "color": COLORS[0], "zorder": 4}
+INFEASIBLE: Mapping[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.6, "color": COLORS[0], "zorder": 4}
+FOUND: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": COLORS[1], "zorder": 2}
 
 
 def check(nominal: Any, problems: Mapping[str, CompiledProblem]) -> None:
@@ -190,46 +191,43 @@ def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:
 
 
 def changed_figure(change: Change) -> Figure:
-    """The nominal front, its points under other data (hollow, or crosses where they are not feasible), and the fronts found under those.
+    """For each of the other data: the nominal front, its flights under the data, and the front found under them, all as they fly there.
 
-    Of more than two objectives, there is a panel for the first with each of the others.
+    Of two objectives, a panel for each data; of more, a row of panels of the first objective with each of the others.
     """
     goals = change.nominal.goals
-    panels = len(goals) - 1
-    columns = min(3, panels)
-    rows = -(-panels // columns)
-    colors = dict(zip(change.flown, ("black", *COLORS * len(change.flown)), strict=False))
+    pairs = [(0, k) for k in range(1, len(goals))]
+    places = [(problem, pair) for problem in [*change.flown][1:] for pair in pairs]
+    columns = len(pairs) if 1 < len(pairs) <= 4 else min(3, len(places))
+    rows = -(-len(places) // columns)
     with style():
-        figure = new_figure(COLUMN if panels == 1 else PAGE, 3.1 if panels == 1 else 2.3 * rows + 0.4)
-        grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, k in zip(grid, range(1, len(goals)), strict=False):
-            for problem, color in colors.items():
-                _draw(ax, change, problem, color, [0, k])
-            ax.set_xlabel(better(goals[0]))
-            ax.set_ylabel(better(goals[k]))
-        for ax in grid[panels:]:
+        figure = new_figure(COLUMN if columns == 1 else PAGE, (2.4 if len(pairs) == 1 else 2.1) * rows + 0.4)
+        shared = "all" if len(pairs) == 1 else "col" if columns == len(pairs) else "none"
+        grid = figure.subplots(rows, columns, squeeze=False, sharex="all", sharey=shared).ravel()
+        for place, (ax, (problem, (i, k))) in enumerate(zip(grid, places, strict=False)):
+            _draw(ax, change, problem, [i, k])
+            ax.set_title(problem, loc="left")
+            if place + columns >= len(places):
+                ax.set_xlabel(better(goals[i]))
+                ax.tick_params(labelbottom=True)
+            if place % columns == 0 or shared != "all":
+                ax.set_ylabel(better(goals[k]))
+        for ax in grid[len(places) :]:
             ax.remove()
-        _legend(figure, colors, 2 if panels == 1 else 4)
+        handles, names = grid[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper left", ncols=2 if columns == 1 else 4, frameon=False, handletextpad=0.3)
     return figure
 
 
-def _draw(ax: Any, change: Change, problem: str, color: str, pair: Sequence[int]) -> None:
-    """What there is of one problem, in two objectives; of the nominal one only what was found, as it flies."""
-    front = change.flown[problem]
-    holds, own = front.status == CONVERGED, front is change.nominal
-    values = front.objectives[:, pair]
-    ax.plot(*values[holds].T, ls="", color=color, zorder=4 if own else 3, **(FILLED if own else HOLLOW))
-    ax.plot(*values[~holds].T, ls="", color=color, zorder=3, **CROSS)
-    if not own and problem in change.found:
-        again = change.found[problem]
-        ax.plot(*again[representatives(again, MANY)].objectives[:, pair].T, ls="", color=color, zorder=2, **FILLED)
-
-
-def _legend(figure: Any, colors: Mapping[str, str], columns: int) -> None:
-    """Which colour is which data, and which mark is what."""
-    from matplotlib.lines import Line2D
-
-    marks = {"found under the data": FILLED, "nominal flights under the data": HOLLOW, "those not feasible": CROSS}
-    handles = [Line2D([], [], ls="", color=color, marker="s", ms=5, mew=0, label=problem) for problem, color in colors.items()]
-    handles += [Line2D([], [], ls="", color=GREY, label=name, **look) for name, look in marks.items()]
-    figure.legend(handles=handles, loc="outside upper left", ncols=columns, frameon=False, handletextpad=0.3)
+def _draw(ax: Any, change: Change, problem: str, pair: Sequence[int]) -> None:
+    """What there is of one problem, in two objectives."""
+    nominal, front = change.nominal, change.flown[problem]
+    holds = front.status == CONVERGED
+    again = change.found.get(problem, nominal[:0])
+    for name, points, look in (
+        ("nominal front", nominal[nominal.status == CONVERGED], NOMINAL),
+        ("its flights under these data", front[holds], FLOWN),
+        ("those not feasible", front[~holds], INFEASIBLE),
+        ("found under these data", again[representatives(again, MANY)], FOUND),
+    ):
+        ax.plot(*points.objectives[:, pair].T, ls="", label=name, **look)
