@@ -76,8 +76,10 @@ class Study:
     nominal : str, optional
         Label of the problem whose front reports fly under the data of all others, which have the same variables and objectives; see
         `reporting.changed`.
+    flights : bool, default True
+        Whether reports show the flights that stand for each front.
     alone : bool, default True
-        Whether reports optimise each objective alone, by gradients on the study's transcriptions, to stand beside what was found. On single
+        Whether each objective is optimised alone, too, by gradients on the study's transcriptions, to stand beside these flights. On single
         shooting with hundreds of nodes that takes many minutes.
     note : str
         What readers of the report should know beforehand.
@@ -107,6 +109,7 @@ class Study:
     paper: Sequence[Mapping[str, Any]] = ()
     goal: Mapping[str, Any] | None = None
     nominal: str | None = None
+    flights: bool = True
     alone: bool = True
     note: str = ""
     cells: tuple[Cell, ...] = field(init=False, repr=False)
@@ -240,6 +243,7 @@ class Study:
             "paper": studyfile.plain(self.paper),
             "goal": studyfile.plain(self.goal),
             "nominal": self.nominal,
+            "flights": self.flights,
             "alone": self.alone,
             "note": self.note,
             "cells": [cell.to_dict() for cell in self.cells],
@@ -255,8 +259,9 @@ class Study:
         sampling(self.start)
         check_inner(self.inner)
         check_paper(self.paper)
-        if not isinstance(self.alone, bool):
-            raise ValueError(f"alone must be True or False, not {self.alone!r}")
+        for name in ("flights", "alone"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"{name} must be True or False, not {getattr(self, name)!r}")
         for name in ("description", "note"):
             if not isinstance(getattr(self, name), str):
                 raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")

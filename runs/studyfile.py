@@ -32,6 +32,7 @@ KEYS = (
     "paper",
     "goal",
     "nominal",
+    "flights",
     "alone",
     "note",
 )
