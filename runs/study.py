@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .reporting.report import Report
 from .making.work import Payload
 
-QUICK_RUNS, QUICK_EVALUATIONS = 2, 500
+QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,17 +214,22 @@ class Study:
         return sampling(self.terms.get(cell.solver, {}).get("start", self.start))
 
     def quick(self) -> Study:
-        """The same with at most 2 runs of at most 500 evaluations: to see that it works, within a minute. Its name ends in -quick."""
-        budgets = {
-            cell.problem: min(cell.evaluations, QUICK_EVALUATIONS)
-            for cell in self.cells
-            if "evaluations" not in self.terms.get(cell.solver, {})
-        }
+        """The same, to see that it works, within a minute: two runs, or one where there are many cells, of at most 500 evaluations.
+
+        Budgets of solvers on terms of their own shrink as the largest does. Its name ends in -quick.
+        """
+        share = min(1.0, QUICK_EVALUATIONS / max(cell.evaluations for cell in self.cells))
         own = {
-            label: {**terms, "evaluations": min(terms["evaluations"], QUICK_EVALUATIONS)} if "evaluations" in terms else terms
+            label: {**terms, "evaluations": min(terms["evaluations"], max(QUICK_LEAST, int(share * terms["evaluations"])))}
+            if "evaluations" in terms
+            else terms
             for label, terms in self.terms.items()
         }
-        return replace(self, name=f"{self.name}-quick", runs=min(self.runs, QUICK_RUNS), evaluations=budgets or None, terms=own)
+        budgets = {
+            cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})
+        }
+        runs = min(self.runs, QUICK_RUNS if len(self.cells) <= MANY_CELLS else 1)
+        return replace(self, name=f"{self.name}-quick", runs=runs, evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:
         """All that decides the numbers, and what reports print, as plain data."""

@@ -58,8 +58,10 @@ def test_all_may_work_apart(tmp_path):
 
 def test_quick_studies_keep_the_terms():
     quick = study(terms={"macs": {**APART["macs"], "evaluations": 9000}}, evaluations=60_000).quick()
-    assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 500, "nsga2": 500}
-    assert quick.terms["macs"]["inner"] == "ipopt"
+    assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 75, "nsga2": 500}
+    assert quick.terms["macs"]["inner"] == "ipopt" and quick.runs == 2
+    assert {cell.labels[2]: cell.evaluations for cell in study(evaluations=60_000).quick().cells} == {"macs": 40, "nsga2": 500}
+    assert study(transcriptions=[f"shooting:{n}" for n in range(3, 12)]).quick().runs == 1
 
 
 @pytest.mark.parametrize(
