@@ -120,7 +120,7 @@ evaluations = 60
 runs = 2
 seed = 1
 note = "Gliders are slow."
-alone = false
+flights = false
 
 [solvers.plain]
 solver = "macs"
@@ -140,7 +140,7 @@ def test_reports_show_it(tmp_path, monkeypatch):
     (tmp_path / "gliders.toml").write_text(GLIDERS, encoding="utf-8")
     assert main(["study", "run", "gliders.toml", "--out", "out"]) == 0
     said = str(report("out"))
-    assert "Gliders are slow." in said and "slow: goal attainment of distance." in said
+    assert "Gliders are slow." in said and "slow: goal attainment of distance." in said and "stand for the front" not in said
     stem = tmp_path / "out" / "report" / "slow-goal-attainment"
     assert stem.with_suffix(".png").read_bytes().startswith(b"\x89PNG") and stem.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     with stem.with_suffix(".csv").open() as file:
@@ -171,3 +171,11 @@ def test_wrong_goals_are_one_line_when_the_study_is_made(goal, words):
     with pytest.raises(ValueError) as error:
         Study("gliders", problems=glide(), solvers=Plain(), evaluations=60, runs=1, seed=1, goal=goal)
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"), [("flights", "no", "True or False"), ("alone", 1, "True or False"), ("note", 3, "a line")]
+)
+def test_what_reports_hold_is_said_rightly(key, value, words):
+    with pytest.raises(ValueError, match=f"{key} must be {words}"):
+        Study("gliders", problems=glide(), solvers=Plain(), evaluations=60, runs=1, seed=1, **{key: value})

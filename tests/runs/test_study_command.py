@@ -9,11 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from problems.reentry import case1
+from problems.reentry.vehicle import MASS
 from runs import Study, studyfile
 from runs.cli import main
 from runs.making.watching import Watch
 from runs.making.work import Outcome
 from runs.store import Store
+from transcription import SingleShooting, parse
 
 GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")
 TOML = """
@@ -135,6 +138,32 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     quick = Study.load("orbit-table3").quick()
     assert quick.name == "orbit-table3-quick" and quick.runs == 2 and quick.cells[0].evaluations == 500
     assert set(studyfile.names()) >= {"goddard-table3", "orbit-table3", "orbit-full-table3"}
+
+
+def test_studies_of_the_parameters_of_the_reentry(capsys):
+    assert main(["list"]) == 0
+    said = capsys.readouterr().out
+    studies = {name: Study.load(f"reentry-{name}") for name in ("nodes", "discretisations", "uncertainty")}
+    for name, study in studies.items():
+        assert f"reentry-{name}" in said and (study.inner, study.start, study.verify) == ("march", "smooth", 0.01)
+        assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)}
+        assert Study.load(f"reentry-{name}").quick().cells[0].evaluations <= 500
+    assert [cell.transcription for cell in studies["nodes"].cells] == [f"shooting:{nodes}" for nodes in (100, 150, 200, 250)]
+    loads = case1.reference()[:, 1]
+    for name in ("nodes", "discretisations"):
+        goal = studies[name].goal
+        assert goal["objective"] == "heat load" and [goal["best"], goal["worst"]] == pytest.approx([loads.min(), loads.max()], abs=1e-3)
+    # As many values of each control on all transcriptions of a node count.
+    for cell in studies["discretisations"].cells:
+        method = parse(cell.transcription)
+        values = method.nodes if isinstance(method, SingleShooting) else method.elements * (method.order + 1)
+        assert cell.problem == f"{values} nodes"
+    uncertain = studies["uncertainty"]
+    assert uncertain.nominal == uncertain.cells[0].problem == "nominal"
+    data = [cell.details["problem"]["data"] for cell in uncertain.cells]
+    assert [one.get("mass", MASS) / MASS for one in data] == pytest.approx([1.0, 1.05, 1.1, 1.0])
+    assert [one.get("gravity") for one in data] == [None, None, None, "constant"]
+    assert all(figure in uncertain.note for figure in ("32.05", "118.37", "32.13", "121.61"))
 
 
 def test_problems_transcriptions_and_budgets_may_be_given_each_by_name(here):
