@@ -105,7 +105,7 @@ class Changed:
     def _shifts(self) -> Table:
         heads: list[Column | str] = [*_WHOSE, "data", "points", "feasible"]
         for goal in self._goals:
-            heads += [Column(f"{goal.name}: mean shift", goal.unit), Column("largest", goal.unit)]
+            heads += [Column(f"{goal.name}: mean shift", goal.unit), Column(f"{goal.name}: largest", goal.unit)]
         rows: list[list[Cell]] = []
         for one in self.changes:
             for problem, front in one.flown.items():

@@ -157,7 +157,7 @@ def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None) -> list
     """The goal that a study gives on each of its problems; nothing if it gives none."""
     if given is None:
         return []
-    goal = Goal(**given)
+    goal = Goal.of(given, {})
     found = []
     for problem in dict.fromkeys(ground.problem for ground in grounds):
         here = [ground for ground in grounds if ground.problem == problem]
