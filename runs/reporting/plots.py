@@ -129,6 +129,7 @@ def convergence_figure(
     ylabel: str,
     larger: bool = False,
     log: bool = True,
+    inside: bool = True,
 ) -> Figure:
     """An indicator over what a run spends: the median of each solver's runs as a line, their quartiles as a band.
 
@@ -144,6 +145,8 @@ def convergence_figure(
         Whether larger values are better.
     log : bool
         Whether the indicator's axis is logarithmic; values that are not positive are then not drawn.
+    inside : bool
+        Whether the legend of a few solvers is within the axes, in the corner that an indicator leaves free as it converges.
     """
     with style():
         figure = new_figure(COLUMN, 2.5)
@@ -179,7 +182,8 @@ def convergence_figure(
         ax.set_xlim(0, last)
         ax.set_xlabel(xlabel)
         ax.set_ylabel(ylabel)
-        legend(figure, ax, "lower right" if larger else "upper right", "median, quartiles")
+        corner = "lower right" if larger else "upper right"
+        legend(figure, ax, corner if inside else None, "median, quartiles")
     return figure
 
 
