@@ -32,7 +32,7 @@ from .studyfile import same
 MISSING, UNREADABLE = "missing", "unreadable"
 FORMAT = "macs study"
 VERSION = 1
-FREE = ("description", "runs", "time_limit", "reference", "paper", "goal", "nominal", "flights", "alone", "note", "cells")
+FREE = ("description", "runs", "time_limit", "reference", "paper", "goal", "nominal", "flights", "note", "cells")
 """What may differ between two calls, or is compared on its own; everything else decides the numbers."""
 
 

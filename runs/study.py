@@ -78,9 +78,6 @@ class Study:
         `reporting.changed`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
-    alone : bool, default True
-        Whether each objective is optimised alone, too, by gradients on the study's transcriptions, to stand beside these flights. On single
-        shooting with hundreds of nodes that takes many minutes.
     note : str
         What readers of the report should know beforehand.
 
@@ -110,7 +107,6 @@ class Study:
     goal: Mapping[str, Any] | None = None
     nominal: str | None = None
     flights: bool = True
-    alone: bool = True
     note: str = ""
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
@@ -249,7 +245,6 @@ class Study:
             "goal": studyfile.plain(self.goal),
             "nominal": self.nominal,
             "flights": self.flights,
-            "alone": self.alone,
             "note": self.note,
             "cells": [cell.to_dict() for cell in self.cells],
         }
@@ -264,9 +259,8 @@ class Study:
         sampling(self.start)
         check_inner(self.inner)
         check_paper(self.paper)
-        for name in ("flights", "alone"):
-            if not isinstance(getattr(self, name), bool):
-                raise ValueError(f"{name} must be True or False, not {getattr(self, name)!r}")
+        if not isinstance(self.flights, bool):
+            raise ValueError(f"flights must be True or False, not {self.flights!r}")
         for name in ("description", "note"):
             if not isinstance(getattr(self, name), str):
                 raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")

@@ -33,7 +33,6 @@ KEYS = (
     "goal",
     "nominal",
     "flights",
-    "alone",
     "note",
 )
 """What a file may say: what `Study` takes."""

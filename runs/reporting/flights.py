@@ -15,7 +15,8 @@ from macs.front import Front
 from macs.gradient import payoff
 from macs.plotting import label
 from macs.point import Point
-from transcription import from_dict
+from problems import load
+from transcription import SingleShooting, from_dict, parse, word
 
 from ..measures.indicators import pieces, truth
 from ..measures.references import room
@@ -52,7 +53,7 @@ class Flights:
         Where the problem comes from, see `references.room`.
     laws : name -> as many flights, None where there is none
     ends : Front
-        The best of each objective alone, by gradients on the same transcription; empty where there is none.
+        The best of each objective alone, by gradients, on the same transcription where that is made for them; empty where there is none.
     note : str
         Why there are no ends; mostly nothing.
     """
@@ -68,8 +69,8 @@ class Flights:
     note: str
 
     @classmethod
-    def of(cls, ground: Ground, reference: Reference, alone: bool = True) -> Flights | None:
-        """Those of a ground, with each objective optimised alone unless that is not wanted; None where nobody found any."""
+    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
+        """Those of a ground; None where nobody found any."""
         for solver in ground.runs:
             fronts = [front for front in ground.fronts[solver] if len(front)]
             if fronts and fronts[0][0].trajectory is not None:
@@ -78,7 +79,7 @@ class Flights:
                 source = front.source
                 named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
                 place = room(source.address) if source is not None and named else None
-                ends, note = _ends(front) if alone else (front[:0], "")
+                ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(ground, reference, solver, points, many, place, laws, ends, note)
         return None
@@ -100,7 +101,7 @@ class Flights:
             rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
         told = [f"Of {self.solver}, all runs together."]
         if len(self.ends):
-            told[0] += f" Alone: one objective optimised by gradients on {self.ground.place(self.solver)}."
+            told[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
         if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
             told.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."
@@ -179,12 +180,18 @@ def flown(point: Point) -> dict[str, np.ndarray]:
 
 
 def _ends(front: Front) -> tuple[Front, str]:
-    """Each objective optimised alone, on the transcription of a front; or why not."""
+    """Each objective optimised alone, on the transcription of a front or, if that is single shooting, on the case's own; or why not."""
     try:
-        problem = front.compiled()
+        problem, method = front.compiled(), from_dict(front[0].transcription or {})
+        if isinstance(method, SingleShooting):
+            # Its derivatives are dense: with hundreds of nodes they take minutes, and lead nowhere where flights are unstable.
+            source = front.source
+            if source is None or not source.address:
+                return front[:0], "Objectives were not optimised alone: single shooting is not made for gradients."
+            method = parse(load(source.address, **source.data).default_transcription)
     except ValueError as error:
         return front[:0], f"Objectives were not optimised alone: {error}."
-    found = payoff(problem, from_dict(front[0].transcription or {}))
+    found = payoff(problem, method)
     failed = [goal.name for goal, status in zip(front.goals, found.status, strict=True) if status != CONVERGED]
     return found, f"Alone, {', '.join(failed)} did not converge." if failed else ""
 

@@ -123,7 +123,7 @@ def _section(ground: Ground, study: Mapping[str, Any], writer: _Writer, drawn: b
     reference, verify = ground.reference(study.get("reference")), study.get("verify")
     told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
     tables, figures = _tables(ground, reference, verify), _figures(ground, reference) if drawn else {}
-    flights = Flights.of(ground, reference, study.get("alone", True)) if study.get("flights", True) else None
+    flights = Flights.of(ground, reference) if study.get("flights", True) else None
     if flights is not None:
         tables["representatives"] = flights.table()
         figures |= flights.figures() if drawn else {}

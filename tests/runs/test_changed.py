@@ -44,7 +44,6 @@ runs = 2
 seed = 1
 inner = "march"
 nominal = "light"
-alone = false
 
 [problems]
 heavy = {problem = "cart.py:cart", mass = 4.0}
@@ -158,8 +157,7 @@ def test_the_report_has_all_of_it(folder):
     assert "The front of light under changed data." in said and "Points of the front of light" in said
     names = {path.name for path in (folder / "report").iterdir()}
     assert {f"changed-data{part}.{suffix}" for part in ("", "-points", "-best") for suffix in ("txt", "csv", "tex")} <= names
-    # The study says that nothing is to be optimised alone.
-    assert "solutions that stand for the front" in said and "alone" not in said.lower()
+    assert "solutions that stand for the front" in said
 
 
 def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_path):
