@@ -5,8 +5,9 @@
 Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
 commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
 are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
-1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. Flights of the first case that are
-feasible in a harder one are optimal there too, and are taken over: then all places lie in that corner.
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. The first solves begin at the guess; in
+a harder case, at those flights of the first one that are feasible there too. These are optimal there as well, and are taken over, and they
+pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere.
 """
 
 from __future__ import annotations
