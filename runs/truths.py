@@ -7,7 +7,8 @@ commands that are linear on each element, with limits a little narrower than the
 are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
 1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. The first solves begin at the guess; in
 a harder case, at those flights of the first one that are feasible there too. These are optimal there as well, and are taken over, and they
-pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere.
+pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere. The first case takes over in turn what its own
+flights do not dominate of the other tables, all of which is feasible in it.
 """
 
 from __future__ import annotations
@@ -208,7 +209,7 @@ def made(case: str, points: int) -> np.ndarray:
         with Steps(f"{case}, to begin with", 4) as steps:
             truth.begin(steps)
     else:
-        easier = easiest()
+        easier = table(EASIEST)
         with Steps(f"{case}, flights of {EASIEST}", len(easier)) as steps:
             truth.inherit(steps, easier)
     windows = [np.full(4, np.inf), CORNER]
@@ -216,20 +217,24 @@ def made(case: str, points: int) -> np.ndarray:
         for window in windows:
             truth.fill(steps, points // len(windows), window)
     with Steps(f"{case}, flown", len(truth.found)) as steps:
-        return united(truth.rows(steps))
+        rows = truth.rows(steps)
+    if case == EASIEST:
+        for harder in CASES:
+            rows += list(table(harder)) if harder != EASIEST else []
+    return united(rows)
 
 
-def easiest() -> np.ndarray:
-    """The table of the easiest case (k, 4 + n)."""
-    with files("problems.reentry").joinpath(f"{EASIEST.removeprefix('reentry_')}.csv").open() as file:
+def table(case: str) -> np.ndarray:
+    """What is known of a case (k, 4 + n)."""
+    with files("problems.reentry").joinpath(f"{case.removeprefix('reentry_')}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
 def united(rows: list[np.ndarray]) -> np.ndarray:
     """The rows that none dominates, by their cross-range."""
-    table = np.array(rows)
-    table = table[nondominated(table[:, :4] * SIGNS)]
-    return table[np.argsort(-table[:, 0])]
+    front = np.unique(np.array(rows), axis=0)
+    front = front[nondominated(front[:, :4] * SIGNS)]
+    return front[np.argsort(-front[:, 0])]
 
 
 def text(case: str, rows: np.ndarray) -> str:
