@@ -44,7 +44,7 @@ def flown(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     count, elements = commands.shape[:2]
     h, y = 2000.0 / elements / STEPS, np.zeros((10, count))
     y[:8] = np.array(START)[:, None]
-    worst, states = np.zeros((3, count)), []
+    worst, states = by_hand(y[:8], commands[:, 0, 0].T)[1], []
 
     def rates(y: np.ndarray, law: np.ndarray) -> np.ndarray:
         found, (heating, *_) = by_hand(y[:8], law)
@@ -98,7 +98,7 @@ def test_zones_cost_and_narrow_limits_too():
 
 
 def test_references_reach_the_corner_in_which_hypervolume_is_measured():
-    """By how much, and in which order: narrower limits take less away than zones do."""
+    """And in this order: narrower limits take less away than zones do."""
     volumes = {case: hypervolume(table(case)[:, :4] * SIGNS, ref=[-28.5, 150.0, 1.5, 200.0]) for case in LIMITS}
     assert volumes["case1"] > volumes["case2"] > volumes["case3"] > 20000
 
@@ -130,12 +130,12 @@ def test_there_is_no_way_north_of_a_zone(passed, least):
     apart = degrees(1.0) * entry["longitude"] - zone.longitude, degrees(1.0) * entry["latitude"] - (zone.latitude - south)
     entry.path("distance from the zone", ca.hypot(*apart), lower=zone.radius / wider, scale=zone.radius)
     problem.minimize("south", south)
-    nlp = DFET(30, 2, control_order=1, basis="bernstein").transcribe(problem)
+    nlp = DFET(60, 2, control_order=1, basis="bernstein").transcribe(problem)
     found = []
-    for row in table("case3")[::15]:
+    for row in table("case3")[::30]:
         laws, candidate = np.radians(row[4:]).reshape(-1, 2), np.full(len(nlp.free), 40.0)
         for profile, law in zip(nlp.profiles, laws.T, strict=True):
-            candidate[profile.columns] = np.interp(profile.places, np.linspace(0.0, 1.0, len(law)), law)
+            candidate[profile.columns] = law
         start = nlp.march(nlp.first_guess(candidate[None]))[0]
         only = np.append(np.full(4, np.inf), 0.0)
         solved = scalarize(nlp, start, reference=only, weights=np.eye(5)[4], max_iterations=200)
