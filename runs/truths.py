@@ -5,8 +5,10 @@
 Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
 commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
 are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
-1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. Flights of the first case that are
-feasible in a harder one are optimal there too, and are taken over: then all places lie in that corner.
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. The first solves begin at the guess; in
+a harder case, at those flights of the first one that are feasible there too. These are optimal there as well, and are taken over, and they
+pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere. The first case takes over in turn what its own
+flights do not dominate of the other tables, all of which is feasible in it.
 """
 
 from __future__ import annotations
@@ -27,8 +29,8 @@ from macs.storage import write_whole
 from problems import load
 from problems.reentry import case1, case2, statement
 from problems.reentry.case3 import ZONES
-from problems.reentry.statement import FOOT, Limits, Zone
-from transcription import DFET, NLP
+from problems.reentry.statement import FOOT, Limits
+from transcription import DFET
 from transcription.scalarized import Solved
 from transcription.simulate import Simulation, simulate
 from transcription.trajectory import Trajectory
@@ -52,10 +54,6 @@ DIGITS = 2
 DIVISIONS, BEYOND = 12, 1.3
 """Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
 RTOL = 1e-8
-SIDE_STARTS = ((-1, 1, 1), (1, 1, 1))
-"""Of the zones, which the flights to begin with pass: south (-1) or north (1) of each."""
-SIDES = 2
-"""From how many ways past the zones a place is gone down from."""
 
 
 class Truth:
@@ -71,12 +69,11 @@ class Truth:
             [replace(zone, radius=zone.radius / NARROWER**0.5) for zone in zones],
             **{name: NEARER * value for name, value in tolerances.items()},
         )
-        self.case, self.zones = load(case).compile(), zones
+        self.case = load(case).compile()
         self.nlp = METHOD.transcribe(strict)
         self.template = self.nlp.unpack(self.nlp.first_guess(self.nlp.guess[None])[0])
         self.descents = Descents(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
         self.found: list[Solved] = []
-        self.ways: list[tuple[int, ...]] = []
         # The tolerance of each state at the end, where it has one.
         self._open = dict(zip(statement.END, tolerances.values(), strict=True))
 
@@ -85,25 +82,25 @@ class Truth:
         solved = self.descents.from_vector(start, reference, weights, ceiling)
         if solved.status == CONVERGED:
             self.found.append(solved)
-            self.ways.append(way(self.nlp.unpack(solved.z), self.zones))
         return solved
 
-    def begin(self, steps: Steps, rows: np.ndarray) -> None:
-        """The best of each objective from the guess; in a harder case, down from flights of the easiest one (k, 4 + n) instead."""
-        if not len(rows):
-            start = self.nlp.first_guess(self.nlp.guess[None])[0]
-            for i in range(4):
-                steps.begin(f"objective {i + 1}")
-                self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
-            return
-        F = rows[:, :4] * SIGNS
-        inside = np.flatnonzero((F - CORNER < 0).all(axis=1))
-        for k in dict.fromkeys(inside[np.argmin(F[inside], axis=0)].tolist()):
-            steps.begin(f"from {np.round(F[k], 2).tolist()}")
-            flown = simulate(self.case, with_commands(self.template, rows[k, 4:]), rtol=RTOL, atol=RTOL)
-            z = self.nlp.interpolate(flown.trajectory)
-            for sides in SIDE_STARTS if self.zones else [()]:
-                self.solve(around(self.nlp, z, self.zones, sides), F[k], np.ptp(F, axis=0), np.full(4, np.inf))
+    def begin(self, steps: Steps) -> None:
+        """The best of each objective, from the guess."""
+        start = self.nlp.first_guess(self.nlp.guess[None])[0]
+        for i in range(4):
+            steps.begin(f"objective {i + 1}")
+            self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
+
+    def inherit(self, steps: Steps, rows: np.ndarray) -> None:
+        """Take over the flights of an easier case (k, 4 + n) that are feasible in this one, and so optimal, and good to start from."""
+        for row in rows:
+            steps.begin(f"cross-range {row[0]:.2f}")
+            if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
+                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
+                if self.feasible(flown):
+                    z = self.nlp.interpolate(flown.trajectory)
+                    self.found.append(Solved(z, row[:4] * SIGNS, float(self.nlp.evaluate(z[None])[1][0]), CONVERGED, 0))
+        print(f"{len(self.found)} of {len(rows)} flights of {EASIEST} are feasible")
 
     def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
         """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4)."""
@@ -136,17 +133,13 @@ class Truth:
             tried = np.vstack([tried, place])
             reference = ideal + ranges * place
             steps.begin(f"place {np.round(reference, 2).tolist()}")
-            for start in self.starts(reference, ranges, ceiling):
-                self.solve(start, reference, ranges, ceiling)
+            self.solve(self.nearest(reference, ranges, ceiling), reference, ranges, ceiling)
 
-    def starts(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> list[np.ndarray]:
-        """The best that is known for a place, of each of the best ways past the zones."""
+    def nearest(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> np.ndarray:
+        """The best that is known for a place, a vector (n,)."""
         F = np.array([solved.F for solved in self.found])
         merit = np.max((F - reference) / ranges, axis=1) + (np.maximum(F - ceiling, 0.0) / ranges).sum(axis=1)
-        best: dict[tuple[int, ...], int] = {}
-        for k in np.argsort(merit):
-            best.setdefault(self.ways[k], int(k))
-        return [self.found[k].z for k in list(best.values())[:SIDES]]
+        return self.found[int(np.argmin(merit))].z
 
     def rows(self, steps: Steps) -> list[np.ndarray]:
         """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
@@ -164,18 +157,6 @@ class Truth:
                 broken += 1
         print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
         return told
-
-    def inherited(self, steps: Steps, rows: np.ndarray) -> list[np.ndarray]:
-        """The flights of the easiest case that are feasible in this one, where they are optimal too."""
-        found = []
-        for row in rows:
-            steps.begin(f"cross-range {row[0]:.2f}")
-            if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
-                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
-                if self.feasible(flown):
-                    found.append(row)
-        print(f"{len(found)} of {len(rows)} flights of {EASIEST} are feasible")
-        return found
 
     def feasible(self, flown: Simulation) -> bool:
         """Whether a flight exceeds no limit by more than is allowed."""
@@ -203,29 +184,6 @@ def projected(y: np.ndarray) -> np.ndarray:
     return y - y.mean(axis=1, keepdims=True)
 
 
-def way(flight: Trajectory, zones: tuple[Zone, ...]) -> tuple[int, ...]:
-    """For each zone whether a flight passes south of it (-1), north (1), or does not get there (0)."""
-    phase = flight["entry"]
-    east, north = (np.degrees(phase[name]) for name in ("longitude", "latitude"))
-    return tuple(int(np.sign(np.interp(zone.longitude, east, north) - zone.latitude)) * (east[-1] > zone.longitude) for zone in zones)
-
-
-def around(nlp: NLP, z: np.ndarray, zones: tuple[Zone, ...], sides: tuple[int, ...]) -> np.ndarray:
-    """A vector (n,), its latitudes moved to one side of each zone."""
-    z = z.copy()
-    names = {v.name: i for i, v in enumerate(nlp.variables)}
-    for name, i in names.items():
-        if not name.startswith("entry.longitude"):
-            continue
-        j = names[name.replace("longitude", "latitude")]
-        for zone, side in zip(zones, sides, strict=True):
-            apart = np.degrees(z[i]) - zone.longitude
-            if abs(apart) < 1.2 * zone.radius:
-                edge = np.radians(zone.latitude + side * 1.1 * np.sqrt(max(zone.radius**2 - apart**2, 0.0)))
-                z[j] = max(z[j], edge) if side > 0 else min(z[j], edge)
-    return nlp.tighten(z[None])[0]
-
-
 def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:
     """A flight with commands of as many digits as the table has, and these: (elements, both ends, both angles) in a row."""
     commands = np.round(np.degrees(flight["entry"].control.coefficients), DIGITS).ravel()
@@ -247,29 +205,36 @@ def volume(front: np.ndarray) -> float:
 def made(case: str, points: int) -> np.ndarray:
     """The table of a case; see the module."""
     truth = Truth(case)
-    easier = np.empty((0, 4)) if case == EASIEST else easiest()
-    windows = [CORNER] if len(easier) else [np.full(4, np.inf), CORNER]
-    with Steps(case, 4 + 4 * len(windows) + points) as steps:
-        truth.begin(steps, easier)
+    if case == EASIEST:
+        with Steps(f"{case}, to begin with", 4) as steps:
+            truth.begin(steps)
+    else:
+        easier = table(EASIEST)
+        with Steps(f"{case}, flights of {EASIEST}", len(easier)) as steps:
+            truth.inherit(steps, easier)
+    windows = [np.full(4, np.inf), CORNER]
+    with Steps(case, 4 * len(windows) + points) as steps:
         for window in windows:
             truth.fill(steps, points // len(windows), window)
     with Steps(f"{case}, flown", len(truth.found)) as steps:
-        own = truth.rows(steps)
-    with Steps(f"{case}, flights of the easiest case", len(easier)) as steps:
-        return united([*truth.inherited(steps, easier), *own])
+        rows = truth.rows(steps)
+    if case == EASIEST:
+        for harder in CASES:
+            rows += list(table(harder)) if harder != EASIEST else []
+    return united(rows)
 
 
-def easiest() -> np.ndarray:
-    """The table of the easiest case (k, 4 + n)."""
-    with files("problems.reentry").joinpath(f"{EASIEST.removeprefix('reentry_')}.csv").open() as file:
+def table(case: str) -> np.ndarray:
+    """What is known of a case (k, 4 + n)."""
+    with files("problems.reentry").joinpath(f"{case.removeprefix('reentry_')}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
 def united(rows: list[np.ndarray]) -> np.ndarray:
     """The rows that none dominates, by their cross-range."""
-    table = np.array(rows)
-    table = table[nondominated(table[:, :4] * SIGNS)]
-    return table[np.argsort(-table[:, 0])]
+    front = np.unique(np.array(rows), axis=0)
+    front = front[nondominated(front[:, :4] * SIGNS)]
+    return front[np.argsort(-front[:, 0])]
 
 
 def text(case: str, rows: np.ndarray) -> str:

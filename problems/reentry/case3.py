@@ -1,4 +1,8 @@
-"""The re-entry within wide limits, around three no-fly zones; see `statement`."""
+"""The re-entry within wide limits, around three no-fly zones; see `statement`.
+
+Every feasible flight passes south of all three, as far as gradients can tell: for one that passes north of the first, this zone would have
+to lie 6.3 degrees farther south; of the second, south of the first, 1.5 degrees; of the third, south of both others, 8.0 degrees.
+"""
 
 from __future__ import annotations
 

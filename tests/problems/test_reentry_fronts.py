@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.resources import files
+from math import degrees, radians
 
+import casadi as ca
 import numpy as np
 import pytest
-from moocore import is_nondominated
+from moocore import hypervolume, is_nondominated
 from test_reentry import STATES, by_hand
 
-from problems.reentry import case1, case2, case3
+from problems.reentry import case1, case2, case3, statement
+from transcription import DFET
+from transcription.scalarized import scalarize
 
 LIMITS = {"case1": (200, 280, 2.5), "case2": (150, 250, 1.25), "case3": (200, 280, 2.5)}
 ROOMS = {"case1": case1, "case2": case2, "case3": case3}
@@ -39,7 +44,7 @@ def flown(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     count, elements = commands.shape[:2]
     h, y = 2000.0 / elements / STEPS, np.zeros((10, count))
     y[:8] = np.array(START)[:, None]
-    worst, states = np.zeros((3, count)), []
+    worst, states = by_hand(y[:8], commands[:, 0, 0].T)[1], []
 
     def rates(y: np.ndarray, law: np.ndarray) -> np.ndarray:
         found, (heating, *_) = by_hand(y[:8], law)
@@ -90,3 +95,49 @@ def test_zones_cost_and_narrow_limits_too():
     best = {case: (table(case)[:, :4] * SIGNS).min(axis=0) for case in LIMITS}
     assert (best["case2"][:2] >= best["case1"][:2] - [0.1, 1.0]).all()
     assert (best["case3"][:2] >= best["case1"][:2] - [0.1, 1.0]).all()
+
+
+def test_references_reach_the_corner_in_which_hypervolume_is_measured():
+    """And in this order: narrower limits take less away than zones do."""
+    volumes = {case: hypervolume(table(case)[:, :4] * SIGNS, ref=[-28.5, 150.0, 1.5, 200.0]) for case in LIMITS}
+    assert volumes["case1"] > volumes["case2"] > volumes["case3"] > 20000
+
+
+def test_flights_of_the_reference_pass_south_of_all_zones(flights):
+    case, _, (_, _, states) = flights
+    if case == "case3":
+        for east, north in np.degrees(states[:, 1:3]).transpose(2, 1, 0):
+            assert all(np.interp(zone.longitude, east, north) < zone.latitude for zone in case3.ZONES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("passed", "least"), [(0, 6.2), (1, 1.5), (2, 7.9)])
+def test_there_is_no_way_north_of_a_zone(passed, least):
+    """How many degrees farther south a zone would have to lie for a flight to pass north of it, all limits one per cent wider.
+
+    Those before it are passed on the south, as there is no other way, and those behind it are left out.
+    """
+    wider, limits, zone = 1.01, case3.LIMITS, case3.ZONES[passed]
+    problem = statement.reentry(
+        "north",
+        statement.Limits(wider * limits.heating_rate, wider * limits.dynamic_pressure, wider * limits.load_factor),
+        [replace(before, radius=before.radius / wider) for before in case3.ZONES[:passed]],
+        altitude_tolerance=wider * 914.4,
+        speed_tolerance=wider * 106.68,
+        angle_tolerance=wider * radians(1.0),
+    )
+    entry, south = problem.phases["entry"], problem.parameter("south", bounds=(0.0, 60.0), scale=1.0)
+    apart = degrees(1.0) * entry["longitude"] - zone.longitude, degrees(1.0) * entry["latitude"] - (zone.latitude - south)
+    entry.path("distance from the zone", ca.hypot(*apart), lower=zone.radius / wider, scale=zone.radius)
+    problem.minimize("south", south)
+    nlp = DFET(60, 2, control_order=1, basis="bernstein").transcribe(problem)
+    found = []
+    for row in table("case3")[::30]:
+        laws, candidate = np.radians(row[4:]).reshape(-1, 2), np.full(len(nlp.free), 40.0)
+        for profile, law in zip(nlp.profiles, laws.T, strict=True):
+            candidate[profile.columns] = law
+        start = nlp.march(nlp.first_guess(candidate[None]))[0]
+        only = np.append(np.full(4, np.inf), 0.0)
+        solved = scalarize(nlp, start, reference=only, weights=np.eye(5)[4], max_iterations=200)
+        found += [solved.F[4]] if solved.status == "converged" else []
+    assert len(found) >= 3 and min(found) > least
