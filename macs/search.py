@@ -143,7 +143,8 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
 
     attempt(inertia, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1])]:
+    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], attempts.budget)
+    for coordinate in order.T[:scanned]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)
         attempt(lambda who, X, c=coordinate, s=side * length[0]: individual.coordinate_step(box, X, c[who], s[who]))
