@@ -7,6 +7,8 @@ only if it is feasible and keeps that promise.
 
 from __future__ import annotations
 
+from itertools import count
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,13 +18,17 @@ from . import social
 from .agent import NO_DIRECTION
 from .archive import Archive
 from .box import Box
-from .directions import normalised
+from .directions import normalised, simplex_lattice
 from .dominance import extremes, nondominated
 from .evaluation import CONVERGED, FAILED, Evaluation, Evaluator
 
 if TYPE_CHECKING:
     from .search import SearchState
 
+CURVE = 2
+"""With so many objectives the front is a curve, and with more a surface."""
+PLACES, BEYOND = 500, 1.3
+"""How many places a surface has, at most, and how far they reach: fronts bulge beyond the simplex between their ends."""
 FLAT = 0.05
 """Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
 SAME, PROMISE = 1e-7, 10.0
@@ -44,10 +50,14 @@ def allowed(evaluations: int, every: int, solves: int) -> int:
 
 
 def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: float) -> list[Evaluation]:
-    """One guarded solve for the agent whose turn it is, towards its own direction.
+    """One solve for the agent whose turn it is, towards its own direction.
 
-    It begins, in turn, where the agent is, where its nearest neighbour in the archive is, and where a social action would have led it: the
-    last two so that it may leave the basin that it is in.
+    Of an agent that is feasible it is guarded, and begins, in turn, where the agent is, where its nearest neighbour in the archive is, and
+    where a social action would have led it: the last two so that it may leave the basin that it is in. One that is infeasible is made
+    feasible on the way, from where it is. In the first turn, those whose direction is one objective go for its best there is, whatever
+    becomes of the others: where the ends of the front are, the archive has to know to be spread along it. With more than two objectives,
+    those that are feasible start from the ideal point, along their direction: a surface has too many places to wait until each has been
+    visited by somebody.
 
     Returns
     -------
@@ -57,20 +67,25 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     agents, m = state.agents, state.directions.shape[1]
     turn, i = divmod(state.refinements, len(agents))
     state.refinements += 1
-    if not len(state.archive) or agents.violation[i] > evaluator.tolerance:
+    feasible = agents.violation[i] <= evaluator.tolerance
+    if not np.isfinite(agents.F[i]).all():
         return []
     start = agents.Z[i].copy()
-    others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1))
+    others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1) & feasible)
     if turn % 3 == 1 and others.size:
         start = state.archive.Z[others[_nearest(state, agents.F[i], state.archive.F[others])[0]]]
-    elif turn % 3 == 2:
+    elif turn % 3 == 2 and feasible:
         pool = box.to_unit(state.archive.Z[:, evaluator.free])
         X = box.to_unit(start[evaluator.free])[None]
         start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
     direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
     weights = np.where(direction > 0, _ranges(state) / np.maximum(direction, FLAT), 0.0)
-    found = evaluator.refine(start[None], agents.F[i][None], weights[None])
-    if _kept(found, agents.F[i][None], agents.violation[i : i + 1], _ranges(state))[0]:
+    alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
+    reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
+    reference = np.where(direction > 0, reference, np.inf) if alone else reference
+    found = evaluator.refine(start[None], reference[None], weights[None])
+    promised = agents.F[i] if feasible else np.full(m, np.inf)
+    if _kept(found, promised[None], agents.violation[i : i + 1], _ranges(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
 
@@ -104,11 +119,17 @@ def polish(state: SearchState, solves: Solves, limit: int, exponent: float | Non
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
     better ones; then points slide along the front to where they repel each other least, or fill what places are left. `exponent` is that of
-    the archive.
+    the archive. Where there are few solves, only some points come down, well spread, so that half of the solves are left to spread them
+    along the front; what did not come down, and is not dominated, then takes what places are left. A surface is first gone down to from
+    all over it, once for each point that the archive may hold.
     """
     if not len(state.archive):
         return
-    _descend(state, solves)
+    if state.archive.F.shape[1] > CURVE:
+        _cover(state, solves, limit, exponent)
+        if not solves.left:
+            return
+    waiting = _descend(state, solves, exponent)
     for _ in range(ROUNDS):
         if not _learn_from_neighbours(state, solves):
             break
@@ -124,6 +145,8 @@ def polish(state: SearchState, solves: Solves, limit: int, exponent: float | Non
         before, state.archive = state.archive, _thinned(pool, limit, exponent)
         if np.array_equal(before.F, state.archive.F):
             break
+    if len(waiting):
+        state.archive = _thinned(_front(_joined(state.archive, waiting), ranges), limit, exponent)
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
@@ -131,9 +154,13 @@ def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
-def _descend(state: SearchState, solves: Solves) -> None:
-    """Guarded solves of all points; ends of the front are solved for their own objective first, then for the others."""
+def _descend(state: SearchState, solves: Solves, exponent: float | None) -> Archive:
+    """Guarded solves of the points; ends of the front are solved for their own objective first, then for the others. Returns the points
+    for which there are too few solves: they are not in the archive any more."""
     archive, ranges = state.archive, _ranges(state)
+    most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
+    chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
+    archive, waiting = archive.take(chosen), archive.take(~chosen)
     found = solves(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
     kept = _kept(found, archive.F, archive.violation, ranges)
     archive = Archive(
@@ -143,6 +170,39 @@ def _descend(state: SearchState, solves: Solves) -> None:
     )
     ends = _ends(archive, ranges, solves)
     state.archive = _front(_joined(ends, archive), ranges)
+    return waiting
+
+
+def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | None) -> None:
+    """Ends of the front, and as many places between them as there may be points: always that which is farthest from what is known."""
+    m = state.archive.F.shape[1]
+    ends = _ends(state.archive, _ranges(state), solves)
+    pool = _front(_joined(ends, state.archive), _ranges(state))
+    ideal, ranges = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
+    ranges = np.where(ranges > 0.0, ranges, _ranges(state))
+    known = _across((ends.F - ideal) / ranges)
+    middle = known.mean(axis=0)
+    places = middle + BEYOND * (simplex_lattice(m, _divisions(m)) @ known - middle)
+    for _ in range(min(limit, solves.left)):
+        place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+        reference = ideal + ranges * place
+        start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
+        found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
+        known = np.vstack([known, place])
+        if found.status[0] == CONVERGED:
+            known = np.vstack([known, _across((found.F - ideal) / ranges)])
+            pool = _joined(Archive(found.Z, found.F, found.violation), pool)
+    state.archive = _thinned(_front(pool, ranges), limit, exponent)
+
+
+def _across(y: np.ndarray) -> np.ndarray:
+    """Points (k, m) on the plane that is square to the way down."""
+    return y - y.mean(axis=1, keepdims=True)
+
+
+def _divisions(m: int) -> int:
+    """Of the finest lattice that has no more than `PLACES` points."""
+    return next(d for d in count(1) if comb(d + m, m - 1) > PLACES)
 
 
 def _ends(archive: Archive, ranges: np.ndarray, solves: Solves) -> Archive:
@@ -163,11 +223,11 @@ def _ends(archive: Archive, ranges: np.ndarray, solves: Solves) -> Archive:
 
 
 def _learn_from_neighbours(state: SearchState, solves: Solves) -> bool:
-    """Guarded solves of every point from its neighbours' controls; whether any was clearly better."""
+    """Guarded solves of every point from its neighbours' controls, if there are enough for all; whether any was clearly better."""
     archive, ranges = state.archive, _ranges(state)
-    if len(archive) < 2 or not solves.left:
-        return False
     pairs = [(i, j) for i in range(len(archive)) for j in _nearest(state, archive.F[i], archive.F)[1 : archive.F.shape[1] + 1]]
+    if not 0 < len(pairs) <= solves.left:
+        return False
     own, other = (np.array(index) for index in zip(*pairs, strict=True))
     found = solves(archive.Z[other], archive.F[own], np.tile(ranges, (len(own), 1)))
     gain = ((archive.F[own] - found.F) / ranges).min(axis=1)
@@ -182,18 +242,18 @@ def _slides(state: SearchState, limit: int, exponent: float | None) -> tuple[np.
     """References (k, m) on the lines between neighbours, and vectors (k, D) to start from: in the middle of wide gaps, and where points
     would repel each other less."""
     archive, ranges = state.archive, _ranges(state)
-    F, count = archive.F / ranges, len(archive)
-    if count < 2:
+    F, n = archive.F / ranges, len(archive)
+    if n < 2:
         return np.empty((0, F.shape[1])), archive.Z[:0]
     neighbours = [_nearest(state, point, archive.F)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
-    pairs = sorted({(min(i, j), max(i, j)) for i in range(count) for j in neighbours[i]})
+    pairs = sorted({(min(i, j), max(i, j)) for i in range(n) for j in neighbours[i]})
     apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
     wide = np.count_nonzero(apart > WIDE * np.median(apart))
-    gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, limit - count)]]
+    gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, min(limit - n, n))]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
     starts = [archive.Z[i] for i, _ in gaps]
     power, share = 0.5 * archives.reach(F, exponent), np.linspace(0.0, 0.6, 25)[:, None]
-    for i in np.setdiff1d(np.arange(count), extremes(archive.F)):
+    for i in np.setdiff1d(np.arange(n), extremes(archive.F)):
         others = np.delete(F, i, axis=0)
         lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])
         energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12) ** power).sum(axis=1)
@@ -225,8 +285,11 @@ def _joined(one: Archive, two: Archive) -> Archive:
 
 
 def _ranges(state: SearchState) -> np.ndarray:
-    """What counts as much in each objective (m,): the range of the archive; where that is nothing, the objective's size."""
+    """What counts as much in each objective (m,): the range of the archive, or of the agents while it is empty; where that is nothing, the
+    objective's size."""
     F = state.archive.F
+    if not len(F):
+        F = state.agents.F[np.isfinite(state.agents.F).all(axis=1)]
     span = np.ptp(F, axis=0)
     return np.where(span > 0.0, span, np.maximum(np.abs(F).max(axis=0), 1.0))
 

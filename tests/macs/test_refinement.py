@@ -88,6 +88,33 @@ def test_no_more_solves_than_allowed() -> None:
     assert allowed(1000, 200, 2) == 3 and allowed(100, 200, 0) == 0 and allowed(1000, 200, 9) == 0
 
 
+def test_where_no_candidate_is_feasible_gradients_find_what_is() -> None:
+    class Closed(Circle):
+        def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+            return Evaluation(Z.copy(), self.objectives(Z), np.ones(len(Z)), np.full(len(Z), "infeasible")), 0
+
+    def found(**settings) -> SearchState:
+        evaluator, solver = Closed(), MACS(agents=4, refine_every=10, **settings)
+        state = solver.begin(evaluator, 200, np.random.default_rng(0))
+        while state.evaluations < 200:
+            solver.advance(state, evaluator, 200)
+        return state
+
+    state = found()
+    assert len(state.archive) >= 3 and state.archive.Z[:, 0] == pytest.approx(1.0)
+    assert not len(found(refine=False).archive)
+
+
+def test_few_solves_are_not_spent_on_a_crowd() -> None:
+    evaluator = Circle()
+    rng = np.random.default_rng(1)
+    state = state_of(evaluator, np.column_stack([rng.uniform(0.8, 0.9, 30), np.linspace(0.7, 0.8, 30)]))
+    polish(state, Solves(evaluator, 20), 30)
+    angles = np.sort(state.archive.Z[state.archive.Z[:, 0] == 1.0, 1])
+    assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
+    assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
+
+
 def test_what_is_worse_or_failed_is_not_taken() -> None:
     class Useless(Circle):
         def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
