@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 CURVE = 2
 """With so many objectives the front is a curve, and with more a surface."""
-PLACES, BEYOND = 500, 1.3
-"""How many places a surface has, at most, and how far they reach: fronts bulge beyond the simplex between their ends."""
+PLACES = 500
+"""How many places a surface has, at most."""
 FLAT = 0.05
 """Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
 SAME, PROMISE = 1e-7, 10.0
@@ -56,8 +56,8 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     where a social action would have led it: the last two so that it may leave the basin that it is in. One that is infeasible is made
     feasible on the way, from where it is. In the first turn, those whose direction is one objective go for its best there is, whatever
     becomes of the others: where the ends of the front are, the archive has to know to be spread along it. With more than two objectives,
-    those that are feasible start from the ideal point, along their direction: a surface has too many places to wait until each has been
-    visited by somebody.
+    all but these look from the ideal point, along their direction: a surface has too many places to wait until each has been visited by
+    somebody. After the first turn, there is nothing to be gained at the ends, and another direction is drawn.
 
     Returns
     -------
@@ -79,6 +79,8 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
         X = box.to_unit(start[evaluator.free])[None]
         start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
     direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
+    if m > CURVE and turn and np.count_nonzero(direction) == 1:
+        direction = state.directions[state.rng.integers(m, len(state.directions))]
     weights = np.where(direction > 0, _ranges(state) / np.maximum(direction, FLAT), 0.0)
     alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
@@ -181,8 +183,7 @@ def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     ideal, ranges = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     ranges = np.where(ranges > 0.0, ranges, _ranges(state))
     known = _across((ends.F - ideal) / ranges)
-    middle = known.mean(axis=0)
-    places = middle + BEYOND * (simplex_lattice(m, _divisions(m)) @ known - middle)
+    places = simplex_lattice(m, _divisions(m)) @ known
     for _ in range(min(limit, solves.left)):
         place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
         reference = ideal + ranges * place
