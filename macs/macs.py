@@ -37,10 +37,11 @@ class MACS(Solver):
     archive : int, default 10
         Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
     refine : bool, default True
-        Use derivatives, where the problem has them (a black box has none): one guarded gradient solve for every `refine_every` evaluations,
-        and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for every
-        `polish_every` evaluations goes. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`. False:
-        the derivative-free method.
+        Use derivatives, where the problem has them (a black box has none): one gradient solve of an agent for every `refine_every`
+        evaluations, and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for
+        every `polish_every` evaluations goes; with more than two objectives it first goes down to the front from places all over it, once
+        for each point that the archive may hold. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`.
+        False: the derivative-free method.
     mesh : {"fixed", "adaptive"}, default "fixed"
         "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
         `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black

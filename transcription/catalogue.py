@@ -13,8 +13,9 @@ from .shooting import MultipleShooting, SingleShooting
 
 METHODS: dict[str, type[Transcription]] = {"DFET": DFET, "SingleShooting": SingleShooting, "MultipleShooting": MultipleShooting}
 EXAMPLES = (
-    "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1), shooting:200 (200 nodes), shooting:200x2:linear:rk8 (2 steps between each, "
-    "linear controls, another Runge-Kutta scheme), shooting:200:spline:21 (controls on 21 nodes), multiple-shooting:40 (intervals)"
+    "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1), shooting:200 (200 nodes), "
+    "shooting:200x2:linear:rk8 (2 steps between each, linear controls, another Runge-Kutta scheme), shooting:200:spline:21 (controls on 21 "
+    "nodes), multiple-shooting:40 (intervals)"
 )
 SHOOTING = {"shooting": SingleShooting, "multiple-shooting": MultipleShooting}
 
