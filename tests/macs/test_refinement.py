@@ -115,6 +115,61 @@ def test_few_solves_are_not_spent_on_a_crowd() -> None:
     assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
 
 
+class Sphere(Circle):
+    """The same with three objectives: the front is the eighth of a sphere at x = 1."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.free, self.lower, self.upper = np.arange(3), np.zeros(3), np.array([1.0, np.pi / 2, np.pi / 2])
+        self.period = np.zeros(3)
+
+    @staticmethod
+    def objectives(Z: np.ndarray) -> np.ndarray:
+        x, a, b = Z.T
+        return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        angles = np.linspace(0.0, np.pi / 2, 101)
+        grid = np.array([[1.0, a, b] for a in angles for b in angles])
+        surface, rows = self.objectives(grid), []
+        for reference, weight in zip(references, weights, strict=True):
+            moving, hard = (weight > 0) & (reference < np.inf), (weight == 0) & (reference < np.inf)
+            alpha = ((surface[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
+            alpha[(surface[:, hard] > reference[hard] + 1e-9).any(axis=1)] = np.inf
+            rows.append(grid[np.argmin(alpha)])
+        Z = np.array(rows)
+        return Evaluation(Z, self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), len(Z)
+
+
+def uncovered(F: np.ndarray, sphere: Sphere) -> float:
+    """How far a point of the sphere may be from the nearest of F."""
+    angles = np.linspace(0.0, np.pi / 2, 21)
+    every = sphere.objectives(np.array([[1.0, a, b] for a in angles for b in angles]))
+    return float(np.linalg.norm(every[:, None] - F, axis=2).min(axis=1).max())
+
+
+def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
+    rng = np.random.default_rng(3)
+    crowd = np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.4, 0.5, (20, 2))])
+    for solves in (36, 200):
+        sphere = Sphere()
+        state = state_of(sphere, crowd)
+        polish(state, Solves(sphere, solves), 30)
+        assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
+        assert uncovered(state.archive.F, sphere) < 0.3
+
+
+def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_over() -> None:
+    sphere = Sphere()
+    solver = MACS(agents=6, archive=30, refine_every=10)
+    state = solver.begin(sphere, 200, np.random.default_rng(0))
+    while state.evaluations < 200:
+        solver.advance(state, sphere, 200)
+    best = state.archive.Z[state.archive.Z[:, 0] == 1.0]
+    assert sphere.objectives(best).min(axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert len(best) > 6 and uncovered(sphere.objectives(best), sphere) < 0.6
+
+
 def test_what_is_worse_or_failed_is_not_taken() -> None:
     class Useless(Circle):
         def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
