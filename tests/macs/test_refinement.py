@@ -9,7 +9,8 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.archive import Archive
 from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
-from macs.refinement import Solves, allowed, polish
+from macs.polish import Solves, polish
+from macs.refinement import allowed
 from macs.search import SearchState, begin
 from problems import Problem, goddard, load, orbit_rise
 from transcription import DFET
