@@ -12,6 +12,9 @@ from transcription.smooth import Smooth
 
 from .evaluation import Counts, Evaluation, Evaluator
 
+PATIENCE = 100
+"""Iterations after which a gradient solve is given up: most take some tens, and for the time of one that wanders others find more."""
+
 
 class Bilevel(Evaluator):
     """The two-level problem of Ricciardi, Vasile and Maddock (IEEE CEC 2016), eq. (13).
@@ -64,7 +67,17 @@ class Bilevel(Evaluator):
         found = []
         for start, reference, weight in zip(starts, references, weights, strict=True):
             self.before_batch()
-            found.append(scalarize(self.nlp, start, reference=reference, weights=weight, tolerance=self.tolerance))
+            found.append(
+                scalarize(
+                    self.nlp,
+                    start,
+                    reference=reference,
+                    weights=weight,
+                    tolerance=self.tolerance,
+                    max_iterations=PATIENCE,
+                    persistent=False,
+                )
+            )
         evaluation = Evaluation(
             Z=np.array([solved.z for solved in found]),
             F=np.array([solved.F for solved in found]),

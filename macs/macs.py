@@ -19,6 +19,9 @@ from .front import Front
 from .search import SearchState
 from .solver import Solver
 
+SHARE = 8
+"""Of the budget, this part is the most that an iteration's scan of the coordinates may take."""
+
 
 @dataclass(frozen=True)
 class MACS(Solver):
@@ -34,10 +37,11 @@ class MACS(Solver):
     archive : int, default 10
         Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
     refine : bool, default True
-        Use derivatives, where the problem has them (a black box has none): one guarded gradient solve for every `refine_every` evaluations,
-        and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for every
-        `polish_every` evaluations goes. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`. False:
-        the derivative-free method.
+        Use derivatives, where the problem has them (a black box has none): one gradient solve of an agent for every `refine_every`
+        evaluations, and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for
+        every `polish_every` evaluations goes; with more than two objectives it first goes down to the front from places all over it, once
+        for each point that the archive may hold. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`.
+        False: the derivative-free method.
     mesh : {"fixed", "adaptive"}, default "fixed"
         "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
         `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
@@ -59,7 +63,8 @@ class MACS(Solver):
     coordinates : float, default 1.0
         Fraction of the coordinates that pattern search goes through, in (0, 1]; used if `adaptive_coordinates` is off (Table I: 1).
     adaptive_coordinates : bool, default True
-        Go through all coordinates while the archive is empty and through one when it is full (the authors' later code).
+        Go through all coordinates while the archive is empty and through one when it is full (the authors' later code); but not through so
+        many that, if all fail, an iteration takes more than an eighth of the budget.
     directions : int, optional
         How many directions the agents' own are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True
@@ -254,11 +259,13 @@ class MACS(Solver):
         believed = refined.F[[i for i, point in enumerate(refined) if not point.note]]
         return refined[np.flatnonzero(~np.any(dominates(believed, refined.F[:, None]), axis=1))]
 
-    def coordinates_to_scan(self, d: int, archived: int, m: int) -> int:
+    def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""
+        if not self.adaptive_coordinates:
+            return max(1, ceil(d * self.coordinates - 1e-9))
         limit = self.archive if m > 1 else 1
-        ratio = 1.0 - (1.0 - 1.0 / d) * archived / limit if self.adaptive_coordinates else self.coordinates
-        return max(1, ceil(d * ratio - 1e-9))
+        wanted = ceil(d * (1.0 - (1.0 - 1.0 / d) * archived / limit) - 1e-9)
+        return max(1, min(wanted, budget // (2 * SHARE * self.agents)))
 
     def points_to_sample(self, budget: int) -> int:
         """How many points are drawn to begin with."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import archive as archives
-from . import breeding, directions, individual, refinement, social
+from . import breeding, directions, individual, polish, refinement, social
 from .agent import NO_DIRECTION, Agents
 from .archive import Archive
 from .attempts import Attempts
@@ -123,7 +123,7 @@ def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
     """The last thing a search does (see `MACS.conclude`)."""
     if settings.refine and evaluator.has_gradients:
         left = state.evaluations // settings.polish_every - evaluator.counts.gradient_solves
-        refinement.polish(state, refinement.Solves(evaluator, left), settings.archive, settings.exponent)
+        polish.polish(state, polish.Solves(evaluator, left), settings.archive, settings.exponent)
 
 
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
@@ -143,7 +143,8 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
 
     attempt(inertia, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    for coordinate in order.T[: settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1])]:
+    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], attempts.budget)
+    for coordinate in order.T[:scanned]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)
         attempt(lambda who, X, c=coordinate, s=side * length[0]: individual.coordinate_step(box, X, c[who], s[who]))

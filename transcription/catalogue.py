@@ -13,8 +13,9 @@ from .shooting import MultipleShooting, SingleShooting
 
 METHODS: dict[str, type[Transcription]] = {"DFET": DFET, "SingleShooting": SingleShooting, "MultipleShooting": MultipleShooting}
 EXAMPLES = (
-    "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, shooting:200 (200 nodes), shooting:200x2:linear:rk8 (2 steps between each, "
-    "linear controls, another Runge-Kutta scheme), shooting:200:spline:21 (controls on 21 nodes), multiple-shooting:40 (intervals)"
+    "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1), shooting:200 (200 nodes), "
+    "shooting:200x2:linear:rk8 (2 steps between each, linear controls, another Runge-Kutta scheme), shooting:200:spline:21 (controls on 21 "
+    "nodes), multiple-shooting:40 (intervals)"
 )
 SHOOTING = {"shooting": SingleShooting, "multiple-shooting": MultipleShooting}
 
@@ -27,9 +28,12 @@ def parse(text: str) -> Transcription:
     if method.lower() in SHOOTING and numbers:
         settings = {**({"steps": int(second)} if cross else {}), **_options(text, [word for word in options if word])}
         return SHOOTING[method.lower()](int(first), **settings)
-    if method.lower() != "dfet" or not numbers or not cross or len(options) > 2:
+    said = [option for option in options if option]
+    orders = [option for option in said if option.isdecimal()]
+    if method.lower() != "dfet" or not numbers or not cross or len(orders) > 1 or len(said) - len(orders) > 1:
         raise ValueError(f"unknown transcription '{text}'; write it as {EXAMPLES}")
-    return DFET(int(first), int(second), basis=options[0] or "lobatto")
+    basis = next((option for option in said if option not in orders), "lobatto")
+    return DFET(int(first), int(second), basis=basis, control_order=int(orders[0]) if orders else None)
 
 
 def _options(text: str, words: list[str]) -> dict[str, Any]:
@@ -48,7 +52,8 @@ def word(method: Transcription) -> str | None:
     """How a transcription is said in one word, such that `parse` gives it again; None if it cannot be."""
     words: list[str] = []
     if isinstance(method, DFET) and isinstance(method.elements, int):
-        words = [f"dfet:{method.elements}x{method.order}", f"dfet:{method.elements}x{method.order}:{method.basis}"]
+        mesh, order = f"dfet:{method.elements}x{method.order}", "" if method.control_order is None else f":{method.control_order}"
+        words = [mesh + order, f"{mesh}:{method.basis}{order}"]
     elif isinstance(method, SingleShooting | MultipleShooting):
         name = next(name for name, kind in SHOOTING.items() if isinstance(method, kind))
         count = method.nodes if isinstance(method, SingleShooting) else method.intervals

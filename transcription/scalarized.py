@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -131,6 +132,7 @@ def scalarize(
     tolerance: float = 1e-6,
     max_iterations: int = 500,
     seconds: float = 60.0,
+    persistent: bool = True,
 ) -> Solved:
     """Go down from a point to the front: least alpha with F - reference <= alpha weights.
 
@@ -148,6 +150,8 @@ def scalarize(
         Largest scaled residual of a feasible point.
     max_iterations, seconds : int, float
         Limits of IPOPT. The time is a safety net: what it ends is not reproducible.
+    persistent : bool
+        Try another way where the first reached the limit of iterations. It is always tried where the first ended badly before.
 
     Returns
     -------
@@ -170,7 +174,8 @@ def scalarize(
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     worse = feasible and task.value(first.F) > tolerance
-    if first.clocked or (first.status == CONVERGED and not worse):
+    tired = first.iterations >= max_iterations and not persistent
+    if first.clocked or tired or (first.status == CONVERGED and not worse):
         return first
     second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
     best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
@@ -264,7 +269,21 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
 
 @lru_cache(maxsize=32)
 def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
-    """The program in x = (y, a), y the scaled variables; its parameters are shift, 1 / scale and slope of `_Task`."""
+    """The program of `_parts` for IPOPT, with these settings and options."""
+    parts, derivatives = _parts(nlp)
+    options = quiet(settings.seconds, settings.max_iterations) | {
+        "ipopt.tol": ACCURACY,
+        "ipopt.acceptable_tol": 100 * ACCURACY,
+        "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
+        "ipopt.nlp_scaling_method": "none",
+        "ipopt.bound_relax_factor": 0.0,
+    }
+    return ca.nlpsol("scalarized", "ipopt", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
+
+
+@lru_cache(maxsize=16)
+def _parts(nlp: NLP) -> tuple[dict[str, Any], dict[str, ca.Function]]:
+    """The program in x = (y, a), y the scaled variables, and its derivatives; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)
     n, m = len(nlp.variables), len(nlp.problem.goals)
     x, p = symbol(nlp, "x", n + 1), symbol(nlp, "p", 3 * m)
@@ -279,14 +298,4 @@ def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], 
     # The objective is linear.
     curvature = ca.triu(ca.hessian(ca.dot(lam_g, rows), x)[0])
     hessian = ca.Function("hess_lag", [x, p, lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"])
-    parts = {"x": x, "p": p, "f": x[n], "g": rows}
-    options = quiet(settings.seconds, settings.max_iterations) | {
-        "ipopt.tol": ACCURACY,
-        "ipopt.acceptable_tol": 100 * ACCURACY,
-        "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
-        "ipopt.nlp_scaling_method": "none",
-        "ipopt.bound_relax_factor": 0.0,
-        "jac_g": jacobian,
-        "hess_lag": hessian,
-    }
-    return ca.nlpsol("scalarized", "ipopt", parts, options | {f"ipopt.{name}": value for name, value in strategy})
+    return {"x": x, "p": p, "f": x[n], "g": rows}, {"jac_g": jacobian, "hess_lag": hessian}

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, refinement
+from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, polish
 from macs.solver import Solver
 from problems import load
 from transcription import DFET
@@ -153,7 +153,7 @@ def test_a_finished_run_returns_its_front_without_evaluations(file) -> None:
 def test_a_finished_search_is_not_polished_twice(file, monkeypatch) -> None:
     solve(checkpoint=file)
     whole = solved()
-    monkeypatch.setattr(refinement, "polish", lambda *_, **__: pytest.fail("polished again"))
+    monkeypatch.setattr(polish, "polish", lambda *_, **__: pytest.fail("polished again"))
     assert_same(solve(checkpoint=file), whole)
 
 
@@ -162,21 +162,21 @@ def test_killed_in_the_polish(file, monkeypatch) -> None:
         raise MemoryError("killed")
 
     with monkeypatch.context() as patch:
-        patch.setattr(refinement, "_learn_from_neighbours", dies)
+        patch.setattr(polish, "_learn_from_neighbours", dies)
         with pytest.raises(MemoryError):
             solve(checkpoint=file)
     assert_same(solve(checkpoint=file), solved())
 
 
 def test_interrupted_in_the_polish(file, monkeypatch) -> None:
-    learn = refinement._learn_from_neighbours
+    learn = polish._learn_from_neighbours
 
     def press(*arguments: Any) -> bool:
         os.kill(os.getpid(), signal.SIGINT)
         return learn(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(refinement, "_learn_from_neighbours", press)
+        patch.setattr(polish, "_learn_from_neighbours", press)
         assert solve(checkpoint=file).stats["stopped"] == "interrupted"
     assert_same(solve(checkpoint=file), solved())
 

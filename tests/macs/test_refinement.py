@@ -9,7 +9,8 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.archive import Archive
 from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
-from macs.refinement import Solves, allowed, polish
+from macs.polish import Solves, polish
+from macs.refinement import allowed
 from macs.search import SearchState, begin
 from problems import Problem, goddard, load, orbit_rise
 from transcription import DFET
@@ -86,6 +87,88 @@ def test_no_more_solves_than_allowed() -> None:
     for seed in (1, 2):
         assert len(MACS(archive=4).solve(load("goddard"), DFET(2, 3), evaluations=150, seed=seed)) <= 4
     assert allowed(1000, 200, 2) == 3 and allowed(100, 200, 0) == 0 and allowed(1000, 200, 9) == 0
+
+
+def test_where_no_candidate_is_feasible_gradients_find_what_is() -> None:
+    class Closed(Circle):
+        def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+            return Evaluation(Z.copy(), self.objectives(Z), np.ones(len(Z)), np.full(len(Z), "infeasible")), 0
+
+    def found(**settings) -> SearchState:
+        evaluator, solver = Closed(), MACS(agents=4, refine_every=10, **settings)
+        state = solver.begin(evaluator, 200, np.random.default_rng(0))
+        while state.evaluations < 200:
+            solver.advance(state, evaluator, 200)
+        return state
+
+    state = found()
+    assert len(state.archive) >= 3 and state.archive.Z[:, 0] == pytest.approx(1.0)
+    assert not len(found(refine=False).archive)
+
+
+def test_few_solves_are_not_spent_on_a_crowd() -> None:
+    evaluator = Circle()
+    rng = np.random.default_rng(1)
+    state = state_of(evaluator, np.column_stack([rng.uniform(0.8, 0.9, 30), np.linspace(0.7, 0.8, 30)]))
+    polish(state, Solves(evaluator, 20), 30)
+    angles = np.sort(state.archive.Z[state.archive.Z[:, 0] == 1.0, 1])
+    assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
+    assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
+
+
+class Sphere(Circle):
+    """The same with three objectives: the front is the eighth of a sphere at x = 1."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.free, self.lower, self.upper = np.arange(3), np.zeros(3), np.array([1.0, np.pi / 2, np.pi / 2])
+        self.period = np.zeros(3)
+
+    @staticmethod
+    def objectives(Z: np.ndarray) -> np.ndarray:
+        x, a, b = Z.T
+        return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        angles = np.linspace(0.0, np.pi / 2, 101)
+        grid = np.array([[1.0, a, b] for a in angles for b in angles])
+        surface, rows = self.objectives(grid), []
+        for reference, weight in zip(references, weights, strict=True):
+            moving, hard = (weight > 0) & (reference < np.inf), (weight == 0) & (reference < np.inf)
+            alpha = ((surface[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
+            alpha[(surface[:, hard] > reference[hard] + 1e-9).any(axis=1)] = np.inf
+            rows.append(grid[np.argmin(alpha)])
+        Z = np.array(rows)
+        return Evaluation(Z, self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), len(Z)
+
+
+def uncovered(F: np.ndarray, sphere: Sphere) -> float:
+    """How far a point of the sphere may be from the nearest of F."""
+    angles = np.linspace(0.0, np.pi / 2, 21)
+    every = sphere.objectives(np.array([[1.0, a, b] for a in angles for b in angles]))
+    return float(np.linalg.norm(every[:, None] - F, axis=2).min(axis=1).max())
+
+
+def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
+    rng = np.random.default_rng(3)
+    crowd = np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.4, 0.5, (20, 2))])
+    for solves in (36, 200):
+        sphere = Sphere()
+        state = state_of(sphere, crowd)
+        polish(state, Solves(sphere, solves), 30)
+        assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
+        assert uncovered(state.archive.F, sphere) < 0.3
+
+
+def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_over() -> None:
+    sphere = Sphere()
+    solver = MACS(agents=6, archive=30, refine_every=10)
+    state = solver.begin(sphere, 200, np.random.default_rng(0))
+    while state.evaluations < 200:
+        solver.advance(state, sphere, 200)
+    best = state.archive.Z[state.archive.Z[:, 0] == 1.0]
+    assert sphere.objectives(best).min(axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert len(best) > 6 and uncovered(sphere.objectives(best), sphere) < 0.6
 
 
 def test_what_is_worse_or_failed_is_not_taken() -> None:

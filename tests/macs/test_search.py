@@ -208,9 +208,11 @@ def test_settings_out_of_range_are_named(setting):
 def test_settings_of_the_paper():
     assert MACS.paper(archive=20).archive == 20
     assert not MACS.paper().redraw
-    assert MACS.paper().coordinates_to_scan(29, 10, 2) == 29
-    assert MACS().coordinates_to_scan(29, 10, 2) == 1
-    assert MACS().coordinates_to_scan(29, 0, 2) == 29
+    assert MACS.paper().coordinates_to_scan(29, 10, 2, 100) == 29
+    assert MACS().coordinates_to_scan(29, 10, 2, 10_000) == 1
+    assert MACS().coordinates_to_scan(29, 0, 2, 10_000) == 29
+    assert MACS().coordinates_to_scan(400, 0, 2, 10_000) == 62, "20 evaluations a coordinate, an eighth of the budget in all"
+    assert MACS().coordinates_to_scan(29, 0, 2, 10) == 1
     state = run(MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3), 600)
     assert len(state.archive) == 10
     assert len(run(MACS.paper(archive=30), BlackBox(schaffer, [(-2, 2)] * 3), 900).archive) == 30

@@ -127,6 +127,9 @@ def test_settings_travel():
         "dfet:4x6:hermite",
         "dfet:0x1",
         "dfet:4.5x6",
+        "dfet:4x6:1:2",
+        "dfet:4x6:lobatto:bernstein",
+        "dfet:4x6:bernstein:1:1",
     ):
         with pytest.raises(ValueError):
             parse(text)

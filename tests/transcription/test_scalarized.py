@@ -205,6 +205,16 @@ def test_too_few_iterations_are_a_failure_even_where_feasible() -> None:
     assert solved.status != "converged"
 
 
+def test_without_persistence_a_solve_out_of_iterations_is_not_begun_again() -> None:
+    start = feasible(goddard(), 1)
+    short = {"start": start, "max_iterations": 3}
+    once, again = (solve(goddard(), [150, -0.5], RANGES.tolist(), persistent=stays, **short) for stays in (False, True))
+    assert once.status == "failed" and once.iterations < again.iterations
+    # One that converges, or ends for another reason, is the same.
+    F = [solve(goddard(), [150, -0.5], RANGES.tolist(), start, persistent=stays).F for stays in (False, True)]
+    assert np.array_equal(*F)
+
+
 @pytest.mark.parametrize(
     ("reference", "weights", "more"),
     [

@@ -427,6 +427,8 @@ def test_settings_pickle_and_come_back_from_plain_data(method):
         ("multiple-shooting:40", MultipleShooting(40)),
         ("multiple-shooting:40x2:heun", MultipleShooting(40, steps=2, scheme="heun")),
         ("dfet:4x6:bernstein", DFET(4, 6, basis="bernstein")),
+        ("dfet:4x6:1", DFET(4, 6, control_order=1)),
+        ("dfet:40x2:bernstein:1", DFET(40, 2, control_order=1, basis="bernstein")),
     ],
 )
 def test_words_of_the_command_line(word, method):
@@ -434,7 +436,7 @@ def test_words_of_the_command_line(word, method):
 
 
 def test_what_cannot_be_said_in_a_word():
-    assert said(SingleShooting(9, path_points=1)) is None and said(DFET(3, 2, control_order=1)) is None
+    assert said(SingleShooting(9, path_points=1)) is None and said(DFET(3, 2, mesh={"fly": ([0, 0.5, 1], 2)})) is None
     assert said(SingleShooting(9)) == "shooting:9" and said(DFET(3, 2)) == "dfet:3x2"
 
 
@@ -448,7 +450,7 @@ def test_what_cannot_be_said_in_a_word():
         ("shooting:20:linear:spline", "'spline' is said twice"),
         ("shooting:1", "nodes must be an integer of at least 2, not 1"),
         ("multiple-shooting:0", "intervals must be an integer of at least 1"),
-        ("dfet:4x6:lobatto:3", "write it as"),
+        ("dfet:4x6:lobatto:3:3", "write it as"),
     ],
 )
 def test_words_that_mean_nothing(word, message):
