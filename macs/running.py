@@ -94,7 +94,10 @@ class Run:
             monitor.show(self._standing(monitor))
             if self._checkpoint:
                 self._checkpoint.write()
-            return self.make_front(self._state, self._stats(monitor, stopped))
+            front = self.make_front(self._state, self._stats(monitor, stopped))
+            # To say how near to optimal the points are takes its time, too.
+            front.stats["wall_time"] = monitor.elapsed
+            return front
 
     def _search(self, monitor: Monitor) -> str:
         """To the end of the search; returns what ended it."""

@@ -24,7 +24,7 @@ class Problem:
 
     Attributes
     ----------
-    default_transcription, default_evaluations, verify_tolerance : str, int, float
+    default_transcription, default_evaluations, default_inner, default_start, verify_tolerance : str, int, str, str or None, float
         What the command line uses when it is told nothing else. A case may set its own.
 
     Examples
@@ -43,6 +43,8 @@ class Problem:
         self.data: Mapping[str, Any] = {}
         self.default_transcription = "dfet:8x3:bernstein"
         self.default_evaluations = 10_000
+        self.default_inner = "auto"
+        self.default_start: str | None = None
         self.verify_tolerance = 1e-2
         self._phases: dict[str, Phase] = {}
         self._parameters: dict[str, tuple[Variable, ca.MX]] = {}

@@ -146,8 +146,10 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
-    solve.add_argument("--inner", metavar="NAME", default="auto", help="the inner level: auto, march, ipopt, ... (default: auto)")
-    solve.add_argument("--start", metavar="KIND", help="first candidates: smooth about the problem's guess, or uniform, without it")
+    solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, march, ipopt, ... (default: the problem's own)")
+    solve.add_argument(
+        "--start", metavar="KIND", help="first candidates: smooth about the guess, or uniform, without it (default: the problem's own)"
+    )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(
         "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"

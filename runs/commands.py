@@ -49,8 +49,8 @@ def solve(arguments: Namespace) -> int:
     with refused():
         scheme = transcription.parse(method) if isinstance(method, str) else method
     solver = make_solver(arguments.solver, arguments.no_refine, choose(arguments.mesh, MESHES, "kind of mesh"))
-    choose(arguments.inner, NAMED, "inner level")
-    start = arguments.start and choose(arguments.start, STARTS, "start")
+    inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
+    start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_picture(arguments.plot)
@@ -62,7 +62,7 @@ def solve(arguments: Namespace) -> int:
             scheme,
             evaluations=arguments.evaluations or problem.default_evaluations,
             seed=arguments.seed,
-            inner=arguments.inner,
+            inner=inner,
             start=start,
             checkpoint=arguments.checkpoint,
             progress=True,

@@ -16,7 +16,8 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that say the same twice; refinement takes it away again."""
-REFINEMENTS = 3
+REFINEMENTS, EXACT = 3, 1e-12
+"""As many at most, until what is left of the right-hand sides is this part of them."""
 
 
 def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> float:
@@ -103,7 +104,10 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarr
     right = np.vstack([gradients.T, np.zeros((r, len(gradients)))])
     solution = factors.solve(right)
     for _ in range(REFINEMENTS):
-        solution += factors.solve(right - exact @ solution)
+        left = right - exact @ solution
+        if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
+            break
+        solution += factors.solve(left)
     return solution[:n][measured]
 
 

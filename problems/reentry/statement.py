@@ -146,9 +146,11 @@ def reentry(
     problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
 
     guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
-    # Commands within bounds everywhere, and few variables: what flies feasibly on it is so as flown, but for some percent of the limits.
-    problem.default_transcription = "dfet:30x2:bernstein"
-    problem.default_evaluations = 1_000
+    # Commands within bounds everywhere, and fine enough that most of what is feasible on it is so as flown, to 1 % of each limit. It takes
+    # seconds to make a candidate feasible: they are scored as they fly, and what is worth it is left to the gradients.
+    problem.default_transcription = "dfet:50x2:bernstein:1"
+    problem.default_evaluations = 700
+    problem.default_inner, problem.default_start = "march", "smooth"
     problem.verify_tolerance = 2e-2
     return problem
 
