@@ -42,9 +42,17 @@ def merge(fronts: Sequence[Front]) -> Front:
         transcription=[point.transcription for point in kept],
         solver=_solver(fronts),
         stats=_stats(fronts),
-        message="" if kept else next((front.message for front in fronts if front.closest is closest), fronts[0].message),
+        message="" if kept else next((front.message for front in fronts if front.closest is closest and front.message), _nearest(closest)),
         closest=None if kept else closest,
     )
+
+
+def _nearest(closest: Point | None) -> str:
+    """What is to be said of fronts none of whose points is feasible, where they do not say it."""
+    if closest is None or not closest.violations:
+        return "nothing feasible"
+    label, amount = max(closest.violations.items(), key=lambda item: item[1])
+    return f"nothing feasible; the nearest violates {label} by {amount:.2g} of its scale"
 
 
 def _check(one: Front, other: Front) -> None:

@@ -20,7 +20,7 @@ CASES: dict[str, tuple[str, str]] = {
     "landing_site": ("problems.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
     "reentry_case1": ("problems.reentry.case1:problem", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
     "reentry_case2": ("problems.reentry.case2:problem", "the same within narrow limits"),
-    "reentry_case3": ("problems.reentry.case3:problem", "the same around three no-fly zones: a front on either side of each"),
+    "reentry_case3": ("problems.reentry.case3:problem", "the same around three no-fly zones"),
     "betts": ("problems.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.betts_heating:problem", "the same with a limit to the heating rate"),
 }

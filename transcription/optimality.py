@@ -48,7 +48,8 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     Returns
     -------
     float
-        Not negative; infinite where a derivative is no number, or where the equations do not determine the states.
+        Not negative; infinite where a derivative is no number, where the equations do not determine the states, and where no multipliers
+        are found.
     """
     z = np.asarray(z, dtype=float)
     found = gradients(nlp)(z)
@@ -62,10 +63,9 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
     sides, slack = _inequalities(nlp, z, g, dg)
     try:
-        reduced = _reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides]))
-    except RuntimeError:
+        return _least(_reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides])), slack)
+    except (RuntimeError, np.linalg.LinAlgError):
         return float("inf")
-    return _least(reduced, slack)
 
 
 def _units(nlp: NLP) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from macs.checkpoint import Unreadable, keeps
 
+from ..flown import record
 from .samples import Report, Samples
 
 if TYPE_CHECKING:
@@ -65,8 +66,7 @@ class Outcome:
         "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
         minimised. The last sample is the front itself.
     flown : dict
-        If the points of the front were to be flown: "F" (n, m), all minimised, and "violation" (n,), as flown, and the states at the end of
-        each phase, "ends": {phase: {state: n values}}.
+        If the points of the front were to be flown: see `flown.record`.
     """
 
     status: str
@@ -94,8 +94,8 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         samples.add(front.stats, front.stats["wall_time"], front.F)
         # What was spent before it was taken up again is known to the front alone.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
-        checked = {} if task.verify is None else _flown(front, task.verify)
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=checked)
+        flights = _flown(task, front)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=flights)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
@@ -131,17 +131,15 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
             return front, samples
 
 
-def _flown(front: Front, tolerance: float) -> dict[str, Any]:
-    """What the points turn out to be in the air; see `Outcome.flown`."""
-    flights = front.flown(tolerance=tolerance)
-    ends = {
-        phase.name: {
-            v.name: [float(point.trajectory[phase.name].edge_states[-1, k]) for point in flights if point.trajectory is not None]
-            for k, v in enumerate(phase.states)
-        }
-        for phase in front.compiled().phases
-    }
-    return {"F": flights.F.tolist(), "violation": flights.violation.tolist(), "ends": ends}
+def _flown(task: Task, front: Front) -> dict[str, Any]:
+    """What the points turn out to be in the air, if that is wanted. If it cannot be found out, the run is none the worse for it."""
+    if task.verify is None:
+        return {}
+    try:
+        return record(front, task.verify)
+    except Exception:
+        log.warning("the points of a front could not be flown; the report will try again", exc_info=True)
+        return {}
 
 
 @lru_cache(maxsize=8)

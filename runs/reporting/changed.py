@@ -95,7 +95,7 @@ class Changed:
 
     def figures(self) -> dict[str, Figure]:
         """Name of a file -> figure, one for each transcription and solver."""
-        drawn = [one for one in self.changes if one.flown and len(self._goals) > 1]
+        drawn = [one for one in self.changes if len(one.flown) > 1 and len(self._goals) > 1]
         return {f"changed-data-{one.transcription}-{one.solver}": changed_figure(one) for one in drawn}
 
     @property

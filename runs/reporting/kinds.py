@@ -11,13 +11,13 @@ import numpy as np
 from macs.front import Front
 from macs.inputs import unknown
 
+from ..flown import Ends
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.statistics import summarise
 from .ground import Ground
 from .measuring import samples, spent
 from .tables import Cell, Column
-from .verified import Ends
 
 Figures = Mapping[str, Cell]
 """A row's figures by key."""
@@ -168,11 +168,12 @@ def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Fig
         figures: dict[str, Cell] = {}
         for key in ("first_feasible", "all_feasible"):
             reached = [one[key] for one in told if one[key] is not None]
+            runs_in_all = len(told) + ground.failures.get(solver, 0)
             figures[key] = float(np.mean(reached)) if reached else None
-            # A run that never got there is later than any other.
-            middle = float(np.median([np.inf if one[key] is None else one[key] for one in told]))
+            # A run that failed, or never got there, is later than any other.
+            middle = float(np.median([*reached, *[np.inf] * (runs_in_all - len(reached))]))
             figures[f"{key}_median"] = middle if np.isfinite(middle) else None
-            figures[f"{key}_never"] = len(told) - len(reached)
+            figures[f"{key}_never"] = runs_in_all - len(reached)
         figures["points"] = float(np.mean([one["nondominated"] for one in told]))
         figures["held"] = float(np.mean([len(one.front) for one in ground.verified[solver]]))
         rows[solver] = [figures]

@@ -86,11 +86,19 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
             continue
         seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
         rows += [[problem, row["by"], None, *_cells(row, keys, kind, None)] for row in theirs]
+        seen = set[tuple[str, str]]()
         for ground in here:
             for solver, figures in kind.ours(ground, paper).items():
+                if (solver, ground.place(solver)) in seen:
+                    continue  # it works apart, and is on each of the others' grounds
+                seen.add((solver, ground.place(solver)))
                 runs = len(ground.fronts[solver]) + ground.failures.get(solver, 0)
                 rows += [[problem, f"{solver}, {ground.place(solver)}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
-        notes.append(f"{problem}: {kind.note(here[0], paper)}")
+        said = {ground.transcription: kind.note(ground, paper) for ground in here}
+        if len(set(said.values())) == 1:
+            notes.append(f"{problem}: {said[here[0].transcription]}")
+        else:
+            notes += [f"{problem}, {place}: {note}" for place, note in said.items()]
     if not rows:
         return None
     heads: list[Column | str] = [
@@ -103,8 +111,8 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper['source']}" if "source" in paper else "Beside published figures"
-    told = [f"{word}: {paper[key]}." for key, word in (("note", "The paper"), ("differs", "What differs")) if key in paper]
-    return table(heads, rows, f"{caption}.", [*notes, *told])
+    words = [f"{word}: {paper[key]}." for key, word in (("note", "The paper"), ("differs", "What differs")) if key in paper]
+    return table(heads, rows, f"{caption}.", [*notes, *words])
 
 
 def _cells(figures: Mapping[str, Any], keys: Sequence[str], kind: Kind, theirs: float | None) -> list[Cell]:

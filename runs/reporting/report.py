@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -205,7 +206,8 @@ def _figures(ground: Ground, reference: Reference) -> dict[str, Figure]:
     runs = {solver: [*fronts, *[nothing] * ground.failures.get(solver, 0)] for solver, fronts in ground.fronts.items()}
     if len(ground.known.goals) == 2:
         surfaces = {solver: attainment(fronts) for solver, fronts in runs.items() if any(map(len, fronts))}
-        found["attainment"] = attainment_figure(surfaces, goals=ground.known.goals, reference=reference.front, truth_name=name)
+        if surfaces:
+            found["attainment"] = attainment_figure(surfaces, goals=ground.known.goals, reference=reference.front, truth_name=name)
     for indicator, larger in (("IGD", False), ("hypervolume", True)):
         for axis, (_, label) in AXES.items():
             told = histories(ground, reference, indicator, axis)
@@ -221,18 +223,26 @@ class _Writer:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(exist_ok=True)
         self._folder, self.files = folder, list[Path]()
+        self._used: Counter[tuple[str, str]] = Counter()
 
     def table(self, stem: str, one: Table) -> str:
         """Write a table in its three forms; returns its text."""
+        stem = self._free("table", stem)
         self.files += one.save(self._folder / stem)
         return one.text()
 
     def figure(self, stem: str, figure: Figure) -> None:
         """Write a figure, as a picture and for print."""
+        stem = self._free("figure", stem)
         for suffix in ("png", "pdf"):
             content = io.BytesIO()
             figure.savefig(content, format=suffix, dpi=200)
             self.write(f"{stem}.{suffix}", content.getvalue())
+
+    def _free(self, kind: str, stem: str) -> str:
+        """A name that no other table, or figure, has: labels may differ in what file names do not show."""
+        self._used[kind, stem] += 1
+        return stem if self._used[kind, stem] == 1 else f"{stem}-{self._used[kind, stem]}"
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,11 @@ from macs.evaluation import CONVERGED
 from macs.flown import best, judged
 from macs.front import Front
 
+from ..flown import Ends, ends, record
 from ..measures.statistics import summarise
 from ..store import Run
+from ..studyfile import told
 from .tables import Cell, Table, table
-
-Ends = Mapping[str, Mapping[str, np.ndarray]]
-"""Phase -> state -> its values at the end (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,44 +40,37 @@ class Verified:
 
     @classmethod
     def of(cls, run: Run, tolerance: float | None) -> Verified:
-        """Of a finished run, of a study that verifies within a tolerance or not at all. Raises ValueError if its points were not flown."""
+        """Of a finished run, of a study that verifies within a tolerance or not at all.
+
+        Points whose flights are not in the run's record are flown now. Raises ValueError if they cannot be, as their problem is not found.
+        """
         front = run.front
         if tolerance is None or not len(front):
-            return cls(front, _ends(front), len(front), len(front))
-        F, violation = (np.array(run.flown.get(key, []), dtype=float) for key in ("F", "violation"))
-        if F.shape != front.F.shape or violation.shape != front.violation.shape:
-            raise ValueError(f"{run.path.with_suffix('.json')} does not say how the points of run {run.number} of {run.cell.name} fly")
-        flown = judged(front, F, violation, tolerance)
+            return cls(front, ends(front), len(front), len(front))
+        found: Any = run.flown
+        if np.shape(found.get("F", ())) != front.F.shape or np.shape(found.get("violation", ())) != front.violation.shape:
+            with told(f"the points of run {run.number} of {run.cell.name} cannot be flown"):
+                found = record(front, tolerance)
+        flown = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
         rows = best(flown)
-        ends = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in run.flown["ends"].items()}
-        return cls(flown[rows], ends, len(front), int((flown.status == CONVERGED).sum()))
-
-
-def _ends(front: Front) -> Ends:
-    """As the transcription has them."""
-    flights = [point.trajectory for point in front]
-    if not flights or any(flight is None for flight in flights):
-        return {}
-    return {
-        name: {
-            v.name: np.array([flight[name].edge_states[-1, k] for flight in flights if flight is not None])
-            for k, v in enumerate(phase.state_variables)
-        }
-        for name, phase in (flights[0] or {}).items()
-    }
+        places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
+        return cls(flown[rows], places, len(front), int((flown.status == CONVERGED).sum()))
 
 
 def claims_table(runs: Mapping[str, Sequence[Verified]], tolerance: float, caption: str) -> Table:
     """A row for each solver: how many points of its runs were claimed to be feasible, and how many are, as flown."""
     rows: list[list[Cell]] = []
     for solver, found in runs.items():
+        if not found:
+            continue
         claimed, held = sum(one.claimed for one in found), sum(one.held for one in found)
         counts = summarise([len(one.front) for one in found], larger=True)
         share = 100.0 * held / claimed if claimed else None
         rows.append([solver, len(found), claimed, held, share, counts.mean, counts.median])
     heads = ["solver", "runs", "points claimed", "hold as flown", "%", "of these not dominated, mean of a run", "median"]
-    told = (
-        f"All points were flown by DOP853. Those that violate nothing by more than {tolerance:g} of its scale hold; they alone are in all "
-        "other tables and figures, with their objectives as flown, without what is dominated by others of their run."
+    note = (
+        f"All points were flown by DOP853. Those hold that violate no state bound, end, path or constraint by more than {tolerance:g} of "
+        "its scale; they alone count in indicators and published statistics, with their objectives as flown, without what is dominated by "
+        "others of their run. What is drawn over evaluations, iterations or time is as claimed."
     )
-    return table(heads, rows, caption, [told])
+    return table(heads, rows, caption, [note])

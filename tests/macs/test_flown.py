@@ -105,3 +105,9 @@ def test_other_problems_are_refused_by_what_differs(front):
         front.flown(tolerance=-1.0)
     with pytest.raises(ValueError, match="black box"):
         NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).flown()
+
+
+def test_where_nothing_holds_the_merged_front_says_what_is_violated(front):
+    merged = Front.merge([front.flown(push(gate=-1.0), tolerance=1e-3)])
+    assert not len(merged) and merged.closest is not None
+    assert "the nearest violates path 'gate' of 'run' by " in merged.message

@@ -147,6 +147,8 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
     (found,) = changes(grounds(Store.open(tmp_path / "out"), {}), "2")
     figure = changed_figure(found.changes[0])
     assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
+    alone = [ground for ground in grounds(Store.open(tmp_path / "out"), {}) if ground.problem == "2"]
+    assert [one.figures() for one in changes(alone, "2")] == [{}], "nothing to draw as long as there is only the nominal front"
     marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == FLOWN["mfc"]]
     assert len(marks) == 1 and len(marks[0].get_xdata()) == len(found.changes[0].nominal)
     assert [ax.get_xlabel() for ax in figure.axes[:3]] == [""] * 3 and "distance" in figure.axes[5].get_xlabel()

@@ -15,7 +15,8 @@ from runs.cli import main
 from runs.making.work import Outcome
 from runs.reporting.ground import grounds
 from runs.reporting.published import check
-from runs.reporting.report import report
+from runs.reporting.report import _plain, _Writer, report
+from runs.reporting.tables import table
 from runs.store import Store
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
@@ -58,8 +59,8 @@ def test_everything_is_told_and_written(folder, told):
     assert (folder / "report" / "report.txt").read_text() == told + "\n"
     names = {path.name for path in (folder / "report").iterdir()}
     stem = "glide-dfet-2x2"
-    for table in ("indicators", "comparisons", "overall", "spent", "representatives"):
-        assert {f"{stem}-{table}.{suffix}" for suffix in ("txt", "csv", "tex")} <= names
+    for name in ("indicators", "comparisons", "overall", "spent", "representatives"):
+        assert {f"{stem}-{name}.{suffix}" for suffix in ("txt", "csv", "tex")} <= names
     for figure in ("fronts", "attainment", "igd-over-evaluations", "hypervolume-over-time", "representatives", "flights"):
         assert {f"{stem}-{figure}.{suffix}" for suffix in ("png", "pdf")} <= names
         assert (folder / "report" / f"{stem}-{figure}.png").read_bytes().startswith(b"\x89PNG")
@@ -167,3 +168,11 @@ def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
         check(paper)
     with pytest.raises(ValueError, match=message):
         study(paper=paper)
+
+
+def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):
+    writer = _Writer(tmp_path / "report")
+    for value in (5, -5):
+        writer.table(_plain(f"mass {value:+d} %"), table(["shift"], [[value]], "of the mass"))
+    assert len(set(writer.files)) == len(writer.files) == 6 and all(path.exists() for path in writer.files)
+    assert [path.name for path in writer.files if path.suffix == ".csv"] == ["mass-5.csv", "mass-5-2.csv"]

@@ -112,13 +112,31 @@ def test_without_flights_points_are_what_the_solver_says(tmp_path):
     assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")
 
 
-def test_a_record_that_does_not_say_how_points_fly_is_named(folder, tmp_path):
+def test_points_whose_flights_are_lost_are_flown_again_if_their_problem_is_found(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "out")
-    record = next((tmp_path / "out").glob("*/0002.json"))
-    data = json.loads(record.read_text())
-    record.write_text(json.dumps({**data, "flown": {}}))
-    with pytest.raises(ValueError, match=r"0002\.json does not say how the points of run 2 of braking, dfet:1x2"):
+    records = sorted((tmp_path / "out").glob("*/000?.json"))
+    data = json.loads(records[0].read_text())
+    records[0].write_text(json.dumps({**data, "flown": {}}))
+    records[1].unlink()
+    with pytest.raises(ValueError, match=r"points of run 1 of braking, dfet:1x2, \w+ cannot be flown: .* was stated in a script"):
         study().report(tmp_path / "out")
+
+
+def test_a_flight_that_fails_costs_no_run(tmp_path, monkeypatch, caplog):
+    def fails(front, tolerance):
+        raise RuntimeError("no air")
+
+    monkeypatch.setattr("runs.making.work.record", fails)
+    assert study().run(tmp_path / "out", executor=Inline()).finished == 4
+    assert "could not be flown" in caplog.text
+
+
+def test_reports_of_runs_that_are_not_there_yet(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "out")
+    for path in (tmp_path / "out").glob("*nsga2*/*"):
+        path.unlink()
+    text = str(study().report(tmp_path / "out", figures=False))
+    assert "nsga2: 2 missing" in text and "what was claimed, and what holds" in text
 
 
 @pytest.mark.parametrize(("value", "message"), [(0.0, "verify must be a positive number"), ("much", "verify must be a positive number")])
@@ -150,7 +168,9 @@ def test_a_state_that_does_not_exist_is_named(folder):
 
 
 def test_where_nothing_is_found_the_report_says_so(tmp_path):
-    nothing = study(problems=braking(pace=100.0))
+    truth = tmp_path / "truth.csv"
+    truth.write_text("distance [m],effort\n1,3\n2,15\n")
+    nothing = study(problems=braking(pace=100.0), reference=str(truth))
     nothing.run(tmp_path / "out", executor=Inline())
     text = str(nothing.report(tmp_path / "out"))
     assert "no run found a point that counts" in text and "braking, dfet:1x2: what a run spent" in text
