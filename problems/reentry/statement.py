@@ -119,7 +119,9 @@ def reentry(
     given = {"altitude": altitude_tolerance, "speed": speed_tolerance, "flight-path angle": angle_tolerance}
     problem = Problem(name)
     phase = problem.phase("entry", t0=0.0, tf=final_time)
-    states = declare(phase, START, {state: _around(state, tolerance, name) for state, tolerance in given.items()})
+    for state, tolerance in given.items():
+        _check_tolerance(tolerance, state, f"{name}: the tolerance of the final {state}")
+    states = declare(phase, START, {state: END[state] for state, tolerance in given.items() if tolerance == 0})
     for angle in ANGLES:
         phase.control(f"{angle} command", bounds=BOUNDS[angle], unit="rad")
     rates = vehicle.rates(states, states["angle of attack"], states["bank angle"], mass, gravity)
@@ -139,6 +141,12 @@ def reentry(
     for number, zone in enumerate(zones, 1):
         east, north = (degrees(1.0) * phase[word] - getattr(zone, word) for word in ("longitude", "latitude"))
         phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, scale=zone.radius)
+
+    for state, tolerance in given.items():
+        if tolerance > 0:
+            # Eq. (10): rows of their own, as what counts as one at the end is what is left open there.
+            error = phase.final(states[state]) - END[state]
+            problem.constraint(f"final {state}", error, lower=-tolerance, upper=tolerance, scale=tolerance)
 
     problem.maximize("cross-range", degrees(1.0) * phase.final(phase["latitude"]), unit="deg")
     problem.minimize("heat load", 1e-3 * phase.integral(heating), unit="kBtu/ft2")
@@ -165,12 +173,12 @@ def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) ->
     }
 
 
-def _around(state: str, tolerance: float, name: str) -> tuple[float, float]:
-    """What the end of a state may be."""
-    what = f"{name}: the tolerance of the final {state}"
+def _check_tolerance(tolerance: Any, state: str, what: str) -> None:
     if checks.number(tolerance, what) < 0:
         raise ValueError(f"{what} must not be negative, not {tolerance:g}")
-    return END[state] - tolerance, END[state] + tolerance
+    low, high = BOUNDS[state]
+    if not low <= END[state] - tolerance <= END[state] + tolerance <= high:
+        raise ValueError(f"{what}: {END[state]:g} +- {tolerance:g} is outside its bounds, {low:g} to {high:g}")
 
 
 def _positive(value: Any, what: str) -> float:

@@ -82,10 +82,10 @@ def test_the_ends_and_the_limits_are_those_of_the_paper():
         [260000 * ft, 0, 0, 25600 * ft, -1 * deg, 90 * deg, 17.4 * deg, -75 * deg]
     )
     assert all(low == high for low, high in phase.initial)
-    final = dict(zip(STATES, phase.final, strict=True))
-    assert final["altitude"] == pytest.approx((77000 * ft, 83000 * ft))
-    assert final["speed"] == pytest.approx((2150 * ft, 2850 * ft))
-    assert final["flight-path angle"] == pytest.approx((-6 * deg, -4 * deg))
+    ends = {limit.name: limit for limit in load("reentry_case1").compile().limits}
+    for name, tolerance in (("altitude", 3000 * ft), ("speed", 350 * ft), ("flight-path angle", deg)):
+        limit = ends[f"final {name}"]
+        assert (limit.lower, limit.upper, limit.scale) == pytest.approx((-tolerance, tolerance, tolerance))
     assert (phase.t0.lower, phase.tf.lower, phase.tf.upper) == (0, 2000, 2000)
     for v in phase.controls:
         assert (v.lower, v.upper) == pytest.approx((0, 40 * deg) if "attack" in v.name else (-90 * deg, 1 * deg))
@@ -107,9 +107,12 @@ def test_the_objectives_have_the_units_of_the_paper():
     assert [(goal.unit, goal.sense) for goal in compiled.goals] == [
         ("deg", "maximize"), ("kBtu/ft2", "minimize"), ("rad", "minimize"), ("Btu/ft2/s", "minimize")
     ]  # fmt: skip
-    latitude, load_, turned, peak = math.radians(31.0), 112e3, 0.9, 145.0
+    latitude, load_, turned, peak, ends = math.radians(31.0), 112e3, 0.9, 145.0, [24000.0, 700.0, -0.09]
     # t0, tf, finals, integrals, peaks
-    assert np.array(compiled.objectives([0, 2000, latitude, load_, turned, peak], [])).ravel() == pytest.approx([-31, 112, 0.9, 145])
+    quantities = [0, 2000, *ends, latitude, load_, turned, peak]
+    assert np.array(compiled.objectives(quantities, [])).ravel() == pytest.approx([-31, 112, 0.9, 145])
+    errors = np.array(ends) - [24384.0, 762.0, math.radians(-5.0)]
+    assert np.array(compiled.constraints(quantities, [])).ravel() == pytest.approx(errors)
 
 
 def fly(rates, state: list[float], seconds: float) -> np.ndarray:
