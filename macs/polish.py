@@ -108,6 +108,7 @@ def _descend(state: SearchState, solves: Solves, exponent: float | None) -> Arch
         np.where(kept[:, None], found.F, archive.F),
         np.where(kept, found.violation, archive.violation),
     )
+    state.archive = _front(_joined(archive, waiting), ranges)  # should it end here
     ends = _ends(archive, ranges, solves)
     state.archive = _front(_joined(ends, archive), ranges)
     return waiting
@@ -122,16 +123,19 @@ def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     ranges = np.where(ranges > 0.0, ranges, ranges_of(state))
     known = _across((ends.F - ideal) / ranges)
     places = simplex_lattice(m, _divisions(m)) @ known
-    for _ in range(min(limit, solves.left)):
-        place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
-        reference = ideal + ranges * place
-        start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
-        found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
-        known = np.vstack([known, place])
-        if found.status[0] == CONVERGED:
-            known = np.vstack([known, _across((found.F - ideal) / ranges)])
-            pool = _joined(Archive(found.Z, found.F, found.violation), pool)
-    state.archive = _thinned(_front(pool, ranges), limit, exponent)
+    try:
+        for _ in range(min(limit, solves.left)):
+            place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+            reference = ideal + ranges * place
+            start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
+            found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
+            known = np.vstack([known, place])
+            if found.status[0] == CONVERGED:
+                known = np.vstack([known, _across((found.F - ideal) / ranges)])
+                pool = _joined(Archive(found.Z, found.F, found.violation), pool)
+    finally:
+        # Whatever ends it: what there is, is the front.
+        state.archive = _thinned(_front(pool, ranges), limit, exponent)
 
 
 def _across(y: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.archive import Archive
 from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
+from macs.monitor import Stopped
 from macs.polish import Solves, polish
 from macs.refinement import allowed
 from macs.search import SearchState, begin
@@ -158,6 +159,24 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
         polish(state, Solves(sphere, solves), 30)
         assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
         assert uncovered(state.archive.F, sphere) < 0.3
+
+
+def test_what_a_polish_that_is_stopped_has_found_is_the_front() -> None:
+    sphere, calls = Sphere(), []
+
+    def stop() -> None:
+        calls.append(None)
+        if len(calls) > 16:
+            raise Stopped("interrupted")
+
+    rng = np.random.default_rng(3)
+    state = state_of(sphere, np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.4, 0.5, (20, 2))]))
+    solve = sphere.refine
+    sphere.refine = lambda *rows: (stop(), solve(*rows))[1]  # type: ignore[method-assign]
+    with pytest.raises(Stopped):
+        polish(state, Solves(sphere, 200), 30)
+    found = state.archive.Z[:, 0] == 1.0
+    assert found.sum() > 8 and uncovered(state.archive.F[found], sphere) < 0.6
 
 
 def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_over() -> None:
