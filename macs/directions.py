@@ -8,6 +8,11 @@ from math import comb
 import numpy as np
 
 
+def across(y: np.ndarray) -> np.ndarray:
+    """Points (k, m) on the plane through the origin that is square to the diagonal, along which all objectives fall alike."""
+    return y - y.mean(axis=1, keepdims=True)
+
+
 def simplex_lattice(m: int, divisions: int) -> np.ndarray:
     """Points with coordinates that are multiples of 1/divisions and sum to 1, (comb(divisions + m - 1, m - 1), m) (Das and Dennis 1998)."""
     bars = np.array(list(combinations(range(divisions + m - 1), m - 1)), dtype=int).reshape(-1, m - 1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from problems.compiled import CompiledProblem
-from transcription.simulate import Simulation, simulate_all
+from transcription.simulate import simulate_all
 
 from .dominance import nondominated
 from .evaluation import CONVERGED, INFEASIBLE
@@ -20,10 +19,8 @@ if TYPE_CHECKING:
     from problems import Problem
 
 
-def flown(
-    front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str
-) -> tuple[Front, Sequence[Simulation]]:
-    """The front as flown, in the same order, and the flights; see `Front.flown`."""
+def flown(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
+    """The front as flown, in the same order; see `Front.flown`."""
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
     known = front.compiled()
@@ -42,7 +39,7 @@ def flown(
     found._violations = [dict(flight.violations) for flight in flights]
     found._trajectories = [flight.trajectory for flight in flights]
     found._problem, found.source = compiled, Source.of(compiled)
-    return found, flights
+    return found
 
 
 def judged(front: Front, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Front:

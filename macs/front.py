@@ -293,7 +293,7 @@ class Front:
         """
         from .flown import flown
 
-        return flown(self, problem, tolerance, rtol, atol, method)[0]
+        return flown(self, problem, tolerance, rtol, atol, method)
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.

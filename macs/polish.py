@@ -10,7 +10,7 @@ import numpy as np
 
 from . import archive as archives
 from .archive import Archive
-from .directions import simplex_lattice
+from .directions import across, simplex_lattice
 from .dominance import extremes, nondominated
 from .evaluation import CONVERGED, FAILED, Evaluation, Evaluator
 from .refinement import CURVE, SAME, keeps_promise, nearest, ranges_of, slack
@@ -121,7 +121,7 @@ def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     pool = _front(_joined(ends, state.archive), ranges_of(state))
     ideal, ranges = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     ranges = np.where(ranges > 0.0, ranges, ranges_of(state))
-    known = _across((ends.F - ideal) / ranges)
+    known = across((ends.F - ideal) / ranges)
     places = simplex_lattice(m, _divisions(m)) @ known
     try:
         for _ in range(min(limit, solves.left)):
@@ -131,16 +131,11 @@ def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | Non
             found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
             known = np.vstack([known, place])
             if found.status[0] == CONVERGED:
-                known = np.vstack([known, _across((found.F - ideal) / ranges)])
+                known = np.vstack([known, across((found.F - ideal) / ranges)])
                 pool = _joined(Archive(found.Z, found.F, found.violation), pool)
     finally:
         # Whatever ends it: what there is, is the front.
         state.archive = _thinned(_front(pool, ranges), limit, exponent)
-
-
-def _across(y: np.ndarray) -> np.ndarray:
-    """Points (k, m) on the plane that is square to the way down."""
-    return y - y.mean(axis=1, keepdims=True)
 
 
 def _divisions(m: int) -> int:

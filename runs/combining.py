@@ -60,7 +60,8 @@ def combine(
 
 def problems(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, CompiledProblem]:
     """The problems of what `combine` gave, by label."""
-    return {cell.problem: pickle.loads(payload[0])[0] for cell, payload in combined}
+    stated = {cell.problem: payload[0] for cell, payload in combined}
+    return {label: pickle.loads(payload)[0] for label, payload in stated.items()}
 
 
 def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:

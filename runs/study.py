@@ -119,10 +119,11 @@ class Study:
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
             combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms)
+            stated = combining.problems(combined) if self.goal is not None or self.nominal is not None else {}
             if self.goal is not None:
-                Goal.of(self.goal, combining.problems(combined))
+                Goal.of(self.goal, stated)
             if self.nominal is not None:
-                check_nominal(self.nominal, combining.problems(combined))
+                check_nominal(self.nominal, stated)
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 

@@ -22,7 +22,7 @@ import moocore
 import numpy as np
 
 from macs.descents import Descents
-from macs.directions import simplex_lattice
+from macs.directions import across, simplex_lattice
 from macs.dominance import nondominated
 from macs.evaluation import CONVERGED
 from macs.storage import write_whole
@@ -121,12 +121,12 @@ class Truth:
         ideal, ranges = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-6)
         lattice = simplex_lattice(4, DIVISIONS)
         middle = np.full((1, 4), 0.25)
-        places = projected(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
+        places = across(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
         tried = np.empty((0, 4))
         for _ in range(count):
             F = np.array([solved.F for solved in self.found])
             F = F[(F - ceiling <= 1e-9).all(axis=1)]
-            known = np.vstack([projected((F - ideal) / ranges), tried])
+            known = np.vstack([across((F - ideal) / ranges), tried])
             place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
             tried = np.vstack([tried, place])
             reference = ideal + ranges * place
@@ -172,11 +172,6 @@ def apart(F: np.ndarray) -> np.ndarray:
         if np.linalg.norm(y[kept] - y[k], axis=1).min() > ALIKE:
             kept.append(k)
     return np.sort(kept)
-
-
-def projected(y: np.ndarray) -> np.ndarray:
-    """Points (k, m) on the plane that is square to the way down."""
-    return y - y.mean(axis=1, keepdims=True)
 
 
 def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:

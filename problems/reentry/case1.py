@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LIMITS = Limits(heating_rate=200.0, dynamic_pressure=280.0, load_factor=2.5)
+REFERENCE = front.REFERENCE
 
 
 def problem(**data: Any) -> Problem:

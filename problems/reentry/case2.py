@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LIMITS = Limits(heating_rate=150.0, dynamic_pressure=250.0, load_factor=1.25)
+REFERENCE = front.REFERENCE
 
 
 def problem(**data: Any) -> Problem:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ZONES = (Zone(30.0, 7.5, 5.0), Zone(60.0, 15.0, 5.0), Zone(70.0, 20.0, 5.0))
+REFERENCE = front.REFERENCE
 
 
 def problem(**data: Any) -> Problem:

@@ -111,6 +111,12 @@ def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np
     return np.asarray(module.reference(), dtype=float)
 
 
+def called(case: str) -> tuple[str, bool]:
+    """What `closed_form` gives of a case, in words, and whether it is the truth: unless the case's `REFERENCE` says that it is less."""
+    what = getattr(room(case), "REFERENCE", None)
+    return (what, False) if what else ("the true front", True)
+
+
 def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
     """A front from a file: a saved one (.nc), or a table of objectives (.csv), such as `Front.to_csv` or another program writes.
 

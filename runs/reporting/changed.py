@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
     from problems.compiled import CompiledProblem
 
+TOLERANCE = 1e-2
+"""What a flight may violate where the study does not say how much counts."""
 MANY, FEW = 60, 4
 """How many points of a front are flown and drawn, and how many of them are told one by one."""
 NOMINAL: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": "black", "zorder": 3}
@@ -83,10 +85,12 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Changed:
-    """Tables and figures of all solvers and transcriptions; `nominal` is the label of the nominal problem."""
+    """Tables and figures of all solvers and transcriptions; `nominal` is the label of the nominal problem, and flights that violate nothing
+    by more than `tolerance`, in scales, count as feasible."""
 
     nominal: str
     changes: Sequence[Change]
+    tolerance: float
 
     def tables(self) -> dict[str, Table]:
         """Name of a file -> table."""
@@ -117,7 +121,8 @@ class Changed:
                 rows.append([one.transcription, one.solver, problem, len(front), int((front.status == CONVERGED).sum()), *told])
         notes = [
             f"Up to {MANY} points that stand for the union of all runs on {self.nominal}, flown with the same commands by an independent "
-            "integrator; feasible: within 1 % of each limit. A shift is against the same flight under the nominal data."
+            f"integrator; feasible: no limit is violated by more than {self.tolerance:g} of its scale. A shift is against the same flight "
+            "under the nominal data."
         ]
         return table(heads, rows, f"The front of {self.nominal} under changed data.", [*notes, *self._notes()])
 
@@ -152,10 +157,11 @@ def _columns(goals: Sequence[Any]) -> list[Column]:
     return [Column(goal.name, goal.unit, digits=5) for goal in goals]
 
 
-def changes(grounds: Sequence[Ground], nominal: str | None) -> list[Changed]:
+def changes(grounds: Sequence[Ground], nominal: str | None, verify: float | None = None) -> list[Changed]:
     """The nominal front of each solver and transcription, flown under the data of all other problems; nothing without a nominal problem."""
     if nominal is None:
         return []
+    tolerance = TOLERANCE if verify is None else verify
     labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
     cells = {
         (ground.place(solver), solver): None
@@ -164,11 +170,11 @@ def changes(grounds: Sequence[Ground], nominal: str | None) -> list[Changed]:
         for solver, runs in ground.runs.items()
         if runs
     }
-    found = [_change(grounds, *cell, labels) for cell in cells]
-    return [Changed(nominal, found)] if found else []
+    found = [_change(grounds, *cell, labels, tolerance) for cell in cells]
+    return [Changed(nominal, found, tolerance)] if found else []
 
 
-def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str]) -> Change:
+def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str], tolerance: float) -> Change:
     here = {
         ground.problem: ground.fronts[solver] for ground in grounds if ground.runs.get(solver) and ground.place(solver) == transcription
     }
@@ -181,7 +187,7 @@ def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: 
         problems = {label: _problem(grounds, label) for label in labels}
     except ValueError as error:
         return Change(transcription, solver, union, note=f"nothing was flown: {error}")
-    return Change(transcription, solver, union, {label: some.flown(problem) for label, problem in problems.items()})
+    return Change(transcription, solver, union, {label: some.flown(problem, tolerance=tolerance) for label, problem in problems.items()})
 
 
 def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:

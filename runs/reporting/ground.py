@@ -10,7 +10,7 @@ from typing import Any
 from macs.front import Front
 
 from ..making.work import CRASHED, MEMORY, TIMEOUT
-from ..measures.references import closed_form, foreign, read, union
+from ..measures.references import called, closed_form, foreign, read, union
 from ..store import Run, Store
 from .verified import Verified
 
@@ -108,14 +108,16 @@ class Ground:
             source = self.known.source
             try:
                 known = closed_form(source.address, source.data) if source is not None else closed_form("")
-                return Reference(foreign(known, self.known.goals, "truth"), "the true front", True)
+                what, true = called(source.address if source is not None else "")
+                return Reference(foreign(known, self.known.goals, "truth"), what, true)
             except ValueError:
                 if given is not None:
                     raise
                 return self.union()
         if Path(given).suffix in (".nc", ".csv"):
             return Reference(read(given, self.known.goals), str(given), False)
-        return Reference(foreign(closed_form(given), self.known.goals, "truth"), f"the true front of {given}", True)
+        what, true = called(given)
+        return Reference(foreign(closed_form(given), self.known.goals, "truth"), f"{what} of {given}", true)
 
 
 def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]:

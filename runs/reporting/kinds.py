@@ -166,9 +166,9 @@ def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Fig
         if not told:
             continue
         figures: dict[str, Cell] = {}
+        runs_in_all = len(told) + ground.failures.get(solver, 0)
         for key in ("first_feasible", "all_feasible"):
             reached = [one[key] for one in told if one[key] is not None]
-            runs_in_all = len(told) + ground.failures.get(solver, 0)
             figures[key] = float(np.mean(reached)) if reached else None
             # A run that failed, or never got there, is later than any other.
             middle = float(np.median([*reached, *[np.inf] * (runs_in_all - len(reached))]))

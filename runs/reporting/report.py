@@ -100,7 +100,10 @@ def report(
     sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
     for ground in _told(found) if progress else found:
         sections += _section(ground, store.definition, writer, figures)
-    across: list[Attained | Changed] = [*attained(found, store.definition.get("goal")), *changes(found, store.definition.get("nominal"))]
+    across: list[Attained | Changed] = [
+        *attained(found, store.definition.get("goal")),
+        *changes(found, store.definition.get("nominal"), store.definition.get("verify")),
+    ]
     for part in across:
         sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
