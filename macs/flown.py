@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, Limit, Variable
+from transcription.sampling import excess
 from transcription.simulate import simulate_all
 
 from .dominance import nondominated
@@ -17,6 +19,7 @@ from .source import Source
 
 if TYPE_CHECKING:
     from problems import Problem
+    from transcription.trajectory import Trajectory
 
 
 def flown(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
@@ -32,13 +35,36 @@ def flown(front: Front, problem: Problem | CompiledProblem | None, tolerance: fl
     missing = [point.index for point in front if point.trajectory is None]
     if missing:
         raise ValueError(f"point {missing[0]} has no trajectory to fly: its status is '{front[missing[0]].status}'")
-    flights = simulate_all(compiled, [p.trajectory for p in front if p.trajectory is not None], rtol=rtol, atol=atol, method=method)
+    planned = [point.trajectory for point in front if point.trajectory is not None]
+    flights = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
+    violations = [{**flight.violations, **_decided(plan, compiled)} for flight, plan in zip(flights, planned, strict=True)]
     signs = compiled.signs
     F = np.array([list(flight.objectives.values()) for flight in flights]).reshape(len(front), len(signs)) * signs
-    found = judged(front, F, np.array([flight.violation for flight in flights]), tolerance)
-    found._violations = [dict(flight.violations) for flight in flights]
+    found = judged(front, F, np.array([max(one.values(), default=0.0) for one in violations]), tolerance)
+    found._violations = violations
     found._trajectories = [flight.trajectory for flight in flights]
     found._problem, found.source = compiled, Source.of(compiled)
+    return found
+
+
+def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
+    """By how much, scaled, what a trajectory decides is outside the bounds of a problem, which need not be its own: times, initial states,
+    controls at the nodes, parameters."""
+    found: dict[str, float] = {}
+
+    def look(values: Any, limits: Sequence[Variable | Limit], where: str) -> None:
+        amounts = excess(np.atleast_2d(values), limits)
+        found.update({f"{where}{v.name}": float(amount) for v, amount in zip(limits, amounts, strict=True)})
+
+    for phase in problem.phases:
+        flight = planned[phase.name]
+        duration = Limit("duration", *phase.duration, phase.tf.scale)
+        look([flight.t0, flight.tf, flight.tf - flight.t0], [phase.t0, phase.tf, duration], f"bounds of {phase.name}.")
+        starts = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.initial, strict=True)]
+        look(flight.edge_states[0], starts, f"initial value of {phase.name}.")
+        free = [k for k, v in enumerate(phase.controls) if not v.period]
+        look(flight.controls[:, free], [phase.controls[k] for k in free], f"bounds of {phase.name}.")
+    look([planned.parameters[v.name] for v in problem.parameters], problem.parameters, "bounds of ")
     return found
 
 

@@ -276,7 +276,8 @@ class Front:
             Fly them under other data, such as another mass: a problem with the same phases, variables and objectives. Each flight begins
             where it began here, and its controls are as functions of time what they were. Default: the front's own.
         tolerance : float
-            How much a flight may violate, in the constraints' scales, and still count as converged.
+            How much a flight may violate, in the constraints' scales, and still count as converged; times, initial states, parameters and
+            controls at the nodes included, which may be outside the bounds of another problem.
         rtol, atol, method
             Of the integrator; see `Point.simulate`.
 

@@ -11,13 +11,13 @@ from problems import Problem
 from transcription import DFET, SingleShooting
 
 
-def push(mass: float = 2.0, unit: str = "m", drag: float = 0.0, **more) -> Problem:
+def push(mass: float = 2.0, unit: str = "m", drag: float = 0.0, most: float = 2.0, end: float = 4.0, start: float = 0.0, **more) -> Problem:
     """v' = u / mass, from rest: under a constant u on each second, everything is a sum."""
     problem = Problem("push")
-    phase = problem.phase("run", t0=0.0, tf=4.0)
-    x = phase.state("x", bounds=(0, 100), initial=0, unit=unit)
+    phase = problem.phase("run", t0=0.0, tf=end)
+    x = phase.state("x", bounds=(0, 100), initial=start, unit=unit)
     v = phase.state("v", bounds=(0, 50), initial=0)
-    u = phase.control("u", bounds=(0, 2))
+    u = phase.control("u", bounds=(0, most))
     phase.dynamics(x=v, v=u / mass - drag * v)
     for name, upper in more.items():
         phase.path(name, v, upper=upper, scale=1.0)
@@ -111,3 +111,15 @@ def test_where_nothing_holds_the_merged_front_says_what_is_violated(front):
     merged = Front.merge([front.flown(push(gate=-1.0), tolerance=1e-3)])
     assert not len(merged) and merged.closest is not None
     assert "the nearest violates path 'gate' of 'run' by " in merged.message
+
+
+@pytest.mark.parametrize(
+    ("data", "what", "amount"),
+    [({"end": 3.0}, "bounds of run.tf", 1.0), ({"start": 50.0}, "initial value of run.x", 0.5), ({"most": 0.01}, "bounds of run.u", None)],
+)
+def test_what_was_decided_has_to_be_within_the_other_bounds(front, data, what, amount):
+    other = front.flown(push(**data))
+    assert set(other.status) == {"infeasible"}
+    for point in other:
+        thrust = point.trajectory["run"].control.coefficients
+        assert point.violations[what] == pytest.approx((thrust.max() - 0.01) / 0.01 if amount is None else amount)
