@@ -77,7 +77,7 @@ class Assembly:
             g_labels=tuple(rows.labels),
             guess=self.guess(),
             profiles=self.profiles(),
-            first_guess=self.first_guess,
+            guessed=self.guessed,
             reduced=self._reduced(z, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
@@ -117,14 +117,14 @@ class Assembly:
                     found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
         return tuple(found)
 
-    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
-        """See `NLP.first_guess`."""
+    def guessed(self, candidates: np.ndarray) -> np.ndarray:
+        """See `NLP.guessed`."""
         Z = np.zeros((len(candidates), len(self.layout.variables)))
         Z[:, self.layout.free] = candidates
         extended = self.layout.extended(Z)
         for writer in self._writers.values():
             writer.guess(extended)
-        return self.tighten(extended[:, : Z.shape[1]])
+        return extended[:, : Z.shape[1]]
 
     def _filled(self, function: ca.Function) -> ca.Function:
         """A Function of the variables alone from one of these and the hidden quantities."""

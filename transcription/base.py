@@ -93,8 +93,9 @@ class NLP:
         What the user guessed of the free variables; NaN where nothing.
     profiles : tuple of Profile
         Which of the free variables are the controls, and where in time.
-    first_guess : callable
-        Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value.
+    guessed : callable
+        Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value;
+        peaks and absolute values are 0.
     reduced : Reduced
         What propagation leaves to satisfy, as functions of the free variables alone.
     tighten : callable
@@ -117,7 +118,7 @@ class NLP:
     g_labels: tuple[str, ...]
     guess: np.ndarray
     profiles: tuple[Profile, ...]
-    first_guess: Callable[[np.ndarray], np.ndarray]
+    guessed: Callable[[np.ndarray], np.ndarray]
     reduced: Reduced
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
@@ -147,6 +148,10 @@ class NLP:
     def period(self) -> np.ndarray:
         """Periods (n,); 0 where a variable has none."""
         return np.array([v.period or 0.0 for v in self.variables])
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        """What is `guessed` of candidates (k, d), with the peaks that belong to it: vectors (k, n) for a solver to begin from."""
+        return self.tighten(self.guessed(candidates))
 
     def march(self, Z: np.ndarray) -> np.ndarray:
         """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
@@ -203,8 +208,12 @@ class NLP:
         residuals = np.empty((len(Z), n + g.shape[1]))
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore"):
-            np.maximum(self.lower - Z, Z - self.upper, out=residuals[:, :n])
-            np.maximum(self.g_lower - g, g - self.g_upper, out=residuals[:, n:])
+            for part, values, lower, upper in (
+                (residuals[:, :n], Z, self.lower, self.upper),
+                (residuals[:, n:], g, self.g_lower, self.g_upper),
+            ):
+                np.subtract(values, upper, out=part)
+                np.maximum(part, lower - values, out=part)
             residuals /= self._scales
         return residuals
 

@@ -22,7 +22,7 @@ LONG = 20_000
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
 WORTH = 24
-"""Calls from which on a whole block of wide ones takes less time."""
+"""Calls of a block of so many from which on all of them, by a wide Function, take less time."""
 
 log = logging.getLogger(__name__)
 
@@ -40,13 +40,15 @@ class Batched:
     compiled : bool
         Whether it may be compiled; not where it has a rootfinder or the like.
     wide : callable, optional
-        k -> what `function.map(k)` is, to the last bit, but faster. It is asked for one number of calls only, which must pay.
+        k -> what `function.map(k)` is, to the last bit, but faster. It is asked for one number of calls only, that into which the first
+        large batch divides evenly: batches are mostly of one size.
     """
 
     def __init__(self, function: ca.Function, *, compiled: bool = True, wide: Callable[[int], ca.Function] | None = None) -> None:
         self._function, self._wide = function, wide
         self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
+        self._width = 0
         self._may_compile = compiled and compiler() is not None
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
         self._work, self._each, self._length = 0, work(function), _length(function)
@@ -70,13 +72,16 @@ class Batched:
         return outputs
 
     def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
-        if self._wide and k % BLOCK and k % BLOCK >= WORTH:
+        if self._wide and not self._width and k >= WORTH:
+            self._width = -(-k // -(-k // BLOCK))
+        most = self._width or BLOCK
+        if self._wide and k % most and k % most * BLOCK >= WORTH * most:
             # Fill the last block up, and leave out what is too much again.
-            filled = [np.concatenate([values, np.repeat(values[-len(values) // k :], BLOCK - k % BLOCK, axis=0)]) for values in arrays]
-            return [values[:k] for values in self._evaluate(filled, k + BLOCK - k % BLOCK)]
+            filled = [np.concatenate([values, np.repeat(values[-len(values) // k :], most - k % most, axis=0)]) for values in arrays]
+            return [values[:k] for values in self._evaluate(filled, k + most - k % most)]
         outputs = [np.empty((k, size)) for size in self._sizes]
-        for first in range(0, k, BLOCK):
-            last = min(first + BLOCK, k)
+        for first in range(0, k, most):
+            last = min(first + most, k)
             buffer, evaluate = self._block(last - first)
             for i, values in enumerate(arrays):
                 if values.size:
@@ -92,7 +97,7 @@ class Batched:
 
     def _block(self, size: int) -> tuple[Any, Callable[[], None]]:
         if size not in self._blocks:
-            wide = self._wide if size == BLOCK else None
+            wide = self._wide if size == self._width else None
             self._blocks[size] = (self._function if size == 1 else wide(size) if wide else self._function.map(size)).buffer()
         return self._blocks[size]
 
@@ -101,15 +106,15 @@ class Batched:
         self._may_compile = False
         if self._length > LONG:
             return
-        interpreted, blocks = self._function, self._blocks
-        library = _library(interpreted)
+        interpreted = self._function, self._blocks, self._wide, self._width
+        library = _library(self._function)
         if library is None:
             return
-        self._function, self._blocks, wide, self._wide = library, {}, self._wide, None
+        self._function, self._blocks, self._wide, self._width = library, {}, None, 0
         found = self._evaluate(arrays, len(arrays[0]))
         if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(found, expected, strict=True)):
-            log.info("%s: compiled values differ in the last bits; it stays interpreted", interpreted.name())
-            self._function, self._blocks, self._wide = interpreted, blocks, wide
+            self._function, self._blocks, self._wide, self._width = interpreted
+            log.info("%s: compiled values differ in the last bits; it stays interpreted", self._function.name())
 
 
 def compiler() -> str | None:

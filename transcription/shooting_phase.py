@@ -79,13 +79,13 @@ class ShootingPhase(PhaseWriter):
 
     def guess(self, extended: np.ndarray) -> None:
         """See `PhaseWriter.guess`."""
-        t0, tf, share = extended[:, self.ends.t0], extended[:, self.ends.tf], self.mesh.places[self.mesh.ends][1:]
+        t0, tf, share = extended[:, self.ends.t0], extended[:, self.ends.tf], self.mesh.places[self._shots][1:]
         slots = self._arrivals
         for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
             start = extended[:, self.ends.initial[i]]
             end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
             given = self.phase.guesses.get(state.name)
-            values = (line(start, end, share) if given is None else along(given, t0, tf, share))[:, -len(slots) :]
+            values = line(start, end, share) if given is None else along(given, t0, tf, share)
             self._layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
             self._layout.write(extended, slots[-1:, i], np.clip(extended[:, slots[-1:, i]], *final))
 

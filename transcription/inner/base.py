@@ -74,9 +74,9 @@ class InnerSolver(ABC):
 
 
 def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.ndarray:
-    """Vectors (k, n) to start from: the candidates with the states of `warm`, or with a first guess."""
+    """Vectors (k, n) to start from: the candidates with the states of `warm`, or with guessed ones; peaks need not fit to these."""
     if warm is None:
-        return nlp.first_guess(candidates)
+        return nlp.guessed(candidates)
     Z = np.array(warm, dtype=float)
     Z[:, nlp.free] = candidates
     return Z

@@ -54,7 +54,7 @@ class Ipopt(InnerSolver):
         flown, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
         (`stopping`), what is left of the batch is not solved, and has the status "timeout".
         """
-        start = started(nlp, candidates, warm)
+        start = nlp.tighten(started(nlp, candidates, warm))
         Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
         _, violation = nlp.evaluate(Z)
         again = np.flatnonzero(~(violation <= tolerance) & (said != TIMEOUT))
