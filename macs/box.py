@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,15 @@ class Box:
         """The step (..., d) from `origin` to X, the short way round where periodic."""
         step = X - origin
         return np.where(self.wraps, step - np.round(step), step) if self.wraps.any() else step
+
+    def nearest(self, X: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Which of `others` (n, d) is nearest to each of X (k, d), the short way round where periodic: indices (k,)."""
+        even = ~self.wraps
+        squares = cdist(X[:, even], others[:, even], "sqeuclidean") if even.any() else np.zeros((len(X), len(others)))
+        for column in np.flatnonzero(self.wraps):
+            step = X[:, None, column] - others[:, column]
+            squares += (step - np.round(step)) ** 2
+        return squares.argmin(axis=1)
 
     def stop_outward(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
         """`step` (..., d) without the components that push a point on a bound out of the box."""

@@ -19,6 +19,7 @@ from .layout import Layout
 from .phase_mesh import PhaseMesh
 from .phase_writer import Ends, PhaseWriter, Rows, Written
 from .polynomials import gauss_legendre
+from .sampling import looked_at
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
 
 
@@ -162,14 +163,14 @@ class DFETPhase(PhaseWriter):
         states = np.vstack([(tables.flown(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
         inner = (tables.control(points) @ control.coefficients).reshape(len(time) - 1, len(phase.controls))
         controls = wrapped(np.vstack([inner, control.ends()[1][-1:]]), phase.controls)
-        paths = np.array(phase.path(states.T, controls.T, time[None], s)).T
+        paths, _ = looked_at(phase, states, controls, time, s)
         return PhaseTrajectory(
             name=phase.name,
             time_unit=phase.time_unit,
             time=time,
             states=states,
             controls=controls,
-            paths=paths.reshape(len(time), len(phase.paths)),
+            paths=paths,
             state=PiecewisePolynomial(edges, closed, "closed-legendre"),
             control=control,
             state_variables=phase.states,

@@ -152,8 +152,7 @@ def _coefficients(flown: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
     for piece, variables in ((flown.control, flown.control_variables), (flown.state, flown.state_variables)):
         k = piece.coefficients.shape[1]
         tau = gauss_legendre(k)[0]
-        values = np.array([piece.on_element(j, tau) for j in range(len(piece.edges) - 1)])
-        found.append(legendre_coefficients(values) / np.array([v.span for v in variables]))
+        found.append(legendre_coefficients(piece.on_elements(tau)) / np.array([v.span for v in variables]))
     # States pass through the stages and both ends of an element, but by collocation their degree is one less: the last is always 0.
     return found[0], found[1][:, :-1]
 

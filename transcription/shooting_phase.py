@@ -12,13 +12,14 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from .base import CHAIN
-from .batched import work
+from .batched import Batched, work
 from .control_law import ControlLaw
 from .dfet_element import wrapped_controls
 from .guess import along, line
 from .layout import Layout
 from .phase_writer import Ends, PhaseWriter, Rows, Written
 from .polynomials import basis_matrix, lobatto_nodes
+from .sampling import looked_at
 from .shooting_step import Step
 from .step_mesh import StepMesh
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
@@ -137,29 +138,28 @@ class ShootingPhase(PhaseWriter):
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, k = self.phase, self.law.degree + 1
-        C, states = (np.array(values) for values in self._flight(extended))
+        C, states = (values[0] for values in self._flight(extended[None]))
         s = extended[self._layout.index(self.ends.statics)]
         edges = s[0] + (s[1] - s[0]) * self.mesh.places
-        control = PiecewisePolynomial(edges, C.T.reshape(self.mesh.steps, k, len(phase.controls)), "lobatto")
-        table = states.T.reshape(self.mesh.steps, -1, len(phase.states))
+        control = PiecewisePolynomial(edges, C.reshape(self.mesh.steps, k, len(phase.controls)), "lobatto")
+        table = states.reshape(self.mesh.steps, -1, len(phase.states))
         B = extended[self._layout.index(self.B)].reshape(self.B.shape)
         shots = self._shots
         table[shots[:-1], 0], table[shots[1:] - 1, -1] = B[:-1], B[1:]
         state = PiecewisePolynomial(edges, table, "lobatto")
         inside = 2.0 * np.array([place for place in self.step.points if place < 1.0]) - 1.0
         time = np.append((edges[:-1, None] + 0.5 * (1.0 + inside) * np.diff(edges)[:, None]).ravel(), edges[-1])
-        every = range(self.mesh.steps)
-        nodes = np.vstack([*(state.on_element(j, inside) for j in every), B[-1:]])
-        controls = np.vstack([*(control.on_element(j, inside) for j in every), control.ends()[1][-1:]])
+        nodes = np.vstack([*state.on_elements(inside), B[-1:]])
+        controls = np.vstack([*control.on_elements(inside), control.ends()[1][-1:]])
         controls = wrapped(controls, phase.controls)
-        paths = np.array(phase.path(nodes.T, controls.T, time[None], s)).T
+        paths, _ = looked_at(phase, nodes, controls, time, s)
         return PhaseTrajectory(
             name=phase.name,
             time_unit=phase.time_unit,
             time=time,
             states=nodes,
             controls=controls,
-            paths=paths.reshape(len(time), len(phase.paths)),
+            paths=paths,
             state=state,
             control=control,
             state_variables=phase.states,
@@ -173,14 +173,15 @@ class ShootingPhase(PhaseWriter):
         return self.B[1:] if self.apart else self.B[-1:]
 
     @cached_property
-    def _flight(self) -> ca.Function:
-        """Extended vector -> (coefficients of the controls, states (nx, N (order + 1)) at Gauss-Lobatto nodes of the steps)."""
+    def _flight(self) -> Batched:
+        """Extended vectors -> coefficients (N, degree + 1, nu) of the controls and states (N, order + 1, nx) at Gauss-Lobatto nodes of the
+        steps, both flat."""
         extended = ca.MX.sym("extended", self._layout.total)
         inputs, left = self._inputs(extended), self._layout.pick(extended, self.B[:-1])
         before = [part for j, (states, *_) in enumerate(self._shots_flown(extended)) for part in (left[:, j], states[:, :-1])]
         places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
         states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
-        return ca.Function("unpacked", [extended], [inputs[0], states])
+        return Batched(ca.Function("unpacked", [extended], [ca.densify(inputs[0]), ca.densify(states)]), compiled=self.compilable)
 
     def _inputs(self, extended: ca.MX, first: int = 0, last: int | None = None) -> tuple[ca.MX, ...]:
         """What else goes into the steps, or some of them, side by side: coefficients of the controls, starts, lengths, and s."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
-from .base import expanded
 from .flying import METHODS, Arcs
-from .sampling import DENSE, excess
+from .sampling import DENSE, excess, looked_at
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
@@ -207,12 +204,10 @@ def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray
     """What is to be known of a flown phase, of which there are states and integrals (N, len(DENSE), ny) on its elements."""
     edges, nx = planned.state.edges, len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
-    times = np.concatenate([edges[j] + 0.5 * (1.0 + DENSE) * (edges[j + 1] - edges[j]) for j in range(len(elements))])
+    times = (edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]).ravel()
     states = elements[:, :, :nx].reshape(-1, nx)
-    controls = np.concatenate([planned.controls_on(j, DENSE) for j in range(len(elements))])
-    inputs = states.T, controls.T, times[None], s
-    path, peak = _looked_at(phase)
-    paths = np.array(path(*inputs)).T.reshape(len(times), len(phase.paths))
+    controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
+    paths, peaks = looked_at(phase, states, controls, times, s)
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
     trajectory = replace(
@@ -223,17 +218,10 @@ def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray
         paths=paths[kept],
         state=PiecewisePolynomial(edges, elements[:, :, :nx], "lobatto"),
     )
-    peaks = np.array(peak(*inputs)).max(axis=1, initial=-np.inf) if phase.peaks.size1_out(0) else []
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
-    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks])
+    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks.max(axis=0)])
     return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
-
-
-@lru_cache(maxsize=64)
-def _looked_at(phase: CompiledPhase) -> tuple[ca.Function, ca.Function]:
-    """Path constraints and peaks, fast."""
-    return expanded(phase.path), expanded(phase.peaks)
 
 
 def _or_infinite(value: float) -> float:

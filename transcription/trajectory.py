@@ -44,9 +44,13 @@ class PiecewisePolynomial:
         """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]
 
+    def on_elements(self, tau: np.ndarray) -> np.ndarray:
+        """The same on every element, shape (N, len(tau), k)."""
+        return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients
+
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Values (N, k) at the beginning and at the end of each element, also where elements have no length."""
-        ends = basis_matrix(self.basis, self.coefficients.shape[1] - 1, np.array([-1.0, 1.0])) @ self.coefficients
+        ends = self.on_elements(np.array([-1.0, 1.0]))
         return ends[:, 0], ends[:, 1]
 
 
@@ -101,6 +105,10 @@ class PhaseTrajectory:
     def controls_on(self, j: int, tau: np.ndarray) -> np.ndarray:
         """Controls (len(tau), nu) on element `j` at local coordinates `tau` in [-1, 1], within the bounds of those that are periodic."""
         return wrapped(self.control.on_element(j, tau), self.control_variables)
+
+    def controls_on_elements(self, tau: np.ndarray) -> np.ndarray:
+        """The same on every element, shape (N, len(tau), nu)."""
+        return wrapped(self.control.on_elements(tau), self.control_variables)
 
     def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
         """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.

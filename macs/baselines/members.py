@@ -67,9 +67,7 @@ def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.nd
     if members.Z.shape[1] == len(free) or not usable.size:
         return evaluator.first_guess(X)
     box, Z = box_of(evaluator), members.Z[usable]
-    there = box.to_unit(Z[:, free])
-    # One by one: all differences at once would not fit into any cache.
-    vectors = Z[[int(np.argmin((box.difference(x, there) ** 2).sum(axis=1))) for x in box.to_unit(X)]]
+    vectors = Z[box.nearest(box.to_unit(X), box.to_unit(Z[:, free]))]
     vectors[:, free] = X
     return vectors
 
