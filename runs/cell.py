@@ -41,9 +41,14 @@ class Cell:
         return self.problem, self.transcription, self.solver
 
     @property
+    def terms(self) -> Mapping[str, Any]:
+        """What its solver, or its problem, has of its own where the study says something else or nothing; see `terms`. Plain data."""
+        return self.details.get("terms", {})
+
+    @property
     def apart(self) -> bool:
         """Whether its solver works on a transcription of its own, unlike the other solvers of the study."""
-        return "transcription" in self.details.get("terms", {})
+        return "transcription" in self.terms
 
     @property
     def name(self) -> str:
