@@ -123,7 +123,8 @@ class Study:
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
             )
             stated = combining.problems(combined) if self.goal is not None or self.nominal is not None or self.paper else {}
-            check_against(self.paper, stated, combining.solvers(combined))
+            if self.paper:
+                check_against(self.paper, stated, combining.solvers(combined))
             if self.goal is not None:
                 Goal.of(self.goal, stated)
             if self.nominal is not None:

@@ -149,6 +149,12 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     assert set(studyfile.names()) >= {"goddard-table3", "orbit-table3", "orbit-full-table3"}
 
 
+@pytest.mark.parametrize("name", studyfile.names())
+def test_each_study_there_is_makes_sense_whole_and_quick(name):
+    study = Study.load(name)
+    assert (study.name, study.quick().name) == (name, f"{name}-quick") and study.description == studyfile.describe(name)
+
+
 def test_studies_of_the_parameters_of_the_reentry(capsys):
     assert main(["list"]) == 0
     said = capsys.readouterr().out
