@@ -42,7 +42,7 @@ class Cell:
 
     @property
     def terms(self) -> Mapping[str, Any]:
-        """What its runs have instead of what the study says of all: its solver's terms, and what its problem says where the study does not."""
+        """What its runs have instead of what the study says: its solver's terms, and what its problem says where the study does not."""
         return self.details.get("terms", {})
 
     @property
