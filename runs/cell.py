@@ -41,9 +41,14 @@ class Cell:
         return self.problem, self.transcription, self.solver
 
     @property
+    def terms(self) -> Mapping[str, Any]:
+        """What its runs have instead of what the study says: its solver's terms, and what its problem says where the study does not."""
+        return self.details.get("terms", {})
+
+    @property
     def apart(self) -> bool:
         """Whether its solver works on a transcription of its own, unlike the other solvers of the study."""
-        return "transcription" in self.details.get("terms", {})
+        return "transcription" in self.terms
 
     @property
     def name(self) -> str:

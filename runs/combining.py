@@ -18,10 +18,17 @@ from .cell import Cell
 from .making.work import Payload
 from .studyfile import plain, told
 from .terms import check as check_terms
+from .terms import of_problem
 
 
 def combine(
-    problems: Any, transcriptions: Any, solvers: Any, evaluations: Any, terms: Mapping[str, Mapping[str, Any]]
+    problems: Any,
+    transcriptions: Any,
+    solvers: Any,
+    evaluations: Any,
+    terms: Mapping[str, Mapping[str, Any]],
+    inner: str | None,
+    start: Any,
 ) -> list[tuple[Cell, Payload]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
 
@@ -35,6 +42,8 @@ def combine(
     combined = []
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
+        with told(f"problems: '{label}'"):
+            theirs = of_problem(problem, inner, start)
         common = [one for one in methods if "transcription" not in terms.get(one, {})]
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         offered += [
@@ -46,7 +55,7 @@ def combine(
         for scheme_label, scheme, method_labels in offered:
             stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
             for method_label in method_labels:
-                method, own = methods[method_label], dict(terms.get(method_label, {}))
+                method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
                 place = f"{label}, {scheme_label}, {method_label}"
                 with told(place):
                     method.check_objectives(len(compiled.goals))
@@ -62,6 +71,11 @@ def problems(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, CompiledProb
     """The problems of what `combine` gave, by label."""
     stated = {cell.problem: payload[0] for cell, payload in combined}
     return {label: pickle.loads(payload)[0] for label, payload in stated.items()}
+
+
+def solvers(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, Solver]:
+    """The solvers of what `combine` gave, by label."""
+    return {label: pickle.loads(payload) for label, payload in {cell.solver: payload[1] for cell, payload in combined}.items()}
 
 
 def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:

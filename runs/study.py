@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,9 @@ from .cell import Cell
 from .reporting.changed import check as check_nominal
 from .reporting.goal import Goal
 from .reporting.published import check as check_paper
+from .reporting.published import check_against
 from .store import Store, Summary
-from .terms import check_inner, sampling
+from .terms import INNER, check_inner, sampling, written
 
 if TYPE_CHECKING:
     from .reporting.report import Report
@@ -55,13 +56,13 @@ class Study:
         The one that all seeds are spawned from.
     reference : optional
         What reports measure fronts against; see `report`.
-    inner : str, default "auto"
-        The inner level, by name.
+    inner : str, optional
+        The inner level, by name. Default: the problem's own, which mostly is "auto".
     tolerance : float, default 1e-6
         As for `solve`.
     start : "uniform", "smooth", Smooth or mapping, optional
-        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: each
-        variable by itself, after the problem's guess.
+        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: the
+        problem's own, or else each variable by itself, after the problem's guess.
     verify : float, optional
         Fly the points of each run's front, see `Front.flown`, and have reports count only those that violate nothing by more than this, in
         the constraints' scales, with their objectives as flown. Default: points are what the solver says.
@@ -97,7 +98,7 @@ class Study:
     runs: int
     seed: int
     reference: Any = None
-    inner: str = "auto"
+    inner: str | None = None
     tolerance: float = 1e-6
     start: Any = None
     verify: float | None = None
@@ -118,8 +119,12 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with studyfile.told(f"study '{self.name}'"):
             self._check_values()
-            combined = combining.combine(self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms)
-            stated = combining.problems(combined) if self.goal is not None or self.nominal is not None else {}
+            combined = combining.combine(
+                self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
+            )
+            stated = combining.problems(combined) if self.goal is not None or self.nominal is not None or self.paper else {}
+            if self.paper:
+                check_against(self.paper, stated, combining.solvers(combined))
             if self.goal is not None:
                 Goal.of(self.goal, stated)
             if self.nominal is not None:
@@ -136,7 +141,9 @@ class Study:
         ValueError
             There is no such study, the file is not TOML, or a key or value in it makes no sense; the message names it.
         """
-        return cls(**studyfile.read(source))
+        given = studyfile.read(source)
+        with studyfile.told(str(source)):
+            return cls(**given)
 
     def run(
         self,
@@ -204,11 +211,11 @@ class Study:
 
     def inner_of(self, cell: Cell) -> str:
         """The inner level of a cell's runs, by name."""
-        return self.terms.get(cell.solver, {}).get("inner", self.inner)
+        return self._terms(cell).get("inner", self.inner or INNER)
 
     def sampling_of(self, cell: Cell) -> Smooth | str | None:
         """What `solve` gets as its `start` in a cell's runs."""
-        return sampling(self.terms.get(cell.solver, {}).get("start", self.start))
+        return sampling(self._terms(cell).get("start", self.start))
 
     def quick(self) -> Study:
         """The same, to see that it works, within a minute: two runs, or one where there are many cells, of at most 500 evaluations.
@@ -230,15 +237,14 @@ class Study:
 
     def definition(self) -> dict[str, Any]:
         """All that decides the numbers, and what reports print, as plain data."""
-        start = sampling(self.start)
         return {
             "name": self.name,
             "description": self.description,
             "seed": int(self.seed),
             "runs": int(self.runs),
-            "inner": self.inner,
+            "inner": self.inner or INNER,
             "tolerance": float(self.tolerance),
-            "start": asdict(start) if isinstance(start, Smooth) else start,
+            "start": written(self.start),
             "verify": self.verify,
             "time_limit": self.time_limit,
             "reference": studyfile.plain(self.reference),
@@ -250,6 +256,10 @@ class Study:
             "cells": [cell.to_dict() for cell in self.cells],
         }
 
+    def _terms(self, cell: Cell) -> dict[str, Any]:
+        """What a cell's runs have of their own: the problem's inner level and start where the study names none, and the solver's terms."""
+        return {**cell.terms, **self.terms.get(cell.solver, {})}
+
     def _check_values(self) -> None:
         check_count("runs", self.runs, 1)
         check_count("seed", self.seed, 0)
@@ -258,7 +268,8 @@ class Study:
             if getattr(self, name) is not None:
                 check_positive(name, getattr(self, name))
         sampling(self.start)
-        check_inner(self.inner)
+        if self.inner is not None:
+            check_inner(self.inner)
         check_paper(self.paper)
         if not isinstance(self.flights, bool):
             raise ValueError(f"flights must be True or False, not {self.flights!r}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -105,6 +106,11 @@ def _placed(one: Any, folder: Path) -> Any:
 def plain(data: Any) -> Any:
     """`data` as it comes back from JSON; what JSON does not know, as its `repr`."""
     return json.loads(json.dumps(data, default=lambda one: one.tolist() if hasattr(one, "tolist") else repr(one)))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, and finite."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 @contextmanager

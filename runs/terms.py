@@ -1,11 +1,14 @@
-"""On what terms a solver works in a study: those of all, or its own."""
+"""On what terms a solver works in a study: those of all, its own, or those of the problem where the study says nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import asdict
 from typing import Any
 
 from macs.inputs import check_count, drawing, unknown
+from problems import Problem
+from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED
 
@@ -13,6 +16,8 @@ from .studyfile import told
 
 TERMS = ("transcription", "evaluations", "inner", "start")
 """What a solver may work with instead of what the others do."""
+INNER = "auto"
+"""The inner level where nobody names one."""
 
 
 def check(terms: Any, solvers: Collection[str]) -> None:
@@ -41,6 +46,22 @@ def _check_own(own: Any) -> None:
     sampling(own.get("start"))
 
 
+def of_problem(problem: Problem | CompiledProblem, inner: str | None, start: Any) -> dict[str, Any]:
+    """The inner level and start of a problem's own, where a study names none and they are not what solvers do anyway: plain data.
+
+    Raises ValueError if they make no sense. A compiled problem has none.
+    """
+    found: dict[str, Any] = {}
+    if isinstance(problem, CompiledProblem):
+        return found
+    if inner is None:
+        check_inner(problem.default_inner)
+        found |= {"inner": problem.default_inner} if problem.default_inner != INNER else {}
+    if start is None and problem.default_start is not None:
+        found["start"] = written(problem.default_start)
+    return found
+
+
 def check_inner(inner: Any) -> None:
     """Raise ValueError unless there is an inner level of this name."""
     if inner not in NAMED:
@@ -58,3 +79,9 @@ def sampling(start: Any) -> Smooth | str | None:
     if found is None and start is not None:
         raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {start!r}")
     return found
+
+
+def written(start: Any) -> Any:
+    """A start as plain data, which `sampling` understands."""
+    found = sampling(start)
+    return asdict(found) if isinstance(found, Smooth) else found

@@ -56,6 +56,10 @@ DIVISIONS, BEYOND = 12, 1.3
 RTOL = 1e-8
 
 
+class Unsolved(RuntimeError):  # noqa: N818 - nobody's error
+    """Gradients did not find an end of the front, without which nobody knows where it lies."""
+
+
 class Truth:
     """The front of a case as it becomes known."""
 
@@ -101,7 +105,12 @@ class Truth:
         print(f"{len(self.found)} of {len(rows)} flights of {EASIEST} are feasible")
 
     def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
-        """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4)."""
+        """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4).
+
+        Raises `Unsolved` if there is nothing to begin with, or the best of an objective is not found.
+        """
+        if not self.found:
+            raise Unsolved("no solve converged, and no flight was taken over: there is nothing to begin with")
         rows = []
         for i in range(4):
             steps.begin(f"end {i + 1}")
@@ -109,6 +118,12 @@ class Truth:
             nearest = int(np.lexsort((F[:, i], np.maximum(F - ceiling, 0.0).sum(axis=1)))[0])
             alone = np.where(np.arange(4) == i, 0.0, np.inf)
             first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
+            if first.status != CONVERGED:
+                within = f" within {ceiling.tolist()}, minimised," if np.isfinite(ceiling).any() else ""
+                raise Unsolved(
+                    f"the best '{self.case.goals[i].name}'{within} was not found: its solve from the nearest of the {len(self.found)} "
+                    f"flights known ended as '{first.status}', with a violation of {first.violation:.1e}"
+                )
             limit = np.where(np.arange(4) == i, first.F[i] + 1e-6 * abs(first.F[i]), ceiling)
             others = np.where(np.arange(4) == i, np.inf, first.F)
             second = self.solve(first.z, others, np.maximum(np.ptp(F, axis=0), 1e-3), limit)
@@ -251,7 +266,10 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=120)
     parser.add_argument("--out", default=None)
     given = parser.parse_args()
-    rows = made(given.case, given.points)
+    try:
+        rows = made(given.case, given.points)
+    except Unsolved as error:
+        raise SystemExit(f"{given.case}: {error}; no table was written") from error
     write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
     print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):

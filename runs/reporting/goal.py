@@ -16,6 +16,7 @@ from macs.inputs import unknown
 
 from ..measures.convergence import Band, History, band
 from ..store import Run
+from ..studyfile import is_number
 from .ground import Ground
 from .plots import convergence_figure
 from .tables import Cell, Column, Table, table
@@ -56,12 +57,12 @@ class Goal:
         if not isinstance(self.objective, str):
             raise ValueError(f"goal: objective must be the name of an objective, not {self.objective!r}")
         for name in ("best", "worst"):
-            if not _number(getattr(self, name)):
+            if not is_number(getattr(self, name)):
                 raise ValueError(f"goal: {name} must be a finite number, not {getattr(self, name)!r}")
         if self.best == self.worst:
             raise ValueError(f"goal: best and worst of '{self.objective}' are both {self.best:g}: there is nothing between them to attain")
         shares = self.shares
-        if isinstance(shares, str) or not isinstance(shares, Sequence) or not all(_number(one) and 0 < one <= 1 for one in shares):
+        if isinstance(shares, str) or not isinstance(shares, Sequence) or not all(is_number(one) and 0 < one <= 1 for one in shares):
             raise ValueError(f"goal: shares must be a list of numbers above 0 and at most 1, not {shares!r}")
 
     @classmethod
@@ -186,7 +187,3 @@ def _reached(b: Band, share: float) -> int | None:
     """After how many evaluations the median run had come so far; None if it never did."""
     there = np.flatnonzero(b.median >= share)
     return int(b.x[there[0]]) if len(there) else None
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

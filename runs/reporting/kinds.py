@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,13 @@ from ..flown import Ends
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.statistics import summarise
+from ..studyfile import is_number
 from .ground import Ground
 from .measuring import samples, spent
 from .tables import Cell, Column
+
+if TYPE_CHECKING:
+    from problems.compiled import CompiledProblem
 
 Figures = Mapping[str, Cell]
 """A row's figures by key."""
@@ -45,6 +49,10 @@ class Kind:
         Whether each row is one of `STATISTICS`, named by its key "statistic".
     needs : mapping
         What else the published table has to say -> what raises ValueError if that makes no sense.
+    fits : callable
+        (the published table, one of its problems) raises ValueError if what it needs is not of such a problem.
+    population : bool
+        Whether ours are of solvers with a population alone.
     """
 
     columns: Callable[[Mapping[str, Any]], Mapping[str, Column] | None]
@@ -52,6 +60,8 @@ class Kind:
     note: Callable[[Ground, Mapping[str, Any]], str]
     statistics: bool = False
     needs: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)
+    fits: Callable[[Mapping[str, Any], CompiledProblem], None] = lambda paper, problem: None
+    population: bool = False
 
 
 def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
@@ -131,31 +141,53 @@ def _end(ends: Ends, end: Mapping[str, Any]) -> np.ndarray:
     """A state at the end of the last phase that has it."""
     found = [states[end["state"]] for states in ends.values() if end["state"] in states]
     if not found:
-        known = ", ".join(dict.fromkeys(name for states in ends.values() for name in states))
-        raise ValueError(f"paper: ends: there is no state '{end['state']}'; there are {known}")
+        raise ValueError(f"paper: {_no_state(end, [name for states in ends.values() for name in states])}")
     return found[-1]
+
+
+def _fit_ends(paper: Mapping[str, Any], problem: CompiledProblem) -> None:
+    """Raise ValueError unless a problem has the states whose ends a published table has."""
+    known = [v.name for phase in problem.phases for v in phase.states]
+    for end in paper["ends"]:
+        if end["state"] not in known:
+            raise ValueError(_no_state(end, known))
+
+
+def _no_state(end: Mapping[str, Any], known: Sequence[str]) -> str:
+    return f"ends: '{end['name']}': {unknown('state', end['state'], dict.fromkeys(known))}"
 
 
 def _check_ends(ends: Any) -> None:
     """Raise ValueError unless a published table says whose ends it has."""
     keys = ("name", "state", "at", "unit", "factor")
     if not isinstance(ends, Sequence) or isinstance(ends, str) or not ends:
-        raise ValueError(f"paper: ends must be a list of tables, not {ends!r}")
+        raise ValueError(f"ends must be a list of tables, not {ends!r}")
+    names: list[str] = []
     for end in ends:
         if not isinstance(end, Mapping) or not all(key in end for key in ("name", "state", "at")):
-            raise ValueError(f"paper: each of ends must be a table with name, state and at, not {end!r}")
+            raise ValueError(f"each of ends must be a table with name, state and at, not {end!r}")
         for key, value in end.items():
             if key not in keys:
-                raise ValueError(f"paper: ends: {unknown('key', key, keys)}")
+                raise ValueError(f"ends: {unknown('key', key, keys)}")
             number = key in ("at", "factor")
-            if isinstance(value, bool) or not isinstance(value, (int, float) if number else str):
-                raise ValueError(f"paper: ends: {key} must be a {'number' if number else 'text'}, not {value!r}")
+            if not (is_number(value) if number else isinstance(value, str)):
+                raise ValueError(f"ends: {key} must be a {'finite number' if number else 'text'}, not {value!r}")
+        if end["name"] in names:
+            raise ValueError(f"ends: '{end['name']}' is there twice")
+        names.append(end["name"])
 
 
 def _check_point(point: Any) -> None:
     """Raise ValueError unless a point is a list of numbers."""
-    if not isinstance(point, Sequence) or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in point):
-        raise ValueError(f"paper: point must be a list of numbers, one for each objective, not {point!r}")
+    if not isinstance(point, Sequence) or not point or not all(map(is_number, point)):
+        raise ValueError(f"point must be a list of numbers, one for each objective, not {point!r}")
+
+
+def _fit_point(paper: Mapping[str, Any], problem: CompiledProblem) -> None:
+    """Raise ValueError unless a point has a number for each objective of a problem."""
+    if len(paper["point"]) != len(problem.goals):
+        names = ", ".join(goal.name for goal in problem.goals)
+        raise ValueError(f"point: {len(paper['point'])} numbers, but {len(problem.goals)} objectives: {names}")
 
 
 def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
@@ -197,6 +229,7 @@ KINDS: Mapping[str, Kind] = {
         _hypervolume,
         _point,
         needs={"point": _check_point},
+        fits=_fit_point,
     ),
     "objectives": Kind(lambda paper: None, _objectives, lambda ground, paper: OVER_ALL, statistics=True),
     "ends": Kind(
@@ -205,6 +238,7 @@ KINDS: Mapping[str, Kind] = {
         lambda ground, paper: OVER_ALL,
         statistics=True,
         needs={"ends": _check_ends},
+        fits=_fit_ends,
     ),
     "feasibility": Kind(
         lambda paper: {
@@ -219,5 +253,6 @@ KINDS: Mapping[str, Kind] = {
         },
         _feasibility,
         lambda ground, paper: "generations from 1, the first population; means of the runs that got there; points are means of a run.",
+        population=True,
     ),
 }

@@ -7,44 +7,57 @@ paper's figures came about), `differs` (what is not the same here), and whatever
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from macs.baselines.population import PopulationSolver
 from macs.inputs import unknown
 
+from ..studyfile import is_number, told
 from .ground import Ground
 from .kinds import KINDS, STATISTICS, Kind
 from .tables import Cell, Column, Table, table
 
+if TYPE_CHECKING:
+    from macs.solver import Solver
+    from problems.compiled import CompiledProblem
+
 TEXTS = ("source", "note", "differs")
 SECTION = ("of", "rows", *TEXTS)
 ROW = ("problem", "by")
+STATISTIC = "statistic"
 
 
 def check(papers: Any) -> None:
-    """Raise ValueError that names what a study's `[[paper]]` sections hold and should not, or lack."""
+    """Raise ValueError that names what a study's `[[paper]]` sections hold and should not, or lack; whatever the study is of."""
     if isinstance(papers, str | Mapping) or not isinstance(papers, Sequence):
         raise ValueError(f"paper must be a list of tables, [[paper]], not a {type(papers).__name__}")
-    for paper in papers:
-        if not isinstance(paper, Mapping):
-            raise ValueError(f"paper: each must be a table, not {paper!r}")
-        if paper.get("of") not in KINDS:
-            raise ValueError(f"paper: of must be one of {', '.join(KINDS)}, not {paper.get('of')!r}")
+    for number, paper in enumerate(papers, 1):
+        with told(_section(number, paper)):
+            _check_section(paper)
+
+
+def check_against(papers: Sequence[Mapping[str, Any]], problems: Mapping[str, CompiledProblem], solvers: Mapping[str, Solver]) -> None:
+    """Raise ValueError that names what `[[paper]]` sections, which `check` has seen, say of things that a study does not have.
+
+    Parameters
+    ----------
+    problems, solvers : mapping
+        The study's, by label.
+    """
+    for number, paper in enumerate(papers, 1):
         kind = KINDS[paper["of"]]
-        for key in paper:
-            if key not in (*SECTION, *kind.needs):
-                raise ValueError(f"paper: {unknown('key', key, (*SECTION, *kind.needs))}")
-        for key in kind.needs:
-            if key not in paper:
-                raise ValueError(f"paper: of {paper['of']} it needs {key}")
-        for key, checked in kind.needs.items():
-            checked(paper[key])
-        for key in TEXTS:
-            if not isinstance(paper.get(key, ""), str):
-                raise ValueError(f"paper: {key} must be a text, not {paper[key]!r}")
-        if not isinstance(paper.get("rows"), Sequence) or not paper["rows"]:
-            raise ValueError("paper: rows must be a list of tables")
-        for row in paper["rows"]:
-            _check_row(row, kind, kind.columns(paper))
+        with told(_section(number, paper)):
+            if kind.population and not any(isinstance(solver, PopulationSolver) for solver in solvers.values()):
+                raise ValueError(f"it is of solvers with a population, and none of the study's has one: {', '.join(solvers)}")
+            for place, row in enumerate(paper["rows"], 1):
+                with told(f"row {place}"):
+                    if row["problem"] not in problems:
+                        raise ValueError(unknown("problem", row["problem"], problems))
+                    if kind.columns(paper) is None:
+                        _check_keys(row, "objective", [goal.name for goal in problems[row["problem"]].goals])
+            for label in dict.fromkeys(row["problem"] for row in paper["rows"]):
+                with told(f"problem '{label}'"):
+                    kind.fits(paper, problems[label])
 
 
 def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, Any]]) -> dict[str, Table]:
@@ -57,20 +70,65 @@ def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, An
     return found
 
 
+def _section(number: int, paper: Any) -> str:
+    """How a section is called in errors."""
+    of = paper.get("of") if isinstance(paper, Mapping) else None
+    return f"[[paper]] {number}{f', of {of}' if isinstance(of, str) else ''}"
+
+
+def _check_section(paper: Any) -> None:
+    if not isinstance(paper, Mapping):
+        raise ValueError(f"it must be a table, not {paper!r}")
+    if not isinstance(paper.get("of"), str) or paper["of"] not in KINDS:
+        raise ValueError(f"of must be one of {', '.join(KINDS)}, not {paper.get('of')!r}")
+    kind = KINDS[paper["of"]]
+    for key in paper:
+        if key not in (*SECTION, *kind.needs):
+            raise ValueError(unknown("key", key, (*SECTION, *kind.needs)))
+    for key, checked in kind.needs.items():
+        if key not in paper:
+            raise ValueError(f"it needs {key}")
+        checked(paper[key])
+    for key in TEXTS:
+        if not isinstance(paper.get(key, ""), str):
+            raise ValueError(f"{key} must be a text, not {paper[key]!r}")
+    if not isinstance(paper.get("rows"), Sequence) or not paper["rows"]:
+        raise ValueError("rows must be a list of tables")
+    seen: list[tuple[str, ...]] = []
+    for place, row in enumerate(paper["rows"], 1):
+        with told(f"row {place}"):
+            _check_row(row, kind, kind.columns(paper))
+            name = tuple(row[key] for key in (*ROW, STATISTIC) if key in row)
+            if name in seen:
+                raise ValueError(f"it is of the same as row {seen.index(name) + 1}: {', '.join(name)}")
+            seen.append(name)
+
+
 def _check_row(row: Any, kind: Kind, columns: Mapping[str, Column] | None) -> None:
     if not isinstance(row, Mapping) or not all(isinstance(row.get(key), str) for key in ROW):
-        raise ValueError(f"paper: each of rows must be a table with problem and by, not {row!r}")
-    if kind.statistics and row.get("statistic") not in STATISTICS:
-        raise ValueError(f"paper: statistic must be one of {', '.join(STATISTICS)}, not {row.get('statistic')!r}")
+        raise ValueError(f"it must be a table with problem and by, not {row!r}")
+    if kind.statistics and (not isinstance(row.get(STATISTIC), str) or row[STATISTIC] not in STATISTICS):
+        raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {row.get(STATISTIC)!r}")
+    if STATISTIC in row and not kind.statistics:
+        raise ValueError(f"{STATISTIC}: this kind of table has none")
+    if columns is not None:
+        _check_keys(row, "key", list(columns))
     for key in _figures(row):
-        if columns is not None and key not in columns:
-            raise ValueError(f"paper: {unknown('key', key, tuple(columns))}")
-        if isinstance(row[key], bool) or not isinstance(row[key], int | float):
-            raise ValueError(f"paper: {key} must be a number, not {row[key]!r}")
+        if not is_number(row[key]):
+            raise ValueError(f"{key} must be a finite number, not {row[key]!r}")
+    if not _figures(row):
+        raise ValueError(f"it holds no figure: {', '.join(columns) if columns else 'there must be some objective'}")
+
+
+def _check_keys(row: Mapping[str, Any], what: str, known: Sequence[str]) -> None:
+    """Raise ValueError if a row holds a figure of something else than those known."""
+    for key in _figures(row):
+        if key not in known:
+            raise ValueError(unknown(what, key, known))
 
 
 def _figures(row: Mapping[str, Any]) -> list[str]:
-    return [key for key in row if key not in (*ROW, "statistic")]
+    return [key for key in row if key not in (*ROW, STATISTIC)]
 
 
 def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> Table | None:
@@ -106,7 +164,7 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
         Column("by", grouped=kind.statistics),
         Column("runs", grouped=kind.statistics),
     ]
-    heads += ["statistic"] if kind.statistics else []
+    heads += [STATISTIC] if kind.statistics else []
     units = {goal.name: goal.unit for ground in grounds for goal in ground.known.goals}
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
@@ -117,7 +175,7 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
 
 def _cells(figures: Mapping[str, Any], keys: Sequence[str], kind: Kind, theirs: float | None) -> list[Cell]:
     """A row's figures; `theirs` are the seconds that the paper's took."""
-    cells: list[Cell] = [figures["statistic"]] if kind.statistics else []
+    cells: list[Cell] = [figures[STATISTIC]] if kind.statistics else []
     cells += [figures.get(key) for key in keys]
     if "seconds" in keys:
         cells.append(theirs / figures["seconds"] if theirs and figures.get("seconds") else None)

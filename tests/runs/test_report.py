@@ -14,7 +14,7 @@ from runs import Study, gd, igd
 from runs.cli import main
 from runs.making.work import Outcome
 from runs.reporting.ground import grounds
-from runs.reporting.published import check
+from runs.reporting.published import check, published_tables
 from runs.reporting.report import _plain, _Writer, report
 from runs.reporting.tables import table
 from runs.store import Store
@@ -24,7 +24,7 @@ WORDS = {"source": "a paper", "note": "thirty runs", "differs": "everything"}
 ROW = {"problem": "glide", "by": "the paper"}
 PAPER = [
     {"of": "indicators", **WORDS, "rows": [{**ROW, "gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}]},
-    {"of": "hypervolume", "point": [10.0, 0.0], "rows": [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]},
+    {"of": "hypervolume", "point": [10.0, 0.0], "rows": [{**ROW, "best": 3.0}]},
     {"of": "objectives", "rows": [{**ROW, "statistic": "greatest", "distance": 7.0}]},
 ]
 
@@ -95,7 +95,7 @@ def test_volumes_and_objectives_beside_published_ones(folder, told):
     assert [float(ours[key]) for key in ("worst", "median", "best")] == pytest.approx(expected, rel=1e-12)
     broken = next(row for row in others if row["by"].startswith("broken"))
     assert [broken[key] for key in ("runs", "best", "worst")] == ["3", "0.0", "0.0"]
-    assert "up to time 10 s, distance 0 km" in told and "dive" not in told
+    assert "up to time 10 s, distance 0 km" in told
     with (folder / "report" / "published-3.csv").open() as file:
         rows = {(row["by"], row["statistic"]): row["distance [km]"] for row in csv.DictReader(file)}
     distances = np.concatenate([front.objectives[:, 1] for front in fronts])
@@ -150,17 +150,25 @@ def test_nothing_to_report_on(tmp_path, capsys):
     ("paper", "message"),
     [
         ({"source": 3}, "must be a list of tables"),
-        ([3], "each must be a table"),
+        ([3], r"\[\[paper\]\] 1: it must be a table"),
         ([{"rows": []}], "of must be one of indicators, hypervolume"),
+        ([{"of": ["indicators"]}], "of must be one of indicators, hypervolume"),
+        ([*PAPER, {"of": "indicator"}], r"\[\[paper\]\] 4, of indicator: of must be one of indicators"),
         ([{"of": "indicators", "source": 3}], "source must be a text"),
         ([{"of": "indicators", "sauce": "3"}], "sauce"),
         ([{"of": "hypervolume", "rows": [ROW]}], "it needs point"),
         ([{"of": "hypervolume", "point": "R", "rows": [ROW]}], "point must be a list of numbers"),
+        ([{"of": "hypervolume", "point": [np.inf, 0.0], "rows": [ROW]}], "point must be a list of numbers"),
         ([{"of": "indicators", "rows": []}], "rows must be a list of tables"),
-        ([{"of": "indicators", "rows": [{"by": "glide"}]}], "with problem and by"),
+        ([{"of": "indicators", "rows": [{"by": "glide"}]}], "row 1: it must be a table with problem and by"),
+        ([{"of": "indicators", "rows": [ROW]}], "row 1: it holds no figure: gd_mean, gd_variance"),
+        ([{"of": "indicators", "rows": [{**ROW, "seconds": 1}] * 2}], "row 2: it is of the same as row 1: glide, the paper"),
         ([{"of": "indicators", "rows": [{**ROW, "gd": 3.0}]}], "unknown key 'gd'"),
-        ([{"of": "indicators", "rows": [{**ROW, "gd_mean": "3"}]}], "gd_mean must be a number"),
+        ([{"of": "indicators", "rows": [{**ROW, "gd_mean": "3"}]}], "gd_mean must be a finite number"),
+        ([{"of": "indicators", "rows": [{**ROW, "gd_mean": np.nan}]}], "gd_mean must be a finite number"),
+        ([{"of": "indicators", "rows": [{**ROW, "gd_mean": 3, "statistic": "mean"}]}], "statistic: this kind of table has none"),
         ([{"of": "objectives", "rows": [{**ROW, "distance": 3}]}], "statistic must be one of greatest"),
+        ([{"of": "objectives", "rows": [{**ROW, "distance": 3, "statistic": []}]}], "statistic must be one of greatest"),
     ],
 )
 def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
@@ -168,6 +176,57 @@ def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
         check(paper)
     with pytest.raises(ValueError, match=message):
         study(paper=paper)
+
+
+MEAN = {**ROW, "statistic": "mean"}
+
+
+@pytest.mark.parametrize(
+    ("paper", "message"),
+    [
+        (
+            {"of": "hypervolume", "point": [1.0, 2.0, 3.0], "rows": [{**ROW, "best": 3}]},
+            "problem 'glide': point: 3 numbers, but 2 objectives",
+        ),
+        (
+            {"of": "hypervolume", "point": [1.0, 2.0], "rows": [{**ROW, "problem": "glid", "best": 3}]},
+            "row 1: unknown problem 'glid', did you",
+        ),
+        (
+            {"of": "objectives", "rows": [MEAN | {"time": 1}, {**MEAN, "by": "others", "range": 2}]},
+            "row 2: unknown objective 'range'; there are",
+        ),
+        (
+            {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 1}], "rows": [MEAN | {"miss": 1}]},
+            "'miss': unknown state 'y'; there are x",
+        ),
+        ({"of": "feasibility", "rows": [{**ROW, "points": 3}]}, "none of the study's has one: one, other, broken"),
+    ],
+)
+def test_a_paper_section_of_what_the_study_does_not_have_is_refused_at_once(paper, message):
+    check([paper])
+    with pytest.raises(ValueError) as refused:
+        study(paper=[PAPER[0], paper])
+    assert f"study 'gliders': [[paper]] 2, of {paper['of']}: " in str(refused.value) and message in str(refused.value)
+
+
+def test_every_problem_of_a_published_table_is_looked_at():
+    third = glide()
+    third.minimize("speed", third.phases["leg"].integral(third.phases["leg"]["u"] ** 2))
+    rows = [{**ROW, "problem": name, "best": 1.0} for name in ("two", "three")]
+    given = {"problems": {"two": glide(), "three": third}, "evaluations": 60}
+    with pytest.raises(ValueError, match="problem 'three': point: 2 numbers, but 3 objectives: time, distance, speed"):
+        study(paper=[{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}], **given)
+    means = [{**MEAN, "problem": "three", "speed": 1.0}, {**MEAN, "problem": "two", "time": 1.0}]
+    assert len(study(paper=[{"of": "objectives", "rows": means}], **given).cells) == 6
+    with pytest.raises(ValueError, match="row 2: unknown objective 'speed'"):
+        study(paper=[{"of": "objectives", "rows": [means[0], {**means[1], "speed": 1.0}]}], **given)
+
+
+def test_problems_without_finished_runs_are_left_out_of_published_tables(folder):
+    rows = [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]
+    found = published_tables(grounds(Store.open(folder), {}), [{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}])
+    assert "dive" not in found["published"].text() and "glide" in found["published"].text()
 
 
 def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):

@@ -30,6 +30,12 @@ seed = 1
 solver = "macs"
 refine = false
 """
+VOLUME = """
+[[paper]]
+of = "hypervolume"
+point = [1.0]
+rows = [{problem = "glide.py:glide", by = "a paper", best = 3}]
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -80,13 +86,16 @@ def test_status_says_what_is_wrong(capsys):
         (TOML.replace("glide.py:glide", "glide.py:glider"), "has no function 'glider'"),
         (TOML.replace("glide.py:glide", "glides.py:glide"), "there is no file 'glides.py'"),
         ("runs = ", "it is not TOML"),
+        (TOML + VOLUME, "[[paper]] 1, of hypervolume: problem 'glide.py:glide': point: 1 numbers, but 2 objectives: time, distance"),
+        (TOML + VOLUME.replace("[1.0]", "[9, 0]").replace("py:glide", "py:dive"), "[[paper]] 1, of hypervolume: row 1: unknown problem"),
     ],
 )
-def test_a_wrong_file_is_one_line_before_any_work(here, capsys, toml, words):
+@pytest.mark.parametrize("how", [[], ["--quick"]])
+def test_a_wrong_file_is_one_line_before_any_work(here, capsys, toml, words, how):
     (here / "gliders.toml").write_text(toml, encoding="utf-8")
-    assert main(["study", "run", "gliders.toml"]) == 2
+    assert main(["study", "run", "gliders.toml", *how]) == 2
     said = capsys.readouterr()
-    assert words in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
+    assert words in said.err and "gliders.toml: " in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -138,6 +147,12 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     quick = Study.load("orbit-table3").quick()
     assert quick.name == "orbit-table3-quick" and quick.runs == 2 and quick.cells[0].evaluations == 500
     assert set(studyfile.names()) >= {"goddard-table3", "orbit-table3", "orbit-full-table3"}
+
+
+@pytest.mark.parametrize("name", studyfile.names())
+def test_each_study_there_is_makes_sense_whole_and_quick(name):
+    study = Study.load(name)
+    assert (study.name, study.quick().name) == (name, f"{name}-quick") and study.description == studyfile.describe(name)
 
 
 def test_studies_of_the_parameters_of_the_reentry(capsys):

@@ -7,9 +7,11 @@ from misbehaving import Plain, glide
 from test_study import Inline
 
 from macs import NSGA2
+from problems import Problem
 from runs import Study
 from runs.reporting.ground import EACH, grounds
 from runs.store import Store
+from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
 SOLVERS = {"macs": Plain(agents=4), "nsga2": NSGA2(population=10)}
@@ -83,3 +85,72 @@ def test_quick_studies_keep_the_terms():
 def test_terms_that_make_no_sense_are_refused(terms, message):
     with pytest.raises(ValueError, match=message):
         study(terms=terms)
+
+
+# What a case has of its own
+
+
+def narrow(**own) -> Problem:
+    """Half of what is drawn flies too far: how it is made feasible tells."""
+    problem = glide(most=6.0)
+    for name, value in {"default_inner": "march", "default_start": "smooth", **own}.items():
+        setattr(problem, name, value)
+    return problem
+
+
+def bare(problem: Problem, **more) -> Study:
+    return Study("bare", **{"problems": problem, "solvers": {"plain": Plain()}, "runs": 1, "seed": 1} | more)
+
+
+def test_a_study_that_says_nothing_does_as_the_command_line_does(tmp_path):
+    (run,) = bare(narrow()).run(tmp_path / "own", executor=Inline()).runs
+    (plain,) = bare(glide(most=6.0)).run(tmp_path / "plain", executor=Inline()).runs
+    given = {"evaluations": 60, "seed": run.seed}
+    front = Plain().solve(narrow(), parse("dfet:2x2"), inner="march", start="smooth", **given)
+    assert run.front.F.tolist() == front.F.tolist()
+    assert plain.front.F.tolist() == Plain().solve(narrow(), parse("dfet:2x2"), **given).F.tolist() != front.F.tolist()
+
+
+def test_a_case_without_its_own_is_as_if_the_study_said_so():
+    assert bare(glide()).definition() == bare(glide(), inner="auto").definition()
+    assert "terms" not in bare(glide()).cells[0].details
+    assert bare(glide().compile(), transcriptions="dfet:2x2", evaluations=60).definition() == bare(glide()).definition()
+
+
+def test_what_a_study_or_a_solver_says_comes_before_what_the_case_says():
+    def found(problem=None, **more) -> tuple:
+        one = bare(problem or narrow(), **more)
+        assert (one.quick().inner_of(one.cells[0]), one.quick().sampling_of(one.cells[0])) == (
+            one.inner_of(one.cells[0]),
+            one.sampling_of(one.cells[0]),
+        )
+        return one.inner_of(one.cells[0]), one.sampling_of(one.cells[0])
+
+    assert found() == ("march", Smooth()) and found(glide()) == ("auto", None)
+    assert found(inner="auto") == ("auto", Smooth()) and found(start="uniform") == ("march", "uniform")
+    assert found(terms={"plain": {"inner": "ipopt"}}) == ("ipopt", Smooth())
+    assert found(terms={"plain": {"start": {"spread": 0.2}}}) == ("march", Smooth(spread=0.2))
+    assert found(narrow(default_start=Smooth(length=0.2))) == ("march", Smooth(length=0.2))
+    assert "terms" not in bare(narrow(), inner="auto", start="uniform").cells[0].details
+
+
+def test_each_problem_has_its_own(tmp_path):
+    both = bare(glide(), problems={"plain": glide(), "narrow": narrow()})
+    assert [both.inner_of(cell) for cell in both.cells] == ["auto", "march"]
+    both.run(tmp_path / "out", executor=Inline())
+    assert both.status(tmp_path / "out").finished == 2
+    with pytest.raises(ValueError, match=r"another study: narrow, dfet:2x2, plain: details\.terms"):
+        bare(glide(), problems={"plain": glide(), "narrow": narrow(default_inner="ipopt")}).run(tmp_path / "out")
+
+
+def test_the_reentry_is_searched_as_the_case_says():
+    study = Study("reentry", problems="reentry_case1", solvers="macs", runs=1, seed=1)
+    assert (study.inner_of(study.cells[0]), study.sampling_of(study.cells[0])) == ("march", Smooth())
+
+
+@pytest.mark.parametrize(
+    ("own", "message"), [({"default_inner": "mrch"}, "inner level 'mrch'"), ({"default_start": "soft"}, "unknown start 'soft'")]
+)
+def test_a_case_whose_own_makes_no_sense_is_named(own, message):
+    with pytest.raises(ValueError, match=f"problems: 'glide': .*{message}"):
+        bare(narrow(**own))

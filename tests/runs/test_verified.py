@@ -151,7 +151,9 @@ def test_how_much_may_be_violated_is_a_number(value, message):
         ([], "ends must be a list of tables"),
         ("x", "ends must be a list of tables"),
         ([{"name": "miss"}], "each of ends must be a table with name, state and at"),
-        ([{**ENDS[0], "at": "2"}], "ends: at must be a number"),
+        ([{**ENDS[0], "at": "2"}], "ends: at must be a finite number"),
+        ([{**ENDS[0], "at": float("inf")}], "ends: at must be a finite number"),
+        ([ENDS[0], ENDS[0]], "ends: 'miss' is there twice"),
         ([{**ENDS[0], "unit": 2}], "ends: unit must be a text"),
         ([{**ENDS[0], "units": "m"}], "units"),
     ],
@@ -163,7 +165,7 @@ def test_ends_that_make_no_sense_are_refused(ends, message):
 
 def test_a_state_that_does_not_exist_is_named(folder):
     paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean"}]}
-    with pytest.raises(ValueError, match="there is no state 'y'; there are x, v"):
+    with pytest.raises(ValueError, match="unknown state 'y'; there are x, v"):
         published_tables(grounds(Store.open(folder), {}), [paper])
 
 
