@@ -130,8 +130,8 @@ class Solver(ABC):
             or more apart. So is a first population that was not finished. `time_limit` counts from each call, `stats["wall_time"]` sums
             them up. Of a run that has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined
             again. All that decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and
-            seed; a seed of None takes over that of the file. Should the file not be writable any more in the middle of the run, the search goes on, logs a
-            warning, and `stats["checkpoint"]` says why.
+            seed; a seed of None takes over that of the file. Should the file not be writable any more in the middle of the run, the search
+            goes on, logs a warning, and `stats["checkpoint"]` says why.
 
         Returns
         -------
