@@ -66,23 +66,23 @@ class Bilevel(Evaluator):
     def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
         found = []
         for start, reference, weight in zip(starts, references, weights, strict=True):
-            self.before_batch()
-            found.append(
-                scalarize(
-                    self.nlp,
-                    start,
-                    reference=reference,
-                    weights=weight,
-                    tolerance=self.tolerance,
-                    max_iterations=PATIENCE,
-                    persistent=False,
-                )
+            solved = scalarize(
+                self.nlp,
+                start,
+                reference=reference,
+                weights=weight,
+                tolerance=self.tolerance,
+                max_iterations=PATIENCE,
+                persistent=False,
             )
+            if not solved.begun:
+                break
+            found.append(solved)
         evaluation = Evaluation(
-            Z=np.array([solved.z for solved in found]),
-            F=np.array([solved.F for solved in found]),
+            Z=np.array([solved.z for solved in found]).reshape(-1, starts.shape[1]),
+            F=np.array([solved.F for solved in found]).reshape(-1, references.shape[1]),
             violation=np.array([solved.violation for solved in found]),
-            status=np.array([solved.status for solved in found]),
+            status=np.array([solved.status for solved in found], dtype="<U10"),
             clocked=any(solved.clocked for solved in found),
         )
         return evaluation, sum(solved.iterations for solved in found)

@@ -143,14 +143,16 @@ class Evaluator(ABC):
         Returns
         -------
         Evaluation
-            "converged" where a local optimum was found that is feasible.
+            "converged" where a local optimum was found that is feasible. If the work is to end early (`transcription.stopping`), only of
+            the first rows, which were solved by then; only these are counted.
         """
+        self.before_batch()
         found, iterations = self._refine(starts, references, weights)
-        self.counts.gradient_solves += len(starts)
+        self.counts.gradient_solves += len(found.F)
         self.counts.inner_iterations += iterations
-        self.counts.clocked += found.clocked
+        self.counts.clocked += found.clocked or len(found.F) < len(starts)
         return found
 
     def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
-        """Solve, if there are gradients; also returns the iterations spent."""
+        """Solve, if there are gradients, as many of the rows, in order, as may be; also returns the iterations spent."""
         raise NotImplementedError(f"{type(self).__name__} has no gradients")

@@ -232,7 +232,7 @@ class MACS(Solver):
         search.advance(self, state, evaluator, budget)
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
-        """Polish the archive by gradients, where there are any."""
+        """Polish the archive by gradients, where there are any. Asked to end early, it leaves what it has; called again, it goes on."""
         search.conclude(self, state, evaluator)
 
     @property

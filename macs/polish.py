@@ -12,8 +12,9 @@ from . import archive as archives
 from .archive import Archive
 from .directions import across, simplex_lattice
 from .dominance import extremes, nondominated
-from .evaluation import CONVERGED, FAILED, Evaluation, Evaluator
+from .evaluation import CONVERGED
 from .refinement import CURVE, SAME, keeps_promise, nearest, ranges_of, slack
+from .solves import Solves
 
 if TYPE_CHECKING:
     from .search import SearchState
@@ -30,30 +31,6 @@ GAIN = 0.995
 """A slide is tried if it is to lower the energy of a point to this part."""
 
 
-class Solves:
-    """Gradient solves as long as there are any left.
-
-    Parameters
-    ----------
-    evaluator : Evaluator
-    left : int
-    """
-
-    def __init__(self, evaluator: Evaluator, left: int) -> None:
-        self._evaluator, self.left = evaluator, left
-
-    def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """See `Evaluator.refine`; rows for which nothing is left have failed."""
-        count = max(min(len(starts), self.left), 0)
-        self.left -= count
-        Z, F = np.array(starts), np.full(references.shape, np.nan)
-        violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
-        if count:
-            found = self._evaluator.refine(starts[:count], references[:count], weights[:count])
-            Z[:count], F[:count], violation[:count], status[:count] = found.Z, found.F, found.violation, found.status
-        return Evaluation(Z, F, violation, status)
-
-
 def polish(state: SearchState, solves: Solves, limit: int, exponent: float | None = None) -> None:
     """Bring every point of the archive down to the front, and spread them along it as evenly as their number allows.
 
@@ -61,7 +38,8 @@ def polish(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     better ones; then points slide along the front to where they repel each other least, or fill what places are left. `exponent` is that of
     the archive. Where there are few solves, only some points come down, well spread, so that half of the solves are left to spread them
     along the front; what did not come down, and is not dominated, then takes what places are left. A surface is first gone down to from
-    all over it, once for each point that the archive may hold.
+    all over it, once for each point that the archive may hold. Where the work is to end early no solves are left, and what those before
+    have found is the front.
     """
     if not len(state.archive):
         return
@@ -108,7 +86,6 @@ def _descend(state: SearchState, solves: Solves, exponent: float | None) -> Arch
         np.where(kept[:, None], found.F, archive.F),
         np.where(kept, found.violation, archive.violation),
     )
-    state.archive = _front(_joined(archive, waiting), ranges)  # should it end here
     ends = _ends(archive, ranges, solves)
     state.archive = _front(_joined(ends, archive), ranges)
     return waiting
@@ -123,19 +100,18 @@ def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     ranges = np.where(ranges > 0.0, ranges, ranges_of(state))
     known = across((ends.F - ideal) / ranges)
     places = simplex_lattice(m, _divisions(m)) @ known
-    try:
-        for _ in range(min(limit, solves.left)):
-            place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
-            reference = ideal + ranges * place
-            start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
-            found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
-            known = np.vstack([known, place])
-            if found.status[0] == CONVERGED:
-                known = np.vstack([known, across((found.F - ideal) / ranges)])
-                pool = _joined(Archive(found.Z, found.F, found.violation), pool)
-    finally:
-        # Whatever ends it: what there is, is the front.
-        state.archive = _thinned(_front(pool, ranges), limit, exponent)
+    for _ in range(limit):
+        if solves.left <= 0:
+            break
+        place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+        reference = ideal + ranges * place
+        start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
+        found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
+        known = np.vstack([known, place])
+        if found.status[0] == CONVERGED:
+            known = np.vstack([known, across((found.F - ideal) / ranges)])
+            pool = _joined(Archive(found.Z, found.F, found.violation), pool)
+    state.archive = _thinned(_front(pool, ranges), limit, exponent)
 
 
 def _divisions(m: int) -> int:

@@ -71,6 +71,8 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
     reference = np.where(direction > 0, reference, np.inf) if alone else reference
     found = evaluator.refine(start[None], reference[None], weights[None])
+    if not len(found.F):  # the search is to end
+        return []
     promised = agents.F[i] if feasible else np.full(m, np.inf)
     if keeps_promise(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)

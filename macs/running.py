@@ -118,22 +118,32 @@ class Run:
                 self._keep(monitor)
                 monitor.after_iteration(self._standing(monitor))
                 self._write_in_time()  # what is in the file, the callback has been told
+            # Asked to stop, this ends with what it has; so far as it got, it is kept.
+            self.evaluator.before_batch = lambda: self._within_the_end(monitor)
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
-        if counts.evaluations < self.budget:
-            return "idle"
-        # The last batch may have been cut short.
-        return monitor.reason if monitor.reason and counts.clocked else "budget"
+        if self._cut_short(monitor):
+            return monitor.reason
+        return "idle" if counts.evaluations < self.budget else "budget"
 
     def _keep(self, monitor: Monitor, stopped: str = "") -> None:
         """Tell the checkpoint how the run stands, unless something of the last iteration was cut short: that has to be done again."""
-        counts = self.evaluator.counts
-        if self._checkpoint is None or (monitor.reason and counts.clocked > self._uncut):
+        if self._cut_short(monitor):
             return
+        counts = self.evaluator.counts
         self._uncut = counts.clocked
-        assert self.seed is not None
-        self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, monitor.elapsed, stopped))
+        if self._checkpoint:
+            assert self.seed is not None
+            self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, monitor.elapsed, stopped))
+
+    def _cut_short(self, monitor: Monitor) -> bool:
+        """Whether something was since the run was last kept, or would have been."""
+        return bool(monitor.reason) and self.evaluator.counts.clocked > self._uncut
+
+    def _within_the_end(self, monitor: Monitor) -> None:
+        self._keep(monitor)
+        self._write_in_time()
 
     def _write_in_time(self) -> None:
         if self._checkpoint:

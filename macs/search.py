@@ -15,6 +15,7 @@ from .attempts import Attempts
 from .box import Box
 from .dominance import dominates, nondominated
 from .evaluation import Evaluation, Evaluator
+from .solves import Polishing, Solves
 
 if TYPE_CHECKING:
     from .macs import MACS
@@ -45,6 +46,8 @@ class SearchState:
         Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
     rng : numpy.random.Generator
         Its `bit_generator.state` is data, and all there is to keep of it.
+    polishing : Polishing, optional
+        Of a polish that has begun and is not finished: where to go on. Then the archive is what it has found so far.
     """
 
     agents: Agents
@@ -59,6 +62,7 @@ class SearchState:
     evaluations: int
     rng: np.random.Generator
     refinements: int = 0
+    polishing: Polishing | None = None
 
 
 def box_of(evaluator: Evaluator) -> Box:
@@ -121,9 +125,16 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
 
 def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
     """The last thing a search does (see `MACS.conclude`)."""
-    if settings.refine and evaluator.has_gradients:
-        left = state.evaluations // settings.polish_every - evaluator.counts.gradient_solves
-        polish.polish(state, polish.Solves(evaluator, left), settings.archive, settings.exponent)
+    if not (settings.refine and evaluator.has_gradients):
+        return
+    if state.polishing is None:
+        state.polishing = Polishing.of(state.archive)
+    state.archive = state.polishing.archive
+    before = evaluator.counts.gradient_solves - len(state.polishing)
+    solves = Solves(evaluator, state.evaluations // settings.polish_every - before, state.polishing)
+    polish.polish(state, solves, settings.archive, settings.exponent)
+    if not solves.stopped:
+        state.polishing = None
 
 
 def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:

@@ -53,7 +53,11 @@ class Solver(ABC):
         """One iteration, within the budget of evaluations."""
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
-        """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers."""
+        """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers.
+
+        If the work is to end early (`transcription.stopping`), it leaves what it has. A checkpoint may keep the state before each of its
+        batches: called with that, it has to go on to the same bits.
+        """
 
     def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
         """What the state adds to the `stats` of a front, as plain data. Nothing, for most solvers."""
@@ -122,12 +126,12 @@ class Solver(ABC):
         checkpoint : path, optional
             A file that the run is kept in, now and then and whenever it ends. The same call goes on where it was, whether the run was
             killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been. What was done
-            since the last write, between iterations and a second or more apart, is done again; so is a first population that was not
-            finished. `time_limit` counts from each call, `stats["wall_time"]` sums them up. Of a run that
-            has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined again. All that
-            decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and seed; a seed of
-            None takes over that of the file. Should the file not be writable any more in the middle of the run, the search goes on, logs a
-            warning, and `stats["checkpoint"]` says why.
+            since the last write is done again; writes are between iterations, and between the gradient solves that end a search, a second
+            or more apart. So is a first population that was not finished. `time_limit` counts from each call, `stats["wall_time"]` sums
+            them up. Of a run that has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined
+            again. All that decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and
+            seed; a seed of None takes over that of the file. Should the file not be writable any more in the middle of the run, the search
+            goes on, logs a warning, and `stats["checkpoint"]` says why.
 
         Returns
         -------

@@ -78,6 +78,8 @@ class Solved:
         Of IPOPT.
     clocked : bool
         Whether a clock ended any of the work: then the same solve need not give the same again.
+    begun : bool
+        False if there was no solve: the work was to end before.
     """
 
     z: np.ndarray
@@ -86,6 +88,7 @@ class Solved:
     status: str
     iterations: int
     clocked: bool = False
+    begun: bool = True
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,7 @@ def scalarize(
     -------
     Solved
         A local optimum. It may be worse than a feasible start: where that matters, compare, or give the start's objectives as ceiling. The
-        start itself, with status "timeout", if the work is to end early (`stopping`).
+        start itself, with status "timeout" and not begun, if the work is to end early (`stopping`).
 
     Raises
     ------
@@ -170,7 +173,7 @@ def scalarize(
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     if stopping():
-        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True)
+        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
     feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     worse = feasible and task.value(first.F) > tolerance

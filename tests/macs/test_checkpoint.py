@@ -11,19 +11,22 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, checkpoint, polish
+from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, bilevel, checkpoint, monitor, polish
 from macs.solver import Solver
 from problems import load
 from transcription import DFET
 from transcription.inner import Ipopt
+from transcription.scalarized import Solved
 
 MESH = DFET(3, 2)
 BOX = [(0.0, 1.0)] * 5
@@ -157,28 +160,94 @@ def test_a_finished_search_is_not_polished_twice(file, monkeypatch) -> None:
     assert_same(solve(checkpoint=file), whole)
 
 
-def test_killed_in_the_polish(file, monkeypatch) -> None:
-    def dies(*_: Any) -> bool:
-        raise MemoryError("killed")
+class Solving:
+    """Counts the gradient solves; within the one of a certain number something happens."""
 
+    def __init__(self, patch: pytest.MonkeyPatch, number: int = 0, happens: Callable[[], None] = lambda: None) -> None:
+        self.count, self._number, self._happens, self._solve = 0, number, happens, bilevel.scalarize
+        patch.setattr(bilevel, "scalarize", self)
+
+    def __call__(self, *arguments: Any, **more: Any) -> Solved:
+        found = self._solve(*arguments, **more)
+        self.count += found.begun
+        if found.begun and self.count == self._number:
+            self._happens()
+        return found
+
+
+def fails() -> None:
+    raise MemoryError("killed")
+
+
+def press() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.parametrize("number", [1, 5, 9, 20, 38])
+def test_killed_in_the_polish(file, monkeypatch, number) -> None:
+    with monkeypatch.context() as patch, pytest.raises(MemoryError):
+        Solving(patch, number, fails)
+        solve(checkpoint=file)
     with monkeypatch.context() as patch:
-        patch.setattr(polish, "_learn_from_neighbours", dies)
-        with pytest.raises(MemoryError):
-            solve(checkpoint=file)
+        solving = Solving(patch)
+        assert_same(solve(checkpoint=file), solved())
+    assert solving.count == solved().stats["gradient_solves"] - (number - 1)  # that one was not finished
+
+
+@pytest.mark.parametrize("number", [1, 5, 9, 20, 38])
+@pytest.mark.parametrize("kept", [True, False])
+def test_interrupted_in_the_polish(file, monkeypatch, number, kept) -> None:
+    with monkeypatch.context() as patch:
+        Solving(patch, number, press)
+        part = solve(checkpoint=file if kept else None)
+    assert part.stats["stopped"] == "interrupted" and not part.stats["reproducible"]
+    assert part.stats["gradient_solves"] == number and len(part)
+    if kept:
+        with monkeypatch.context() as patch:
+            solving = Solving(patch)
+            assert_same(solve(checkpoint=file), solved())
+        assert solving.count == solved().stats["gradient_solves"] - number
+
+
+def test_out_of_time_in_the_polish(file, monkeypatch) -> None:
+    with monkeypatch.context() as patch:
+        late = SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
+        Solving(patch, 12, lambda: patch.setattr(monitor, "time", late))
+        part = solve(checkpoint=file, time_limit=600.0)
+    assert part.stats["stopped"] == "time limit" and part.stats["gradient_solves"] == 12
     assert_same(solve(checkpoint=file), solved())
 
 
-def test_interrupted_in_the_polish(file, monkeypatch) -> None:
-    learn = polish._learn_from_neighbours
+def test_interrupted_time_and_again_in_the_polish(file, monkeypatch) -> None:
+    solves = 0
+    while True:
+        with monkeypatch.context() as patch:
+            Solving(patch, 7, press)
+            front = solve(checkpoint=file)
+        if front.stats["stopped"] != "interrupted":
+            break
+        solves += 7
+        assert front.stats["gradient_solves"] == solves
+    assert solves > 20
+    assert_same(front, solved())
 
-    def press(*arguments: Any) -> bool:
-        os.kill(os.getpid(), signal.SIGINT)
-        return learn(*arguments)
 
+def test_interrupted_within_the_last_solve(file, monkeypatch) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(polish, "_learn_from_neighbours", press)
-        assert solve(checkpoint=file).stats["stopped"] == "interrupted"
-    assert_same(solve(checkpoint=file), solved())
+        Solving(patch, solved().stats["gradient_solves"], press)
+        front = solve(checkpoint=file)
+    assert front.stats["stopped"] == "budget"  # there was nothing left to interrupt
+    assert_same(front, solved())
+
+
+def test_interrupted_in_the_polish_of_a_search_that_is_stuck(file, monkeypatch) -> None:
+    solver = Stuck(agents=4, archive=6, polish_every=4)
+    with monkeypatch.context() as patch:
+        Solving(patch, 3, press)
+        assert solve(solver, checkpoint=file).stats["stopped"] == "interrupted"
+    front = solve(solver, checkpoint=file)
+    assert front.stats["stopped"] == "idle"
+    assert_same(front, solve(solver))
 
 
 def test_what_an_interrupt_cut_short_is_done_again(file, monkeypatch) -> None:
@@ -274,25 +343,59 @@ front.save("front.nc")
 """
 
 
-@pytest.mark.parametrize("solver", [SMALL, MOPSO(particles=10)], ids=["MACS", "MOPSO"])
-def test_kill_9(tmp_path, solver) -> None:
-    (tmp_path / "script.py").write_text(SCRIPT.replace("SOLVER", repr(solver)), encoding="utf-8")
-    log = tmp_path / "log"
+def killed(folder: Path, script: str, when: int) -> tuple[int, int]:
+    """A script is killed once it has logged so much, and called again; what it had logged, and what it logged then."""
+    (folder / "script.py").write_text(script, encoding="utf-8")
+    log = folder / "log"
     call = [sys.executable, "script.py"]
-    run = subprocess.Popen(call, cwd=tmp_path)
+    run = subprocess.Popen(call, cwd=folder)
     ends = time.monotonic() + 60
-    while (log.stat().st_size if log.exists() else 0) < 200:
+    while (log.stat().st_size if log.exists() else 0) < when:
         assert run.poll() is None and time.monotonic() < ends
         time.sleep(0.005)
     run.kill()
     assert run.wait() == -signal.SIGKILL
-    assert not (tmp_path / "front.nc").exists()
+    assert not (folder / "front.nc").exists()
     done = log.stat().st_size
-    subprocess.run(call, cwd=tmp_path, check=True, timeout=60)
-    again = log.stat().st_size - done
+    subprocess.run(call, cwd=folder, check=True, timeout=60)
+    assert {path.name for path in folder.iterdir() if ".part" not in path.name} == {"script.py", "log", "run.ckpt", "front.nc"}
+    return done, log.stat().st_size - done
+
+
+@pytest.mark.parametrize("solver", [SMALL, MOPSO(particles=10)], ids=["MACS", "MOPSO"])
+def test_kill_9(tmp_path, solver) -> None:
+    done, again = killed(tmp_path, SCRIPT.replace("SOLVER", repr(solver)), 200)
     assert 400 - done <= again < 400 - done + 120 < 400  # what one or two iterations had evaluated since the last write
     assert_same(Front.load(tmp_path / "front.nc"), minimize(solver))
-    assert {path.name for path in tmp_path.iterdir() if ".part" not in path.name} == {"script.py", "log", "run.ckpt", "front.nc"}
+
+
+POLISH = """
+import sys, time
+from macs import MACS, bilevel, checkpoint
+from problems import load
+from transcription import DFET
+
+checkpoint.SECONDS = checkpoint.SHARE = 0.0
+scalarize = bilevel.scalarize
+
+def logged(*arguments, **more):
+    found = scalarize(*arguments, **more)
+    with open("log", "a") as log:
+        log.write("x")
+    time.sleep(0.02)
+    return found
+
+bilevel.scalarize = logged
+front = MACS(agents=4, archive=6, polish_every=4).solve(load("orbit_rise"), DFET(3, 2), evaluations=160, checkpoint="run.ckpt", seed=1)
+front.save("front.nc")
+"""
+
+
+def test_kill_9_in_the_polish(tmp_path) -> None:
+    done, again = killed(tmp_path, POLISH, 17)
+    left = solved().stats["gradient_solves"] - done
+    assert 0 < left <= again <= left + 1  # what the one before the kill had found may not have been written yet
+    assert_same(Front.load(tmp_path / "front.nc"), solved())
 
 
 # Whom it belongs to

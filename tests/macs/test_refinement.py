@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from fronts import distance_to_curve, inverted_distance
 
 from macs import MACS
 from macs.archive import Archive
+from macs.bilevel import Bilevel
 from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
-from macs.monitor import Stopped
-from macs.polish import Solves, polish
+from macs.polish import polish
 from macs.refinement import allowed
-from macs.search import SearchState, begin
+from macs.search import SearchState, begin, conclude
+from macs.solves import Solves
 from problems import Problem, goddard, load, orbit_rise
 from transcription import DFET
-from transcription.inner import Newton
+from transcription.inner import Auto, Newton
 from transcription.optimality import optimality
+from transcription.stopping import stopped_by, stopping
 
 
 class Circle(Evaluator):
@@ -161,22 +165,81 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
         assert uncovered(state.archive.F, sphere) < 0.3
 
 
-def test_what_a_polish_that_is_stopped_has_found_is_the_front() -> None:
-    sphere, calls = Sphere(), []
+def after(solves: int):
+    """Asks to stop after so many questions."""
+    asked = iter(range(10**6))
+    return lambda: next(asked) >= solves
 
-    def stop() -> None:
-        calls.append(None)
-        if len(calls) > 16:
-            raise Stopped("interrupted")
 
+class Asking:
+    """Asks before each solve whether it is to go on, and notes what solves find."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[np.ndarray] = []
+
+    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+        if stopping():
+            return Evaluation(starts[:0], references[:0], np.empty(0), np.empty(0, dtype=str)), 0
+        found, iterations = super()._refine(starts, references, weights)  # type: ignore[misc]
+        self.found.extend(found.F)
+        return found, iterations
+
+
+class AskingCircle(Asking, Circle):
+    pass
+
+
+class AskingSphere(Asking, Sphere):
+    pass
+
+
+@pytest.mark.parametrize(
+    ("kind", "solves"), [*((AskingCircle, solves) for solves in (0, 1, 11, 19, 21, 23, 35)), (AskingSphere, 4), (AskingSphere, 16)]
+)
+def test_a_polish_that_is_stopped_loses_nothing_and_goes_on(kind, solves) -> None:
     rng = np.random.default_rng(3)
-    state = state_of(sphere, np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.4, 0.5, (20, 2))]))
-    solve = sphere.refine
-    sphere.refine = lambda *rows: (stop(), solve(*rows))[1]  # type: ignore[method-assign]
-    with pytest.raises(Stopped):
-        polish(state, Solves(sphere, 200), 30)
-    found = state.archive.Z[:, 0] == 1.0
-    assert found.sum() > 8 and uncovered(state.archive.F[found], sphere) < 0.6
+    crowd = np.column_stack([rng.uniform(0.85, 0.9, 24), rng.uniform(0.4, 0.9, (24, len(kind().free) - 1))])
+    settings = MACS(agents=3, archive=200, polish_every=1)
+
+    def beginning() -> tuple[SearchState, Any]:
+        evaluator = kind()
+        state = state_of(evaluator, crowd)
+        state.evaluations = 40  # so many solves, one for each
+        return state, evaluator
+
+    whole, thorough = beginning()
+    conclude(settings, whole, thorough)
+    assert len(thorough.found) > solves
+    state, evaluator = beginning()
+    with stopped_by(after(solves)):
+        conclude(settings, state, evaluator)
+    assert evaluator.counts.gradient_solves == len(evaluator.found) == solves and evaluator.counts.clocked
+    # What was there, and what was found, is in the front, or something that is better.
+    for F in [*evaluator.objectives(crowd), *evaluator.found]:
+        assert (state.archive.F <= F + 1e-3).all(axis=1).any()
+    conclude(settings, state, evaluator)
+    assert evaluator.counts.gradient_solves == len(evaluator.found) == len(thorough.found)
+    assert state.archive.Z.tobytes() == whole.archive.Z.tobytes() and state.archive.F.tobytes() == whole.archive.F.tobytes()
+
+
+def test_gradient_solves_that_are_stopped_within_a_batch_are_kept() -> None:
+    nlp = DFET(3, 2).transcribe(load("goddard"))
+
+    def solved(solves: int) -> tuple[Bilevel, Evaluation]:
+        evaluator = Bilevel(nlp, Auto(), 1e-6)
+        rng = np.random.default_rng(1)
+        seen = evaluator.evaluate(evaluator.first_guess(evaluator.lower + rng.random((4, len(nlp.free))) * nlp.span[nlp.free]))
+        with stopped_by(after(solves)):
+            return evaluator, evaluator.refine(seen.Z, seen.F, np.ones((4, 2)))
+
+    whole, everything = solved(4)
+    assert whole.counts.gradient_solves == 4 and not whole.counts.clocked
+    for solves in range(4):
+        part, found = solved(solves)
+        assert part.counts.gradient_solves == solves and part.counts.clocked == 1
+        assert found.Z.shape == (solves, len(nlp.variables)) and found.F.shape == (solves, 2)
+        assert np.array_equal(found.Z, everything.Z[:solves]) and np.array_equal(found.status, everything.status[:solves])
 
 
 def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_over() -> None:
