@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 from scipy.sparse import csc_matrix, csr_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from .base import NLP
 from .derivatives import gradients, objective_scales
@@ -91,24 +91,31 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarr
     """Reduced gradients (d, k) of k functions with gradients (k, n): what is left of each after the best multipliers of the equations.
 
     Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
-    for the others.
+    for the others. Where there are as many equations as others, these follow from the free ones, and it is the total derivative by these.
     """
     r, n = equations.shape
     measured = np.isinf(nlp.span)
     measured[nlp.free] = True
+    if r + np.count_nonzero(measured) == n:
+        by_states = csc_matrix(equations[:, ~measured].T)
+        adjoints = _solved(splu(by_states), by_states, gradients[:, ~measured].T)
+        return gradients[:, measured].T - equations[:, measured].T @ adjoints
     weights = np.where(measured, 1.0, DEPENDENT)
     e, every = equations.tocoo(), np.arange(n + r)
     i, j = np.r_[e.col, e.row + n, every], np.r_[e.row + n, e.col, every]
     exact, regular = (csc_matrix((np.r_[e.data, e.data, weights, np.full(r, -last)], (i, j))) for last in (0.0, REGULAR))
-    factors = splu(regular)
-    right = np.vstack([gradients.T, np.zeros((r, len(gradients)))])
+    return _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))[:n][measured]
+
+
+def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
+    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it."""
     solution = factors.solve(right)
     for _ in range(REFINEMENTS):
-        left = right - exact @ solution
+        left = right - matrix @ solution
         if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
             break
         solution += factors.solve(left)
-    return solution[:n][measured]
+    return solution
 
 
 def _least(A: np.ndarray, slack: np.ndarray) -> float:
