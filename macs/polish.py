@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import count
 from math import comb
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,8 @@ from .archive import Archive
 from .directions import across, simplex_lattice
 from .dominance import extremes, nondominated
 from .evaluation import CONVERGED
-from .refinement import CURVE, SAME, keeps_promise, nearest, ranges_of, slack
+from .refinement import CURVE, SAME, keeps_promise, nearest, ranges, slack
 from .solves import Solves
-
-if TYPE_CHECKING:
-    from .search import SearchState
 
 PLACES = 500
 """How many places a surface has, at most."""
@@ -31,8 +27,8 @@ GAIN = 0.995
 """A slide is tried if it is to lower the energy of a point to this part."""
 
 
-def polish(state: SearchState, solves: Solves, limit: int, exponent: float | None = None) -> None:
-    """Bring every point of the archive down to the front, and spread them along it as evenly as their number allows.
+def polish(archive: Archive, solves: Solves, limit: int, exponent: float | None = None) -> Archive:
+    """Bring every point of an archive down to the front, and spread them along it as evenly as their number, at most `limit`, allows.
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
     better ones; then points slide along the front to where they repel each other least, or fill what places are left. `exponent` is that of
@@ -41,30 +37,33 @@ def polish(state: SearchState, solves: Solves, limit: int, exponent: float | Non
     all over it, once for each point that the archive may hold. Where the work is to end early no solves are left, and what those before
     have found is the front.
     """
-    if not len(state.archive):
-        return
-    if state.archive.F.shape[1] > CURVE:
-        _cover(state, solves, limit, exponent)
+    if not len(archive):
+        return archive
+    if archive.F.shape[1] > CURVE:
+        archive = _covered(archive, solves, limit, exponent)
         if not solves.left:
-            return
-    waiting = _descend(state, solves, exponent)
+            return archive
+    archive, waiting = _descended(archive, solves, exponent)
     for _ in range(ROUNDS):
-        if not _learn_from_neighbours(state, solves):
+        better = _taught(archive, solves)
+        if better is archive:
             break
-    pool, ranges = state.archive, ranges_of(state)
-    state.archive = _thinned(pool, limit, exponent)
+        archive = better
+    pool, span = archive, ranges(archive.F)
+    archive = _thinned(pool, limit, exponent)
     for _ in range(ROUNDS):
-        references, starts = _slides(state, limit, exponent)
+        references, starts = _slides(archive, limit, exponent)
         if not (len(references) and solves.left):
             break
-        found = solves(starts, references, np.tile(ranges, (len(references), 1)))
+        found = solves(starts, references, np.tile(span, (len(references), 1)))
         good = found.status == CONVERGED
-        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), ranges)
-        before, state.archive = state.archive, _thinned(pool, limit, exponent)
-        if np.array_equal(before.F, state.archive.F):
+        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), span)
+        before, archive = archive, _thinned(pool, limit, exponent)
+        if np.array_equal(before.F, archive.F):
             break
     if len(waiting):
-        state.archive = _thinned(_front(_joined(state.archive, waiting), ranges), limit, exponent)
+        archive = _thinned(_front(_joined(archive, waiting), span), limit, exponent)
+    return archive
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
@@ -72,46 +71,44 @@ def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
-def _descend(state: SearchState, solves: Solves, exponent: float | None) -> Archive:
-    """Guarded solves of the points; ends of the front are solved for their own objective first, then for the others. Returns the points
-    for which there are too few solves: they are not in the archive any more."""
-    archive, ranges = state.archive, ranges_of(state)
+def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tuple[Archive, Archive]:
+    """Guarded solves of the points; ends of the front for their own objective first, then for the others. Also returns the points
+    for which there are too few solves: they are not among the others any more."""
+    span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
     chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
     archive, waiting = archive.take(chosen), archive.take(~chosen)
-    found = solves(archive.Z, archive.F, np.tile(ranges, (len(archive), 1)))
-    kept = keeps_promise(found, archive.F, archive.violation, ranges)
+    found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
+    kept = keeps_promise(found, archive.F, archive.violation, span)
     archive = Archive(
         np.where(kept[:, None], found.Z, archive.Z),
         np.where(kept[:, None], found.F, archive.F),
         np.where(kept, found.violation, archive.violation),
     )
-    ends = _ends(archive, ranges, solves)
-    state.archive = _front(_joined(ends, archive), ranges)
-    return waiting
+    return _front(_joined(_ends(archive, span, solves), archive), span), waiting
 
 
-def _cover(state: SearchState, solves: Solves, limit: int, exponent: float | None) -> None:
+def _covered(archive: Archive, solves: Solves, limit: int, exponent: float | None) -> Archive:
     """Ends of the front, and as many places between them as there may be points: always that which is farthest from what is known."""
-    m = state.archive.F.shape[1]
-    ends = _ends(state.archive, ranges_of(state), solves)
-    pool = _front(_joined(ends, state.archive), ranges_of(state))
-    ideal, ranges = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
-    ranges = np.where(ranges > 0.0, ranges, ranges_of(state))
-    known = across((ends.F - ideal) / ranges)
+    m, span = archive.F.shape[1], ranges(archive.F)
+    ends = _ends(archive, span, solves)
+    pool = _front(_joined(ends, archive), span)
+    ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
+    between = np.where(between > 0.0, between, span)
+    known = across((ends.F - ideal) / between)
     places = simplex_lattice(m, _divisions(m)) @ known
     for _ in range(limit):
         if solves.left <= 0:
             break
         place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
-        reference = ideal + ranges * place
-        start = np.argmin(((pool.F - reference) / ranges).max(axis=1))
-        found = solves(pool.Z[start : start + 1], reference[None], ranges[None])
+        reference = ideal + between * place
+        start = np.argmin(((pool.F - reference) / between).max(axis=1))
+        found = solves(pool.Z[start : start + 1], reference[None], between[None])
         known = np.vstack([known, place])
         if found.status[0] == CONVERGED:
-            known = np.vstack([known, across((found.F - ideal) / ranges)])
+            known = np.vstack([known, across((found.F - ideal) / between)])
             pool = _joined(Archive(found.Z, found.F, found.violation), pool)
-    state.archive = _thinned(_front(pool, ranges), limit, exponent)
+    return _thinned(_front(pool, between), limit, exponent)
 
 
 def _divisions(m: int) -> int:
@@ -119,47 +116,47 @@ def _divisions(m: int) -> int:
     return next(d for d in count(1) if comb(d + m, m - 1) > PLACES)
 
 
-def _ends(archive: Archive, ranges: np.ndarray, solves: Solves) -> Archive:
+def _ends(archive: Archive, span: np.ndarray, solves: Solves) -> Archive:
     """The best of each objective, and of these the best in the others."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
     one = np.eye(m, dtype=bool)
-    single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, ranges, 0.0))
-    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + slack(best.violation) * ranges)
+    single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
+    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + slack(best.violation) * span)
     Z, F = np.where(kept[:, None], single.Z, best.Z), np.where(kept[:, None], single.F, best.F)
     if m == 1:
         return Archive(Z, F, np.where(kept, single.violation, best.violation))
     # From the least value of its own objective, which becomes a limit, all others together.
-    both = solves(Z, F, np.where(one, 0.0, ranges))
+    both = solves(Z, F, np.where(one, 0.0, span))
     violation = np.where(kept, single.violation, best.violation)
-    good = keeps_promise(both, F, violation, ranges)
+    good = keeps_promise(both, F, violation, span)
     return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
 
 
-def _learn_from_neighbours(state: SearchState, solves: Solves) -> bool:
-    """Guarded solves of every point from its neighbours' controls, if there are enough for all; whether any was clearly better."""
-    archive, ranges = state.archive, ranges_of(state)
-    pairs = [(i, j) for i in range(len(archive)) for j in nearest(state, archive.F[i], archive.F)[1 : archive.F.shape[1] + 1]]
+def _taught(archive: Archive, solves: Solves) -> Archive:
+    """Guarded solves of every point from its neighbours' controls, if there are enough for all; the archive itself if none was clearly
+    better."""
+    span = ranges(archive.F)
+    pairs = [(i, j) for i in range(len(archive)) for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]]
     if not 0 < len(pairs) <= solves.left:
-        return False
+        return archive
     own, other = (np.array(index) for index in zip(*pairs, strict=True))
-    found = solves(archive.Z[other], archive.F[own], np.tile(ranges, (len(own), 1)))
-    gain = ((archive.F[own] - found.F) / ranges).min(axis=1)
+    found = solves(archive.Z[other], archive.F[own], np.tile(span, (len(own), 1)))
+    gain = ((archive.F[own] - found.F) / span).min(axis=1)
     better = (found.status == CONVERGED) & (gain > BETTER)
     if not better.any():
-        return False
-    state.archive = _front(_joined(Archive(found.Z[better], found.F[better], found.violation[better]), archive), ranges)
-    return True
+        return archive
+    return _front(_joined(Archive(found.Z[better], found.F[better], found.violation[better]), archive), span)
 
 
-def _slides(state: SearchState, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
+def _slides(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
     """References (k, m) on the lines between neighbours, and vectors (k, D) to start from: in the middle of wide gaps, and where points
     would repel each other less."""
-    archive, ranges = state.archive, ranges_of(state)
-    F, n = archive.F / ranges, len(archive)
+    span = ranges(archive.F)
+    F, n = archive.F / span, len(archive)
     if n < 2:
         return np.empty((0, F.shape[1])), archive.Z[:0]
-    neighbours = [nearest(state, point, archive.F)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
+    neighbours = [nearest(point, archive.F, span)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
     pairs = sorted({(min(i, j), max(i, j)) for i in range(n) for j in neighbours[i]})
     apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
     wide = np.count_nonzero(apart > WIDE * np.median(apart))
@@ -175,12 +172,12 @@ def _slides(state: SearchState, limit: int, exponent: float | None) -> tuple[np.
         if energy[best] < GAIN * energy[0]:
             references.append(lines[best])
             starts.append(archive.Z[i])
-    return np.array(references).reshape(-1, F.shape[1]) * ranges, np.array(starts).reshape(-1, archive.Z.shape[1])
+    return np.array(references).reshape(-1, F.shape[1]) * span, np.array(starts).reshape(-1, archive.Z.shape[1])
 
 
-def _front(points: Archive, ranges: np.ndarray) -> Archive:
+def _front(points: Archive, span: np.ndarray) -> Archive:
     """Points that no other dominates, to as many digits as they have; of equal ones the first."""
-    return points.take(np.flatnonzero(nondominated(np.round((points.F - points.F.min(axis=0)) / ranges / SAME))))
+    return points.take(np.flatnonzero(nondominated(np.round((points.F - points.F.min(axis=0)) / span / SAME))))
 
 
 def _joined(one: Archive, two: Archive) -> Archive:

@@ -58,7 +58,7 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     start = agents.Z[i].copy()
     others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1) & feasible)
     if turn % 3 == 1 and others.size:
-        start = state.archive.Z[others[nearest(state, agents.F[i], state.archive.F[others])[0]]]
+        start = state.archive.Z[others[nearest(agents.F[i], state.archive.F[others], ranges_of(state))[0]]]
     elif turn % 3 == 2 and feasible:
         pool = box.to_unit(state.archive.Z[:, evaluator.free])
         X = box.to_unit(start[evaluator.free])[None]
@@ -91,17 +91,17 @@ def slack(violation: np.ndarray) -> np.ndarray:
 
 
 def ranges_of(state: SearchState) -> np.ndarray:
-    """What counts as much in each objective (m,): the range of the archive, or of the agents while it is empty; where that is nothing, the
-    objective's size."""
-    F = state.archive.F
-    if not len(F):
-        F = state.agents.F[np.isfinite(state.agents.F).all(axis=1)]
+    """The `ranges` of the archive, or of the agents while it is empty."""
+    return ranges(state.archive.F if len(state.archive) else state.agents.F[np.isfinite(state.agents.F).all(axis=1)])
+
+
+def ranges(F: np.ndarray) -> np.ndarray:
+    """What counts as much in each objective (m,): the range of points F (k, m); where that is nothing, the objective's size."""
     span = np.ptp(F, axis=0)
     return np.where(span > 0.0, span, np.maximum(np.abs(F).max(axis=0), 1.0))
 
 
-def nearest(state: SearchState, point: np.ndarray, F: np.ndarray) -> np.ndarray:
+def nearest(point: np.ndarray, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     """Rows of F (n, m), the nearest to a point first."""
-    ranges = ranges_of(state)
     zero = np.zeros(len(ranges))
     return np.argsort(np.linalg.norm(normalised(F - point, zero, ranges), axis=1), kind="stable")

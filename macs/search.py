@@ -129,10 +129,9 @@ def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
         return
     if state.polishing is None:
         state.polishing = Polishing.of(state.archive)
-    state.archive = state.polishing.archive
     before = evaluator.counts.gradient_solves - len(state.polishing)
     solves = Solves(evaluator, state.evaluations // settings.polish_every - before, state.polishing)
-    polish.polish(state, solves, settings.archive, settings.exponent)
+    state.archive = polish.polish(state.polishing.archive, solves, settings.archive, settings.exponent)
     if not solves.stopped:
         state.polishing = None
 

@@ -67,8 +67,7 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
     rng = np.random.default_rng(1)
     Z = np.column_stack([rng.uniform(0.8, 0.9, 10), np.sort(rng.uniform(0.2, 1.3, 10))])
     state = state_of(evaluator, Z)
-    polish(state, Solves(evaluator, 10_000), 10)
-    archive = state.archive
+    archive = polish(state.archive, Solves(evaluator, 10_000), 10)
     assert len(archive) == 10 and archive.Z[:, 0] == pytest.approx(1.0)
     angles = np.sort(archive.Z[:, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
@@ -78,7 +77,7 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
 def test_a_polish_fills_empty_places() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.array([[0.9, 0.3], [0.9, 1.2]]))
-    polish(state, Solves(evaluator, 10_000), 6)
+    state.archive = polish(state.archive, Solves(evaluator, 10_000), 6)
     assert len(state.archive) == 6
 
 
@@ -86,7 +85,7 @@ def test_no_more_solves_than_allowed() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)]))
     solves = Solves(evaluator, 3)
-    polish(state, solves, 5)
+    state.archive = polish(state.archive, solves, 5)
     assert evaluator.counts.gradient_solves == 3 and solves.left == 0
     assert 3 <= len(state.archive) <= 5
     for seed in (1, 2):
@@ -115,7 +114,7 @@ def test_few_solves_are_not_spent_on_a_crowd() -> None:
     evaluator = Circle()
     rng = np.random.default_rng(1)
     state = state_of(evaluator, np.column_stack([rng.uniform(0.8, 0.9, 30), np.linspace(0.7, 0.8, 30)]))
-    polish(state, Solves(evaluator, 20), 30)
+    state.archive = polish(state.archive, Solves(evaluator, 20), 30)
     angles = np.sort(state.archive.Z[state.archive.Z[:, 0] == 1.0, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
     assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
@@ -160,7 +159,7 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
     for solves in (36, 200):
         sphere = Sphere()
         state = state_of(sphere, crowd)
-        polish(state, Solves(sphere, solves), 30)
+        state.archive = polish(state.archive, Solves(sphere, solves), 30)
         assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
         assert uncovered(state.archive.F, sphere) < 0.3
 
@@ -263,7 +262,7 @@ def test_what_is_worse_or_failed_is_not_taken() -> None:
     evaluator = Useless()
     Z = np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)])
     state = state_of(evaluator, Z)
-    polish(state, Solves(evaluator, 1000), 5)
+    state.archive = polish(state.archive, Solves(evaluator, 1000), 5)
     assert np.array_equal(np.sort(state.archive.Z[:, 1]), Z[:, 1])
 
 
