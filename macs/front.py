@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from problems import Problem
+    from transcription.base import Transcription
     from transcription.trajectory import Trajectory
 
 
@@ -258,6 +259,41 @@ class Front:
         from .refining import refine_mesh
 
         return refine_mesh(self, tolerance, limit, progress)
+
+    def polished(
+        self, transcription: Transcription, *, solves: int | None = None, limit: int | None = None, progress: bool = False
+    ) -> Front:
+        """The front brought down to the Pareto front by gradient solves, whichever solver found it on whichever transcription.
+
+        A search wants candidates that are scored quickly, such as those of single shooting; gradients want a sparse problem, such as that
+        of DFET. The solves begin from the front's trajectories, interpolated: first the best of each objective, then places all over the
+        front, or along it; see `MACS`. Points that no solve came to better remain what they are, on their own transcription.
+
+        Parameters
+        ----------
+        transcription : Transcription
+            On which to solve.
+        solves : int, optional
+            How many gradient solves there may be. Default: as many as there are points.
+        limit : int, optional
+            Most points of the result, well spread. Default: as many as there are.
+        progress : bool
+            Tell on the terminal how it stands.
+
+        Returns
+        -------
+        Front
+            Feasible, mutually non-dominated points; those that were solved for have their `optimality`. Costs are added to those of the
+            search. Ctrl-C ends the work with what there is.
+
+        Raises
+        ------
+        ValueError
+            For a black box, a problem that cannot be found, peaks that gradient tools refuse, and arguments that make no sense.
+        """
+        from .polished import polished
+
+        return polished(self, transcription, solves, limit, progress)
 
     def flown(
         self,

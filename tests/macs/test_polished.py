@@ -1,0 +1,101 @@
+"""A front of whichever solver and transcription, brought down by gradients on another."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+from fronts import distance_to_curve
+from synthetic_fronts import black_box
+
+from macs import NSGA2, Front
+from macs.bilevel import Bilevel
+from problems import Problem, load
+from problems.goddard import reference
+from transcription import DFET, SingleShooting
+from transcription.stopping import stopping
+
+FINE = DFET(8, 4)
+
+
+@pytest.fixture(scope="module")
+def rough() -> Front:
+    """Goddard, by a search that knows no gradients."""
+    return NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=600, seed=1)
+
+
+@pytest.fixture(scope="module")
+def smooth(rough) -> Front:
+    return rough.polished(FINE, solves=50)
+
+
+def test_the_front_comes_down_to_the_truth(rough, smooth):
+    truth = reference(20001)
+    assert distance_to_curve(rough.objectives, truth).max() > 1e-2, "there is something to do"
+    assert len(smooth) == len(rough) and set(smooth.status) == {"converged"}
+    assert distance_to_curve(smooth.objectives, truth).max() < 1e-3
+    assert all(point.transcription == FINE.to_dict() and point.optimality < 1e-6 for point in smooth)
+    assert smooth.F.min(axis=0) == pytest.approx(truth.min(axis=0) * [1, 0] + (-truth).min(axis=0) * [0, 1], abs=2e-2), "both ends"
+
+
+def test_costs_are_those_of_both(rough, smooth):
+    assert smooth.stats["gradient_solves"] == rough.stats["gradient_solves"] + 50
+    assert smooth.stats["evaluations"] == rough.stats["evaluations"] == 600
+    assert smooth.stats["wall_time"] > rough.stats["wall_time"] and smooth.stats["reproducible"]
+    assert smooth.solver == rough.solver and smooth.stats["seed"] == 1
+
+
+def test_what_no_solve_came_to_stays_what_it_is(rough, tmp_path):
+    few = rough.polished(FINE, solves=5)
+    methods = {point.transcription["method"] for point in few}
+    assert methods == {"DFET", "SingleShooting"}
+    kept = [point for point in few if point.transcription["method"] == "SingleShooting"]
+    assert all(any(np.array_equal(point.decision, one.decision) for one in rough) for point in kept)
+    assert all(len(point.alone()) == 1 for point in few)
+    few.save(tmp_path / "few.nc")
+    again = Front.load(tmp_path / "few.nc")
+    assert np.array_equal(again.F, few.F) and [p.transcription for p in again] == [p.transcription for p in few]
+    assert np.array_equal(rough.polished(FINE, solves=0).F, rough.F)
+
+
+def test_the_same_bits_again(rough, smooth):
+    assert np.array_equal(rough.polished(FINE, solves=50).F, smooth.F)
+
+
+def test_no_more_points_than_asked(rough):
+    assert len(rough.polished(FINE, solves=20, limit=5)) == 5
+
+
+def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
+    solve, solved = Bilevel._refine, []
+
+    def refine(self, *arguments):
+        solved.append(solve(self, *arguments))
+        if len(solved) == 7:
+            signal.raise_signal(signal.SIGINT)
+            assert stopping()
+        return solved[-1]
+
+    monkeypatch.setattr(Bilevel, "_refine", refine)
+    found = rough.polished(FINE, solves=50)
+    assert 7 <= found.stats["gradient_solves"] < 10 and found.stats["stopped"] == "interrupted" and not found.stats["reproducible"]
+    assert any(point.transcription == FINE.to_dict() for point in found) and len(found) == len(rough)
+
+
+def test_what_makes_no_sense_is_refused(rough):
+    for wrong in ({"solves": -1}, {"solves": 2.5}, {"limit": 0}, {"limit": True}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            rough.polished(FINE, **wrong)
+    with pytest.raises(ValueError, match="Transcription such as DFET"):
+        rough.polished("dfet:8x4")
+    with pytest.raises(ValueError, match="black box"):
+        black_box(3).polished(FINE)
+    problem = Problem("climb")
+    phase = problem.phase("up", t0=0.0, tf=1.0)
+    x, u = phase.state("x", bounds=(-2.0, 2.0), initial=0.0), phase.control("u", bounds=(-1.0, 1.0))
+    phase.dynamics(x=u)
+    problem.maximize("top", phase.peak(x))
+    problem.minimize("effort", phase.integral(u**2))
+    with pytest.raises(ValueError, match="peak"):
+        NSGA2(population=4).solve(problem, SingleShooting(5), evaluations=8, inner="march", seed=1).polished(DFET(2, 2))
