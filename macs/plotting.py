@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from .front import Front
 
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's, which people with any colour vision tell apart."""
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
+"""Okabe and Ito's, with a wine red for black, which references are near to: people with any colour vision tell them apart."""
 GREY = "#666666"
 STYLE = {
     "font.size": 9.0,

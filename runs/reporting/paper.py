@@ -44,7 +44,10 @@ def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
     if place and len(names) <= 4:
         ax.legend(handles, names, loc=place, **look)
     else:
-        columns = min(len(names), 2 if figure.get_figwidth() < PAGE else 6)
+        for columns in range(min(len(names), 6), 0, -1):
+            above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
+            if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
+                break
+            above.remove()
         rows = -(-len(names) // columns) + bool(title)
         figure.set_figheight(figure.get_figheight() + 0.16 * rows)
-        figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)

@@ -23,7 +23,7 @@ from .paper import COLUMN, PAGE, legend, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARKERS = "o^sDvP*"
+MARKERS = "o^sDvPX"
 
 
 def front_figure(
