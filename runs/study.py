@@ -13,6 +13,7 @@ from transcription import Smooth
 
 from . import combining, studyfile
 from .cell import Cell
+from .measures.given import check_reference
 from .reporting.changed import check as check_nominal
 from .reporting.goal import Goal
 from .reporting.published import check as check_paper
@@ -122,9 +123,12 @@ class Study:
             combined = combining.combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
             )
-            stated = combining.problems(combined) if self.goal is not None or self.nominal is not None or self.paper else {}
+            asked = (self.goal, self.nominal, self.reference)
+            stated = combining.problems(combined) if self.paper or any(one is not None for one in asked) else {}
             if self.paper:
                 check_against(self.paper, stated, combining.solvers(combined))
+            if self.reference is not None:
+                check_reference(self.reference, stated)
             if self.goal is not None:
                 Goal.of(self.goal, stated)
             if self.nominal is not None:

@@ -18,10 +18,11 @@ from macs.point import Point
 from problems import load
 from transcription import SingleShooting, from_dict, parse, word
 
+from ..measures.given import Reference
 from ..measures.indicators import pieces, truth
 from ..measures.references import room
 from .flight_plots import Law, flights_figure, paths_figure, representatives
-from .ground import Ground, Reference
+from .ground import Ground
 from .paper import style
 from .plots import front_figure
 from .tables import Cell, Column, Table, table

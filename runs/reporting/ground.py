@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from macs.front import Front
 
 from ..making.work import CRASHED, MEMORY, TIMEOUT
-from ..measures.references import called, closed_form, foreign, read, union
+from ..measures.given import Reference, look_up
+from ..measures.references import union
 from ..store import Run, Store
 from .verified import Verified
 
@@ -18,24 +18,6 @@ EACH = "each on its own"
 """What is said for the transcription of a ground without a common one."""
 FAILED = (CRASHED, TIMEOUT, MEMORY)
 """What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What fronts are measured against.
-
-    Attributes
-    ----------
-    front : Front
-    what : str
-        In words: "the true front, in closed form".
-    true : bool
-        Whether it is the truth, or only the best that is known.
-    """
-
-    front: Front
-    what: str
-    true: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,37 +69,10 @@ class Ground:
         return Reference(together, f"the union of {len(fronts)} run{'' if len(fronts) == 1 else 's'}", False)
 
     def reference(self, given: Any) -> Reference:
-        """What the study says that fronts are measured against.
-
-        Parameters
-        ----------
-        given : None, str, or mapping
-            "union"; "truth" or the address of a case with a known front; a file; or {label of a problem: one of these}. None: the truth
-            where it is known, else the union.
-
-        Raises
-        ------
-        ValueError, FileNotFoundError
-            If there is no such reference, or it cannot be read.
-        """
-        if isinstance(given, Mapping):
-            given = given.get(self.problem)
-        if given == "union":
-            return self.union()
-        if given is None or given == "truth":
-            source = self.known.source
-            try:
-                known = closed_form(source.address, source.data) if source is not None else closed_form("")
-                what, true = called(source.address if source is not None else "")
-                return Reference(foreign(known, self.known.goals, "truth"), what, true)
-            except ValueError:
-                if given is not None:
-                    raise
-                return self.union()
-        if Path(given).suffix in (".nc", ".csv"):
-            return Reference(read(given, self.known.goals), str(given), False)
-        what, true = called(given)
-        return Reference(foreign(closed_form(given), self.known.goals, "truth"), f"{what} of {given}", true)
+        """What the study says that fronts are measured against; see `look_up`."""
+        source = self.known.source
+        address, data = (source.address, source.data) if source is not None else ("", {})
+        return look_up(given, self.problem, address, data, self.known.goals) or self.union()
 
 
 def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]:

@@ -9,9 +9,10 @@ import numpy as np
 from macs.front import Front
 
 from ..measures.convergence import History
+from ..measures.given import Reference
 from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
 from ..store import Run
-from .ground import Ground, Reference
+from .ground import Ground
 
 INDICATORS: Mapping[str, Callable[..., float]] = {
     "GD": gd,

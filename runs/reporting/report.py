@@ -16,6 +16,7 @@ from macs.storage import write_whole
 
 from .. import studyfile
 from ..measures.attainment import attainment
+from ..measures.given import Reference
 from ..measures.references import read
 from ..measures.scale import Scale
 from ..measures.statistics import summarise
@@ -25,7 +26,7 @@ from ..store import Store
 from .changed import Changed, changes
 from .flights import Flights
 from .goal import Attained, attained
-from .ground import Ground, Reference, grounds
+from .ground import Ground, grounds
 from .measuring import AXES, histories, samples, spent
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import check, published_tables

@@ -117,7 +117,7 @@ def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
     file.write_text("time [s],distance [km]\n1,3\n5,15\n")
     assert ground.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
     assert ground.reference({"glide": str(file)}).what == str(file)
-    with pytest.raises(ValueError, match="there is no problem"):
+    with pytest.raises(ValueError, match="a problem that a script states"):
         ground.reference("truth")
     with pytest.raises(FileNotFoundError):
         ground.reference("nowhere.csv")

@@ -154,3 +154,21 @@ def test_the_reentry_is_searched_as_the_case_says():
 def test_a_case_whose_own_makes_no_sense_is_named(own, message):
     with pytest.raises(ValueError, match=f"problems: 'glide': .*{message}"):
         bare(narrow(**own))
+
+
+def test_a_reference_is_held_against_the_problems_before_any_run(tmp_path):
+    file = tmp_path / "truth.csv"
+    file.write_text("time [s],distance [km]\n1,3\n")
+    assert study(reference={"glide": str(file)}).reference and study(reference="union") and study(reference=str(file))
+    file.with_name("other.csv").write_text("time [s],mass [kg]\n1,3\n")
+    for given, message in (
+        ("nowhere.csv", "reference of 'glide'.*nowhere.csv"),
+        (str(file.with_name("other.csv")), "reference of 'glide'.*no column 'distance"),
+        ("truth", "reference of 'glide'.*a problem that a script states"),
+        ("goddart", "reference of 'glide'.*there is no problem 'goddart'"),
+        ({"glyde": "union"}, "unknown problem 'glyde', did you mean glide"),
+        (7, "reference must be 'union'.*not 7"),
+        ({"glide": ["union"]}, "reference must be 'union'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            study(reference=given)
