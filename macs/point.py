@@ -92,7 +92,8 @@ class Point:
 
     @property
     def optimality(self) -> float | None:
-        """How far a gradient solver found the point from satisfying the conditions of Pareto optimality; None until one has looked."""
+        """How far a gradient solver found the point from satisfying the conditions of Pareto optimality; None until one has looked, as
+        after Ctrl-C or a time limit, when nobody waits for it."""
         return self._front._optimality[self.index]
 
     @property

@@ -9,7 +9,6 @@ import numpy as np
 from problems.peaks import refuse_peaks
 from transcription.base import Transcription
 from transcription.inner import March
-from transcription.optimality import optimality
 from transcription.stopping import stopped_by
 
 from . import archive as archives
@@ -22,7 +21,7 @@ from .monitor import Monitor
 from .polish import polish
 from .progress import Told
 from .refinement import ranges
-from .results import vectors_front
+from .results import certificates, vectors_front
 from .solves import Solves
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def polished(front: Front, transcription: Transcription, solves: int | None, lim
         untouched = {z.tobytes() for z in starts}
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         told(f"polish: how near to optimal {len(Z)} points are")
-        certified = [optimality(nlp, z, ranges(archive.F)) for z in Z]
+        certified = certificates(nlp, Z, ranges(archive.F))
         taken = monitor.elapsed
         interrupted = bool(monitor.reason)
     counts, before = evaluator.counts, front.stats

@@ -11,6 +11,7 @@ from problems.compiled import Objective, Variable
 from transcription.base import NLP
 from transcription.optimality import optimality
 from transcription.sampling import excursions
+from transcription.stopping import stopping
 
 from .archive import Archive
 from .evaluation import CONVERGED, FAILED, INFEASIBLE
@@ -30,12 +31,15 @@ def trajectory_front(
 ) -> Front:
     """A front of the trajectories in an archive, `certified` with their optimality; objectives count in the front's ranges there."""
     if len(archive):
-        ranges = np.ptp(archive.F, axis=0)
-        return vectors_front(
-            nlp, archive.Z, solver, stats, optimality=[optimality(nlp, z, ranges) for z in archive.Z] if certified else None
-        )
+        found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
+        return vectors_front(nlp, archive.Z, solver, stats, optimality=found)
     nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
     return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+
+
+def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
+    """The optimality of vectors (k, n), objectives counting in `ranges` (m,); None of those for which the work is to end early."""
+    return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
 
 
 def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Front:
