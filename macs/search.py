@@ -47,7 +47,7 @@ class SearchState:
     rng : numpy.random.Generator
         Its `bit_generator.state` is data, and all there is to keep of it.
     polishing : Polishing, optional
-        Of a polish that has begun and is not finished: where to go on. Then the archive is what it has found so far.
+        Of a polish that has begun and is not finished: where to go on.
     """
 
     agents: Agents

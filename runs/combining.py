@@ -39,6 +39,11 @@ def combine(
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
+    own_budgets = {}
+    for label, given in terms.items():
+        if "evaluations" in given:
+            with told(f"terms of '{label}'"):
+                own_budgets[label] = _budgets(given["evaluations"], stated)
     combined = []
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
@@ -62,7 +67,7 @@ def combine(
                     method.check_transcription(scheme)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
                 details |= {"terms": own} if own else {}
-                cell = Cell(label, scheme_label, method_label, own.get("evaluations", budgets[label]), plain(details))
+                cell = Cell(label, scheme_label, method_label, own_budgets.get(method_label, budgets)[label], plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
     return combined
 

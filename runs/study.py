@@ -227,12 +227,11 @@ class Study:
         Budgets of solvers on terms of their own shrink as the largest does. Its name ends in -quick.
         """
         share = min(1.0, QUICK_EVALUATIONS / max(cell.evaluations for cell in self.cells))
-        own = {
-            label: {**terms, "evaluations": min(terms["evaluations"], max(QUICK_LEAST, int(share * terms["evaluations"])))}
-            if "evaluations" in terms
-            else terms
-            for label, terms in self.terms.items()
-        }
+        own = {label: dict(terms) for label, terms in self.terms.items()}
+        for label, terms in own.items():
+            if "evaluations" in terms:
+                given = {cell.problem: cell.evaluations for cell in self.cells if cell.solver == label}
+                terms["evaluations"] = {problem: min(n, max(QUICK_LEAST, int(share * n))) for problem, n in given.items()}
         budgets = {
             cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})
         }

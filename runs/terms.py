@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from macs.inputs import check_count, drawing, unknown
+from macs.inputs import drawing, unknown
 from problems import Problem
 from problems.compiled import CompiledProblem
 from transcription import Smooth
@@ -39,8 +39,6 @@ def _check_own(own: Any) -> None:
             raise ValueError(unknown("key", key, TERMS))
     if isinstance(own.get("transcription"), list | tuple | Mapping):
         raise ValueError(f"transcription must be one, not {own['transcription']!r}")
-    if "evaluations" in own:
-        check_count("evaluations", own["evaluations"], 1)
     if "inner" in own:
         check_inner(own["inner"])
     sampling(own.get("start"))

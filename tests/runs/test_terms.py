@@ -32,6 +32,13 @@ def test_cells():
     assert same.seed(1, 1) == plain.seed(1, 1) and same.to_dict() == plain.to_dict(), "others do not notice"
 
 
+def test_a_budget_of_its_own_for_each_problem():
+    two = {"slow": glide(), "fast": glide()}
+    made = study(problems=two, terms={"macs": {**APART["macs"], "evaluations": {"slow": 40, "fast": 9000}}}, evaluations=60_000)
+    assert {cell.problem: cell.evaluations for cell in made.cells if cell.solver == "macs"} == {"slow": 40, "fast": 9000}
+    assert {cell.problem: cell.evaluations for cell in made.quick().cells if cell.solver == "macs"} == {"slow": 40, "fast": 75}
+
+
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
     assert study().run(tmp_path / "out", executor=Inline()).finished == 6
     found = grounds(Store.open(tmp_path / "out"), {})
@@ -74,6 +81,8 @@ def test_quick_studies_keep_the_terms():
         ({"macs": {}}, "terms of 'macs': there must be a table of transcription, evaluations, inner, start"),
         ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'"),
         ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be"),
+        ({"macs": {"evaluations": {"glyde": 40}}}, "terms of 'macs': evaluations: there is no problem 'glyde'"),
+        ({"macs": {"evaluations": {"glide": 0}}}, "terms of 'macs': evaluations of 'glide' must be"),
         ({"macs": {"inner": "outer"}}, "terms of 'macs': .*inner level 'outer'"),
         ({"macs": {"start": "soft"}}, "terms of 'macs': unknown start 'soft'"),
         ({"macs": {"start": 3}}, "terms of 'macs': start must be 'uniform', 'smooth'"),
