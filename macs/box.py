@@ -55,14 +55,15 @@ class Box:
         step = X - origin
         return np.where(self.wraps, step - np.round(step), step) if self.wraps.any() else step
 
-    def nearest(self, X: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Which of `others` (n, d) is nearest to each of X (k, d), the short way round where periodic: indices (k,)."""
+    def squared_distances(self, X: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """From each of X (k, d) to each of `others` (n, d), the short way round where periodic: (k, n), 0 between equal points."""
         even = ~self.wraps
         squares = cdist(X[:, even], others[:, even], "sqeuclidean") if even.any() else np.zeros((len(X), len(others)))
-        for column in np.flatnonzero(self.wraps):
-            step = X[:, None, column] - others[:, column]
-            squares += (step - np.round(step)) ** 2
-        return squares.argmin(axis=1)
+        if self.wraps.any():
+            step = X[:, None, self.wraps] - others[:, self.wraps]
+            step -= np.round(step)
+            squares += np.einsum("knd,knd->kn", step, step)
+        return squares
 
     def stop_outward(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
         """`step` (..., d) without the components that push a point on a bound out of the box."""

@@ -31,7 +31,7 @@ def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -
 
     Where the pool has too few others, the point itself stands in for them: differences to it are zero.
     """
-    squared = (box.difference(pool, X[:, None, :]) ** 2).sum(axis=-1)
+    squared = box.squared_distances(X, pool)
     squared[squared == 0.0] = np.inf
     order = np.argsort(squared, axis=1, kind="stable")
     others = np.isfinite(squared).sum(axis=1)

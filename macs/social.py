@@ -12,7 +12,7 @@ def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray
 
     A pool with copies of the point has fewer others; the missing rows are -1.
     """
-    squared = (box.difference(pool, X[:, None, :]) ** 2).sum(axis=-1)
+    squared = box.squared_distances(X, pool)
     squared[squared == 0.0] = np.inf
     order = np.argsort(squared, axis=1, kind="stable")[:, :count]
     return np.where(np.isfinite(np.take_along_axis(squared, order, axis=1)), order, -1)

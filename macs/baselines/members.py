@@ -67,7 +67,7 @@ def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.nd
     if members.Z.shape[1] == len(free) or not usable.size:
         return evaluator.first_guess(X)
     box, Z = box_of(evaluator), members.Z[usable]
-    vectors = Z[box.nearest(box.to_unit(X), box.to_unit(Z[:, free]))]
+    vectors = Z[box.squared_distances(box.to_unit(X), box.to_unit(Z[:, free])).argmin(axis=1)]
     vectors[:, free] = X
     return vectors
 

@@ -14,6 +14,15 @@ def box(d, wraps=()):
     return Box(np.full(d, -2.0), np.full(d, 6.0), np.isin(np.arange(d), wraps))
 
 
+@pytest.mark.parametrize("wraps", [(), (0, 2), (0, 1, 2, 3)])
+def test_distances_are_those_of_the_differences(wraps):
+    rng, cube = np.random.default_rng(len(wraps)), box(4, wraps)
+    X, others = rng.random((9, 4)), rng.random((30, 4))
+    squares = (cube.difference(X[:, None], others) ** 2).sum(axis=2)
+    assert cube.squared_distances(X, others) == pytest.approx(squares, rel=1e-13)
+    assert not np.diag(cube.squared_distances(X, X)).any()
+
+
 @given(SEEDS, st.booleans())
 def test_every_proposal_is_in_the_box(seed, wrap):
     rng = np.random.default_rng(seed)
