@@ -64,7 +64,7 @@ class Descents:
     def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
         """One solve from a vector (n,)."""
         solved = scalarize(self.nlp, start, reference=reference, weights=weights, ceiling=ceiling, tolerance=self.tolerance)
-        self.counts.gradient_solves += 1
+        self.counts.gradient_solves += solved.begun
         self.counts.inner_iterations += solved.iterations
         self.counts.clocked += solved.clocked
         if solved.status != CONVERGED:

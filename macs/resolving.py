@@ -118,6 +118,6 @@ class Resolver:
         return second if second.status == CONVERGED else first
 
     def _count(self, solved: Solved) -> Solved:
-        self.gradient_solves += 1
+        self.gradient_solves += solved.begun
         self.clocked |= solved.clocked
         return solved

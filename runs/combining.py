@@ -61,13 +61,15 @@ def combine(
             stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
             for method_label in method_labels:
                 method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
+                budget = own_budgets.get(method_label, budgets)[label]
+                own |= {"evaluations": budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
                 with told(place):
                     method.check_objectives(len(compiled.goals))
                     method.check_transcription(scheme)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
                 details |= {"terms": own} if own else {}
-                cell = Cell(label, scheme_label, method_label, own_budgets.get(method_label, budgets)[label], plain(details))
+                cell = Cell(label, scheme_label, method_label, budget, plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
     return combined
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,25 +71,19 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
             return None
     if Path(given).suffix in (".nc", ".csv"):
         return Reference(read(given, goals), str(given), False)
-    what, _ = called(given)
-    return Reference(foreign(closed_form(given), goals, "truth"), f"{what} of {given}", True)
+    what, true = called(given)
+    return Reference(foreign(closed_form(given), goals, "truth"), f"{what} of {given}", true)
 
 
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
-    kinds = (given.values() if isinstance(given, Mapping) else [given]) if given is not None else ()
-    for label in given if isinstance(given, Mapping) else ():
+    for label, one in (given if isinstance(given, Mapping) else dict.fromkeys(stated, given)).items():
         if label not in stated:
             raise ValueError(f"reference: {unknown('problem', label, stated)}")
-    _check_words(kinds)
+        if one is not None and not isinstance(one, str):
+            raise ValueError(f"reference must be 'union', 'truth', the name of a case, a file, or one of these by problem, not {one!r}")
     for label, problem in stated.items():
         try:
             look_up(given, label, problem.address, problem.data, problem.goals)
         except (ValueError, OSError) as error:
             raise ValueError(f"reference of '{label}': {error}") from error
-
-
-def _check_words(given: Iterable[Any]) -> None:
-    for one in given:
-        if not isinstance(one, str):
-            raise ValueError(f"reference must be 'union', 'truth', the name of a case, a file, or one of these by problem, not {one!r}")

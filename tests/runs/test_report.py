@@ -10,9 +10,11 @@ import pytest
 from misbehaving import Crashing, Plain, glide
 
 from macs import Front
+from problems import load
 from runs import Study, gd, igd
 from runs.cli import main
 from runs.making.work import Outcome
+from runs.measures.given import look_up
 from runs.reporting.ground import grounds
 from runs.reporting.published import check, published_tables
 from runs.reporting.report import _plain, _Writer, report
@@ -117,6 +119,8 @@ def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
     file.write_text("time [s],distance [km]\n1,3\n5,15\n")
     assert ground.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
     assert ground.reference({"glide": str(file)}).what == str(file)
+    assert look_up("goddard", "glide", "", {}, load("goddard").compile().goals).true
+    assert not look_up("reentry_case1", "glide", "", {}, load("reentry_case1").compile().goals).true, "gradients found it, locally"
     with pytest.raises(ValueError, match="a problem that a script states"):
         ground.reference("truth")
     with pytest.raises(FileNotFoundError):

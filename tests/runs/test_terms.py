@@ -37,6 +37,7 @@ def test_a_budget_of_its_own_for_each_problem():
     made = study(problems=two, terms={"macs": {**APART["macs"], "evaluations": {"slow": 40, "fast": 9000}}}, evaluations=60_000)
     assert {cell.problem: cell.evaluations for cell in made.cells if cell.solver == "macs"} == {"slow": 40, "fast": 9000}
     assert {cell.problem: cell.evaluations for cell in made.quick().cells if cell.solver == "macs"} == {"slow": 40, "fast": 75}
+    assert all(cell.terms["evaluations"] == cell.evaluations for cell in made.cells if cell.solver == "macs"), "others' do not matter"
 
 
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
