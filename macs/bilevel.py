@@ -63,14 +63,18 @@ class Bilevel(Evaluator):
         )
         return evaluation, int(np.sum(found.iterations))
 
-    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+    def _refine(
+        self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
+    ) -> tuple[Evaluation, int]:
         found = []
-        for start, reference, weight in zip(starts, references, weights, strict=True):
+        inside = [None] * len(starts) if margins is None else margins
+        for start, reference, weight, margin in zip(starts, references, weights, inside, strict=True):
             solved = scalarize(
                 self.nlp,
                 start,
                 reference=reference,
                 weights=weight,
+                margin=margin,
                 tolerance=self.tolerance,
                 max_iterations=PATIENCE,
                 persistent=False,

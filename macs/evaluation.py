@@ -130,7 +130,7 @@ class Evaluator(ABC):
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation
 
-    def refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+    def refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None = None) -> Evaluation:
         """Gradient solves, each to the least alpha with F - reference <= alpha weights; they are counted beside evaluations.
 
         Parameters
@@ -139,6 +139,8 @@ class Evaluator(ABC):
             Full vectors to begin with.
         references, weights : arrays (k, m)
             Weight 0: a hard limit at the reference. Reference +inf: the objective does not matter.
+        margins : array (k, r), optional
+            By how much, in their scales, the rows of the constraints are to stay inside their limits. Default: not at all.
 
         Returns
         -------
@@ -147,12 +149,14 @@ class Evaluator(ABC):
             the first rows, which were solved by then; only these are counted.
         """
         self.before_batch()
-        found, iterations = self._refine(starts, references, weights)
+        found, iterations = self._refine(starts, references, weights, margins)
         self.counts.gradient_solves += len(found.F)
         self.counts.inner_iterations += iterations
         self.counts.clocked += found.clocked or len(found.F) < len(starts)
         return found
 
-    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+    def _refine(
+        self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
+    ) -> tuple[Evaluation, int]:
         """Solve, if there are gradients, as many of the rows, in order, as may be; also returns the iterations spent."""
         raise NotImplementedError(f"{type(self).__name__} has no gradients")

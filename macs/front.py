@@ -261,7 +261,13 @@ class Front:
         return refine_mesh(self, tolerance, limit, progress)
 
     def polished(
-        self, transcription: Transcription, *, solves: int | None = None, limit: int | None = None, progress: bool = False
+        self,
+        transcription: Transcription,
+        *,
+        solves: int | None = None,
+        limit: int | None = None,
+        verify: float | None = None,
+        progress: bool = False,
     ) -> Front:
         """The front brought down to the Pareto front by gradient solves, whichever solver found it on whichever transcription.
 
@@ -277,14 +283,18 @@ class Front:
             How many gradient solves there may be. Default: as many as there are points.
         limit : int, optional
             Most points of the result, well spread. Default: as many as there are.
+        verify : float, optional
+            By how much, in their scales, constraints may be missed when a point is flown. Points that miss more are solved once more, three
+            times at most, inside of their limits by what they missed; these solves come beside, and `Point.note` tells of them. What still
+            misses more then, also of the front's own points, is left out. Default: what the mesh says is believed.
         progress : bool
             Tell on the terminal how it stands.
 
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points; those that were solved for have their `optimality`. Costs are added to those of the
-            search. Ctrl-C ends the work with what there is.
+            Feasible, mutually non-dominated points; those that were solved for have their `optimality`, unless they were moved inside.
+            Costs are added to those of the search. Ctrl-C ends the work with what there is.
 
         Raises
         ------
@@ -293,7 +303,7 @@ class Front:
         """
         from .polished import polished
 
-        return polished(self, transcription, solves, limit, progress)
+        return polished(self, transcription, solves, limit, verify, progress)
 
     def flown(
         self,

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from problems.compiled import CompiledProblem
 from transcription.base import Transcription
-from transcription.dfet import DFET
 
-from . import search
-from .dominance import dominates
+from . import ending, search
 from .evaluation import Evaluator
 from .front import Front
 from .search import SearchState
@@ -42,6 +41,13 @@ class MACS(Solver):
         every `polish_every` evaluations goes; with more than two objectives it first goes down to the front from places all over it, once
         for each point that the archive may hold. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`.
         False: the derivative-free method.
+    polish_on : str, optional
+        A transcription, said as on the command line ("dfet:30x3:bernstein:1"), on which the archive is polished instead, see
+        `Front.polished`: a search wants what is scored quickly, such as shooting, gradients what is sparse. There are no gradient solves of
+        agents then. Not after Ctrl-C, a time limit or a callback ended the search; of a finished checkpoint the polish is made again.
+    verify : float, optional
+        For `polish_on`: by how much, in their scales, constraints may be missed when a point is flown. Points that miss more are moved
+        inside, by solves that come beside, or left out.
     mesh : {"fixed", "adaptive"}, default "fixed"
         "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
         `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
@@ -111,6 +117,8 @@ class MACS(Solver):
     agents: int = 10
     archive: int = 10
     refine: bool = True
+    polish_on: str | None = None
+    verify: float | None = None
     mesh: str = "fixed"
     mesh_tolerance: float = 1e-7
     rho: float = 1.0
@@ -153,9 +161,10 @@ class MACS(Solver):
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
-        if self.mesh not in ("fixed", "adaptive"):
-            raise ValueError(f"MACS: mesh must be 'fixed' or 'adaptive', not {self.mesh!r}")
+        ending.check(self)
         self._check_range("mesh_tolerance", "[1e-10, 1]", lambda x: 1e-10 <= x <= 1)
+        if self.verify is not None:
+            self._check_range("verify", "(0, 1]", lambda x: 0 < x <= 1)
         if self.reseed not in ("all", "spread"):
             raise ValueError(f"MACS: reseed must be 'all' or 'spread', not {self.reseed!r}")
         self._check_range("rho", "(0, 1]", lambda x: 0 < x <= 1)
@@ -238,26 +247,25 @@ class MACS(Solver):
     @property
     def certifies(self) -> bool:
         """See `Solver.certifies`."""
-        return self.refine
+        return self.refines
+
+    @property
+    def refines(self) -> bool:
+        """Whether there are gradient solves on the transcription that is searched."""
+        return self.refine and self.polish_on is None
 
     def check_objectives(self, m: int) -> None:
         """Refuse an archive that could not keep the best points of all m objectives."""
         if self.archive < m:
             raise ValueError(f"MACS: archive must hold at least one point for each of the {m} objectives, not {self.archive}")
 
-    def check_transcription(self, transcription: Transcription) -> None:
-        """Refuse to adapt meshes of methods whose meshes nobody knows how to refine."""
-        if self.mesh == "adaptive" and not isinstance(transcription, DFET):
-            raise ValueError(f"MACS: mesh='adaptive' needs DFET, not {type(transcription).__name__}")
+    def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:
+        """Refuse to adapt meshes of methods whose meshes nobody knows how to refine, and to polish where gradients make no sense."""
+        ending.check_transcription(self, transcription, problem)
 
     def finish(self, front: Front, progress: bool) -> Front:
-        """On an adaptive mesh, the refined front."""
-        if self.mesh == "fixed" or not len(front):
-            return front
-        refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress)
-        # A point that did not get there may promise too much: it is not believed to dominate any.
-        believed = refined.F[[i for i, point in enumerate(refined) if not point.note]]
-        return refined[np.flatnonzero(~np.any(dominates(believed, refined.F[:, None]), axis=1))]
+        """The front polished on another transcription, or with its meshes refined, where that is wanted."""
+        return ending.finish(self, front, progress) if len(front) else front
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""

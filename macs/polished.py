@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import Transcription
+from transcription.base import NLP, Transcription
 from transcription.inner import March
 from transcription.stopping import stopped_by
 
@@ -15,7 +17,8 @@ from . import archive as archives
 from .archive import Archive
 from .bilevel import Bilevel
 from .evaluation import CONVERGED
-from .inputs import check_count, check_problem
+from .holding import believable, hold
+from .inputs import check_count, check_positive, check_problem
 from .merging import merge
 from .monitor import Monitor
 from .polish import polish
@@ -27,8 +30,13 @@ from .solves import Solves
 if TYPE_CHECKING:
     from .front import Front
 
+KEPT_INSIDE = "kept inside its limits, so that it holds when it is flown"
+"""What there is to say of a point that missed some."""
 
-def polished(front: Front, transcription: Transcription, solves: int | None, limit: int | None, progress: bool) -> Front:
+
+def polished(
+    front: Front, transcription: Transcription, solves: int | None, limit: int | None, verify: float | None, progress: bool
+) -> Front:
     """See `Front.polished`."""
     problem = front.compiled()
     check_problem(problem, transcription)
@@ -36,10 +44,12 @@ def polished(front: Front, transcription: Transcription, solves: int | None, lim
     solves, limit = len(known) if solves is None else solves, len(known) if limit is None else limit
     check_count("solves", solves, 0)
     check_count("limit", limit, min(len(front.goals), len(known)))
+    if verify is not None:
+        check_positive("verify", verify)
     refuse_peaks(problem)
     if not len(known):
         return front
-    nlp = transcription.transcribe(problem)
+    nlp = _written(problem, transcription)
     starts = np.array([nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None])
     tolerance = float(front.stats["tolerance"])
     evaluator = Bilevel(nlp, March(), tolerance)
@@ -48,11 +58,18 @@ def polished(front: Front, transcription: Transcription, solves: int | None, lim
     with Told(progress) as told, Monitor(None, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
         evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
         archive = polish(begun, Solves(evaluator, solves), limit)
-        taken = monitor.elapsed
         untouched = {z.tobytes() for z in starts}
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
+        moved = np.zeros(len(Z), dtype=bool)
+        if verify is not None:
+            evaluator.before_batch = lambda: told("polish: points that miss something when flown are solved once more")
+            Z, holds, moved = hold(evaluator, Z, ranges(archive.F), verify)
+            Z, moved = Z[holds], moved[holds]
+            known = believable(nlp.evaluate(Z)[0], known, verify)
         told(f"polish: how near to optimal {len(Z)} points are")
-        certified = certificates(nlp, Z, ranges(archive.F))
+        certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
+        # What was moved inside is no optimum of the problem as it is stated, but the nearest that can be flown.
+        optimality = [None if inside else next(certified) for inside in moved]
         taken = monitor.elapsed
         interrupted = bool(monitor.reason)
     counts, before = evaluator.counts, front.stats
@@ -64,7 +81,16 @@ def polished(front: Front, transcription: Transcription, solves: int | None, lim
         "reproducible": before["reproducible"] and not (counts.clocked or interrupted),
         **({"stopped": "interrupted"} if interrupted else {}),
     }
-    found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=certified), known])
+    notes = [KEPT_INSIDE if inside else "" for inside in moved]
+    found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
     found.solver, found.stats = dict(front.solver), stats
+    if not len(found):
+        found.message = f"no point misses less than {verify:g} when it is flown"
     return found
+
+
+@lru_cache(maxsize=4)
+def _written(problem: CompiledProblem, transcription: Transcription) -> NLP:
+    """The problem by this method: fronts of one problem share it, and all that is compiled of it."""
+    return transcription.transcribe(problem)

@@ -116,7 +116,7 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
     social_actions(state, settings, box, attempts, evaluator)
     remember(state, attempts.seen, settings, evaluator)
     breed_archive(state, settings, box, Attempts(settings, state, evaluator, box, budget))
-    if settings.refine and evaluator.has_gradients:
+    if settings.refines and evaluator.has_gradients:
         for _ in range(refinement.allowed(state.evaluations, settings.refine_every, state.refinements)):
             remember(state, refinement.individual_action(state, box, evaluator, settings.F), settings, evaluator)
     assign(state, settings, box, evaluator)
@@ -125,7 +125,7 @@ def advance(settings: MACS, state: SearchState, evaluator: Evaluator, budget: in
 
 def conclude(settings: MACS, state: SearchState, evaluator: Evaluator) -> None:
     """The last thing a search does (see `MACS.conclude`)."""
-    if not (settings.refine and evaluator.has_gradients):
+    if not (settings.refines and evaluator.has_gradients):
         return
     if state.polishing is None:
         state.polishing = Polishing.of(state.archive)

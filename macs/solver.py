@@ -76,8 +76,8 @@ class Solver(ABC):
     def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
         """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
 
-    def check_transcription(self, transcription: Transcription) -> None:  # noqa: B027
-        """Raise ValueError if the settings do not suit the transcription. Called before any work."""
+    def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
+        """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
     def finish(self, front: Front, progress: bool) -> Front:
         """What is left to do with the front of a search that ended by itself, told on the terminal or not. Nothing, for most solvers."""
@@ -147,9 +147,9 @@ class Solver(ABC):
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
-        self.check_transcription(transcription)
         solver = inner_solver(inner)
         nlp = transcription.transcribe(problem)
+        self.check_transcription(transcription, nlp.problem)
         check_freedom(nlp)
         self.check_objectives(len(nlp.problem.goals))
         about = self._about()

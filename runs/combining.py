@@ -66,7 +66,7 @@ def combine(
                 place = f"{label}, {scheme_label}, {method_label}"
                 with told(place):
                     method.check_objectives(len(compiled.goals))
-                    method.check_transcription(scheme)
+                    method.check_transcription(scheme, compiled)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
                 details |= {"terms": own} if own else {}
                 cell = Cell(label, scheme_label, method_label, budget, plain(details))

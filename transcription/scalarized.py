@@ -104,7 +104,8 @@ class _Settings:
 class _Task:
     """One scalarisation in numbers near one.
 
-    Row i is (F_i - shift_i) / scale_i <= slope_i a, with a = 0 at the start; (F_i - shift_i) / scale_i <= top_i is its hard limit.
+    Row i is (F_i - shift_i) / scale_i <= slope_i a, with a = 0 at the start; (F_i - shift_i) / scale_i <= top_i is its hard limit. The rows
+    of the NLP are between lower and upper.
     """
 
     shift: np.ndarray
@@ -112,6 +113,8 @@ class _Task:
     slope: np.ndarray
     used: np.ndarray
     top: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
 
     def value(self, F: np.ndarray) -> float:
         """The least a that F (m,) allows."""
@@ -132,6 +135,7 @@ def scalarize(
     reference: np.ndarray,
     weights: np.ndarray,
     ceiling: np.ndarray | None = None,
+    margin: np.ndarray | None = None,
     tolerance: float = 1e-6,
     max_iterations: int = 500,
     seconds: float = 60.0,
@@ -149,6 +153,9 @@ def scalarize(
         reference. Reference +inf: the objective does not matter.
     ceiling : array (m,), optional
         Hard limits of the objectives beside; +inf for none.
+    margin : array (r,), optional
+        By how much, in their scales, rows of the NLP are to stay inside their limits; where these are too near to each other for that, in
+        the middle. Default: not at all.
     tolerance : float
         Largest scaled residual of a feasible point.
     max_iterations, seconds : int, float
@@ -169,12 +176,13 @@ def scalarize(
         than minimised or bounded above.
     """
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
-    task = _task(nlp, start, reference, weights, ceiling)
+    task = _task(nlp, start, reference, weights, ceiling, margin)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     if stopping():
         return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
-    feasible = violation[0] <= tolerance and task.excess(F[0]) <= tolerance
+    # With a margin, a start that misses it is none to be held on to.
+    feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     worse = feasible and task.value(first.F) > tolerance
     tired = first.iterations >= max_iterations and not persistent
@@ -185,13 +193,19 @@ def scalarize(
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
 
 
-def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> _Task:
-    n, m = len(nlp.variables), len(nlp.problem.goals)
+def _task(
+    nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None, margin: np.ndarray | None
+) -> _Task:
+    n, m, r = len(nlp.variables), len(nlp.problem.goals), len(nlp.g_scale)
     limits = np.full(m, np.inf) if ceiling is None else np.asarray(ceiling, dtype=float)
+    inside = np.zeros(r) if margin is None else np.asarray(margin, dtype=float)
     reference, weights = np.asarray(reference, dtype=float), np.asarray(weights, dtype=float)
-    for name, value, size in (("start", start, n), ("reference", reference, m), ("weights", weights, m), ("ceiling", limits, m)):
+    given = (("start", start, n), ("reference", reference, m), ("weights", weights, m), ("ceiling", limits, m), ("margin", inside, r))
+    for name, value, size in given:
         if np.shape(value) != (size,) or np.isnan(value).any():
             raise ValueError(f"scalarize: {name} must be {size} numbers, not {value!r}")
+    if not (inside >= 0).all():
+        raise ValueError(f"scalarize: margin must not be negative, not {inside.min():g}")
     used = reference < np.inf
     moving = used & (weights > 0)
     if not (np.isfinite(weights) & (weights >= 0)).all() or not moving.any() or not np.isfinite(reference[used]).all():
@@ -205,7 +219,9 @@ def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarra
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
     scale = objective_scales(nlp)
     slope = np.where(moving, weights, 0.0) / scale
-    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale)
+    lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
+    inside = np.minimum(inside, 0.5 * (upper - lower))
+    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale, lower + inside, upper - inside)
 
 
 def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> Solved:
@@ -234,8 +250,8 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, mann
         p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
         lbx=np.append(lower, -np.inf),
         ubx=np.append(upper, 0.0 if manner.held else np.inf),
-        lbg=np.concatenate([nlp.g_lower / nlp.g_scale, none]),
-        ubg=np.concatenate([nlp.g_upper / nlp.g_scale, np.where(task.used, 0.0, np.inf), task.top]),
+        lbg=np.concatenate([task.lower, none]),
+        ubg=np.concatenate([task.upper, np.where(task.used, 0.0, np.inf), task.top]),
     )
     stats = solver.stats()
     words, iterations = stats["return_status"], int(stats["iter_count"])

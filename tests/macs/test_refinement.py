@@ -42,7 +42,7 @@ class Circle(Evaluator):
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         return Evaluation(Z.copy(), self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), 0
 
-    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         angles = np.linspace(0.0, np.pi / 2, 20_001)
         curve = 1.0 - np.column_stack([np.cos(angles), np.sin(angles)])
         rows = []
@@ -133,7 +133,7 @@ class Sphere(Circle):
         x, a, b = Z.T
         return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
 
-    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         angles = np.linspace(0.0, np.pi / 2, 101)
         grid = np.array([[1.0, a, b] for a in angles for b in angles])
         surface, rows = self.objectives(grid), []
@@ -177,7 +177,7 @@ class Asking:
         super().__init__()
         self.found: list[np.ndarray] = []
 
-    def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
+    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         if stopping():
             return Evaluation(starts[:0], references[:0], np.empty(0), np.empty(0, dtype=str)), 0
         found, iterations = super()._refine(starts, references, weights)  # type: ignore[misc]
@@ -254,8 +254,8 @@ def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_ov
 
 def test_what_is_worse_or_failed_is_not_taken() -> None:
     class Useless(Circle):
-        def _refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> tuple[Evaluation, int]:
-            found, count = super()._refine(starts, references, weights)
+        def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
+            found, count = super()._refine(starts, references, weights, margins)
             status = np.where(np.arange(count) % 2, CONVERGED, "failed")
             return Evaluation(found.Z, found.F + 2.0, found.violation, status), count
 
