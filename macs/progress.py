@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
@@ -80,7 +81,8 @@ class Display(AbstractContextManager["Display"]):
 
 
 class Told(AbstractContextManager["Told"]):
-    """Says in one line what is being done, as long as it is entered; nothing unless it is `wanted`.
+    """Says in one line what is being done, as long as it is entered; nothing unless it is `wanted`. Where there is no terminal, not more
+    often than every `EVERY` seconds.
 
     Parameters
     ----------
@@ -92,12 +94,14 @@ class Told(AbstractContextManager["Told"]):
     def __init__(self, wanted: bool, stream: TextIO | None = None) -> None:
         self._wanted, self._stream = wanted, stream or sys.stderr
         self._live: Any = None
+        self._written = -float("inf")
 
     def __call__(self, words: str) -> None:
         """What is being done now."""
         if self._live is not None:
             self._live.update(words)
-        elif self._wanted:
+        elif self._wanted and time.perf_counter() - self._written >= EVERY:
+            self._written = time.perf_counter()
             print(words, file=self._stream, flush=True)
 
     def __enter__(self) -> Told:

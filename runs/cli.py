@@ -154,6 +154,11 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument(
         "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"
     )
+    solve.add_argument(
+        "--polish-on",
+        metavar="T",
+        help="polish the front on this transcription by gradients in the end, so that its points hold when flown",
+    )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
     solve.add_argument("--plot", metavar="FRONT.png", help="draw the front too")

@@ -48,7 +48,8 @@ def solve(arguments: Namespace) -> int:
     method = problem.default_transcription if arguments.transcription is None else arguments.transcription
     with refused():
         scheme = transcription.parse(method) if isinstance(method, str) else method
-    solver = make_solver(arguments.solver, arguments.no_refine, choose(arguments.mesh, MESHES, "kind of mesh"))
+    mesh = choose(arguments.mesh, MESHES, "kind of mesh")
+    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, problem.verify_tolerance)
     inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
     start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
@@ -157,16 +158,22 @@ def load_problem(address: str, **data: Any) -> Problem:
     return problem
 
 
-def make_solver(name: str, plain: bool = False, mesh: str = "fixed") -> Solver:
-    """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive"."""
+def make_solver(name: str, plain: bool = False, mesh: str = "fixed", polish_on: str | None = None, verify: float | None = None) -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive", or polished on another
+    transcription to hold within `verify`."""
     with refused():
         solver = solver_class(name)
-    settings = inspect.signature(solver).parameters
-    if plain and "refine" not in settings:
-        raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
-    if mesh != "fixed" and "mesh" not in settings:
-        raise WrongCall(f"--mesh {mesh} makes no sense for solver '{name}', which leaves meshes as they are")
-    return solver(**({"refine": False} if plain else {}), **({"mesh": mesh} if mesh != "fixed" else {}))
+        known = inspect.signature(solver).parameters
+        if plain and "refine" not in known:
+            raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
+        if mesh != "fixed" and "mesh" not in known:
+            raise WrongCall(f"--mesh {mesh} makes no sense for solver '{name}', which leaves meshes as they are")
+        if polish_on and "polish_on" not in known:
+            raise WrongCall(f"--polish-on {polish_on} makes no sense for solver '{name}', which does not polish")
+        settings: dict[str, Any] = {"refine": False} if plain else {}
+        settings |= {"mesh": mesh} if mesh != "fixed" else {}
+        settings |= {"polish_on": polish_on, "verify": verify} if polish_on else {}
+        return solver(**settings)
 
 
 def choose(word: str, known: Iterable[str], what: str) -> str:

@@ -180,7 +180,7 @@ class Asking:
     def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         if stopping():
             return Evaluation(starts[:0], references[:0], np.empty(0), np.empty(0, dtype=str)), 0
-        found, iterations = super()._refine(starts, references, weights)  # type: ignore[misc]
+        found, iterations = super()._refine(starts, references, weights, margins)  # type: ignore[misc]
         self.found.extend(found.F)
         return found, iterations
 

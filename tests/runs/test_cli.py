@@ -137,11 +137,19 @@ def test_shooting_is_solved_shown_and_verified(capsys, method):
     assert main(["verify", "shot.nc", "--tolerance", "1e-6"]) == 0
 
 
+def test_a_search_on_shooting_is_polished_on_dfet(capsys):
+    call = ["solve", "glide.py:build", "--transcription", "shooting:6", "--polish-on", "dfet:4x3", "--seed", "1", "--out", "polished.nc"]
+    assert main(call) == 0 and "DFET" in capsys.readouterr().out
+    assert main(["verify", "polished.nc"]) == 0
+
+
 def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
     from runs.commands import make_solver
 
     assert make_solver("macs") == macs.MACS()
     assert make_solver("MACS", plain=True, mesh="adaptive") == macs.MACS(refine=False, mesh="adaptive")
+    assert make_solver("macs", polish_on="dfet:8x3", verify=0.1) == macs.MACS(polish_on="dfet:8x3", verify=0.1)
+    assert make_solver("nsga2", verify=0.1) == macs.NSGA2()
 
 
 def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
@@ -162,6 +170,9 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--transcription", "shooting:1"], ["nodes must be an integer of at least 2"]),
         (["solve", "glide.py:lagging", "--transcription", "shooting:20"], ["'leg'", "'x'", "rk4", "nodes=", "steps="]),
         (["solve", "goddard", "--transcription", "shooting:9", "--mesh", "adaptive"], ["needs DFET", "SingleShooting"]),
+        (["solve", "goddard", "--polish-on", "dfet:4"], ["polish_on", "'dfet:4'", "dfet:4x6"]),
+        (["solve", "goddard", "--polish-on", "dfet:8x3", "--no-refine"], ["polish_on", "refine=False"]),
+        (["solve", "goddard", "--polish-on", "dfet:8x3", "--solver", "nsga2"], ["--polish-on dfet:8x3", "'nsga2'"]),
         (["solve", "goddard", "--mesh", "adaptve"], ["'adaptve'", "did you mean adaptive?", "fixed"]),
         (["solve", "goddard", "--inner", "marsh"], ["'marsh'", "did you mean march?", "ipopt"]),
         (["solve", "goddard", "--evaluations", "ten"], ["--evaluations", "'ten' is not a whole number above 0"]),

@@ -1,0 +1,176 @@
+"""Points that are moved inside of their limits until they hold when flown, by the problem of Bryson and Denham, whose front is known.
+
+Bryson and Ho, "Applied Optimal Control", 1975, section 3.11: least effort is 4 / (9 l) where the height may not exceed l <= 1/6.
+"""
+
+from __future__ import annotations
+
+import signal
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from macs import MACS, Front
+from macs.bilevel import Bilevel
+from macs.holding import MORE, believable, hold
+from problems import Problem
+from transcription import DFET, SingleShooting
+from transcription.inner import March
+
+COARSE, SHOOTING = DFET(3, 3), SingleShooting(10, control="linear")
+VERIFY = 1e-4
+
+
+def bryson_denham() -> Problem:
+    problem = Problem("Bryson and Denham")
+    phase = problem.phase("flight", t0=0.0, tf=1.0)
+    x, v = phase.state("x", bounds=(-0.5, 0.5), initial=0.0, final=0.0), phase.state("v", bounds=(-2.0, 2.0), initial=1.0, final=-1.0)
+    u = phase.control("u", bounds=(-30.0, 30.0))
+    limit = problem.parameter("limit", bounds=(0.04, 1 / 6))
+    phase.dynamics(x=v, v=u)
+    phase.path("height", x - limit, upper=0.0)
+    problem.minimize("effort", phase.integral(u**2 / 2))
+    problem.minimize("highest", limit)
+    return problem
+
+
+def gust() -> Problem:
+    """A final value leaves no room to keep away from it, and two elements do not see what the wind does."""
+    problem = Problem("gust")
+    phase = problem.phase("flight", t0=0.0, tf=1.0)
+    phase.state("x", bounds=(-2.0, 2.0), initial=0.0, final=0.5)
+    u = phase.control("u", bounds=(-3.0, 3.0))
+    phase.dynamics(x=u + ca.sin(20.0 * phase.time))
+    problem.minimize("effort", phase.integral(u**2))
+    return problem
+
+
+@pytest.fixture(scope="module")
+def rough() -> Front:
+    return MACS(refine=False).solve(bryson_denham(), SHOOTING, evaluations=400, seed=1)
+
+
+def share(front: Front) -> np.ndarray:
+    """The effort as flown, by the least that any flight of this height takes."""
+    flown = front.flown(tolerance=np.inf).objectives
+    return flown[:, 0] / (4 / (9 * flown[:, 1]))
+
+
+def test_points_hold_at_a_price_that_is_small(rough):
+    promised, held = (rough.polished(COARSE, solves=30, verify=verify) for verify in (None, VERIFY))
+    before, after = (front.flown(tolerance=VERIFY) for front in (promised, held))
+    assert before.violation.max() > 10 * VERIFY and share(promised).min() < 0.99, "better than there is: they exceed what they promise"
+    assert after.violation.max() <= VERIFY and share(held).min() > 1 - 1e-3
+    assert len(held) == len(promised) and np.median(share(held)) < 1.03
+    moved = [point for point in held if point.note]
+    assert moved and all("inside its limits" in point.note and point.optimality is None for point in moved)
+    assert held.stats["gradient_solves"] == promised.stats["gradient_solves"] + len(moved), "at once"
+
+
+def test_what_cannot_be_made_to_hold_is_told():
+    evaluator = Bilevel(DFET(2, 1).transcribe(gust()), March(), 1e-6)
+    start = evaluator.nlp.march(evaluator.first_guess(np.zeros((1, len(evaluator.free)))))
+    flat = evaluator.refine(start, np.full((1, 1), 0.0), np.ones((1, 1)))
+    assert flat.status[0] == "converged"
+    Z, holds, _ = hold(evaluator, flat.Z, np.ones(1), VERIFY)
+    assert holds.shape == (1,) and not holds[0] and evaluator.nlp.evaluate(Z)[1][0] <= 1e-6
+    none, holds, moved = hold(evaluator, flat.Z[:0], np.ones(1), VERIFY)
+    assert len(none) == len(holds) == len(moved) == 0
+
+
+def test_known_points_are_flown_only_if_it_matters(rough, monkeypatch):
+    flown = []
+    import macs.holding as module
+
+    fly = module._flights
+
+    def counted(problem, planned, verify):
+        flown.append(len(planned))
+        return fly(problem, planned, verify)
+
+    monkeypatch.setattr(module, "_flights", counted)
+    assert len(believable(rough.F.min(axis=0)[None] - 1.0, rough, VERIFY)) == len(rough) and not flown, "dominated, all of them"
+    nothing = np.empty((0, 2))
+    kept = believable(nothing, rough, VERIFY)
+    assert sum(flown) == len(rough)
+    actual = rough.flown(tolerance=VERIFY)
+    assert np.array_equal(kept.F, rough.F[actual.status == "converged"])
+
+
+def test_margins_keep_rows_inside(rough):
+    nlp = COARSE.transcribe(bryson_denham())
+    evaluator = Bilevel(nlp, March(), 1e-6)
+    start = nlp.interpolate(rough[4].trajectory)[None]
+    height = np.array(["height" in label for label in nlp.g_labels])
+    margins = np.where(height, 0.01, 0.0)[None]
+    plain, inside = (evaluator.refine(start, rough.F[4:5], np.ones((1, 2)), one) for one in (None, margins))
+    g = [np.array(nlp.functions(found.Z[0])[1]).ravel() for found in (plain, inside)]
+    assert g[0][height].max() == pytest.approx(0.0, abs=1e-6)
+    assert g[1][height].max() == pytest.approx(-0.01, abs=1e-6)
+    assert evaluator.counts.gradient_solves == 2 and MORE > 1
+
+
+def test_an_interruption_leaves_what_holds(rough, monkeypatch):
+    refine = Bilevel._refine
+
+    def interrupted(self, starts, references, weights, margins):
+        found = refine(self, starts, references, weights, margins)
+        if margins is not None:
+            signal.raise_signal(signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(Bilevel, "_refine", interrupted)
+    found = rough.polished(COARSE, solves=30, verify=VERIFY)
+    assert found.stats["stopped"] == "interrupted" and len(found)
+    assert found.flown(tolerance=VERIFY).violation.max() <= VERIFY
+
+
+def test_if_nothing_holds_the_front_says_so():
+    front = MACS(archive=1).solve(gust(), DFET(2, 1), evaluations=40, seed=1)
+    assert len(front)
+    empty = front.polished(DFET(2, 1), solves=2, verify=VERIFY)
+    assert not len(empty) and empty.message == "no point misses less than 0.0001 when it is flown"
+    assert "0.0001" in empty.table() and len(front.polished(DFET(2, 1), solves=2, verify=1.0))
+
+
+def test_what_makes_no_sense_is_refused(rough):
+    with pytest.raises(ValueError, match="verify must be a positive number"):
+        rough.polished(COARSE, verify=0)
+
+
+class TestOfASearch:
+    """MACS searches on one transcription and polishes on another."""
+
+    def test_it_is_the_polished_front_of_the_search(self, rough):
+        found = MACS(polish_on="dfet:3x3", polish_every=20, verify=VERIFY).solve(bryson_denham(), SHOOTING, evaluations=400, seed=1)
+        expected = rough.polished(COARSE, solves=20, limit=10, verify=VERIFY)
+        assert np.array_equal(found.F, expected.F) and found.stats["gradient_solves"] == expected.stats["gradient_solves"]
+        assert found.solver["settings"]["polish_on"] == "dfet:3x3" and found.stats["evaluations"] == 400
+
+    def test_a_finished_checkpoint_is_polished_again(self, tmp_path):
+        solver = MACS(polish_on="dfet:3x3", polish_every=40)
+        problem, kept = bryson_denham(), tmp_path / "kept"
+        first, again = (solver.solve(problem, SHOOTING, evaluations=400, seed=1, checkpoint=kept) for _ in range(2))
+        assert np.array_equal(first.F, again.F) and any(point.transcription == COARSE.to_dict() for point in again)
+
+    @pytest.mark.parametrize(
+        ("settings", "words"),
+        [
+            ({"verify": 0.1}, "verify makes no sense without polish_on"),
+            ({"polish_on": "dfet:3x3", "verify": 0.0}, "verify must be in"),
+            ({"polish_on": "dfet"}, "polish_on: unknown transcription 'dfet'"),
+            ({"polish_on": COARSE}, "polish_on must be a word"),
+            ({"polish_on": "dfet:3x3", "refine": False}, "refine=False"),
+            ({"polish_on": "dfet:3x3", "mesh": "adaptive"}, "mesh='adaptive'"),
+        ],
+    )
+    def test_what_makes_no_sense_is_refused(self, settings, words):
+        with pytest.raises(ValueError, match=words):
+            MACS(**settings)
+
+    def test_a_peak_that_gradients_refuse_is_told_before_any_work(self):
+        problem = bryson_denham()
+        problem.maximize("fastest", problem.phases["flight"].peak(problem.phases["flight"]["v"]))
+        with pytest.raises(ValueError, match="peak"):
+            MACS(polish_on="dfet:3x3").solve(problem, SHOOTING, evaluations=10**9, seed=1)
