@@ -52,7 +52,7 @@ def finish(settings: MACS, front: Front, progress: bool) -> Front:
     if settings.polish_on is not None:
         solves = front.stats["evaluations"] // settings.polish_every
         return front.polished(parse(settings.polish_on), solves=solves, limit=settings.archive, verify=settings.verify, progress=progress)
-    if settings.mesh == "fixed":
+    if settings.mesh == "fixed" or not len(front):
         return front
     refined = front.refine_mesh(tolerance=settings.mesh_tolerance, progress=progress)
     # A point that did not get there may promise too much: it is not believed to dominate any.

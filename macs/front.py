@@ -273,14 +273,15 @@ class Front:
 
         A search wants candidates that are scored quickly, such as those of single shooting; gradients want a sparse problem, such as that
         of DFET. The solves begin from the front's trajectories, interpolated: first the best of each objective, then places all over the
-        front, or along it; see `MACS`. Points that no solve came to better remain what they are, on their own transcription.
+        front, or along it; see `MACS`. Points that no solve came to better remain what they are, on their own transcription. Without any
+        points, they begin from what is `closest` to one.
 
         Parameters
         ----------
         transcription : Transcription
             On which to solve.
         solves : int, optional
-            How many gradient solves there may be. Default: as many as there are points.
+            How many gradient solves there may be. Default: as many as there are points, or one.
         limit : int, optional
             Most points of the result, well spread. Default: as many as there are.
         verify : float, optional

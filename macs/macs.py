@@ -265,7 +265,7 @@ class MACS(Solver):
 
     def finish(self, front: Front, progress: bool) -> Front:
         """The front polished on another transcription, or with its meshes refined, where that is wanted."""
-        return ending.finish(self, front, progress) if len(front) else front
+        return ending.finish(self, front, progress)
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from transcription.stopping import stopped_by
 from . import archive as archives
 from .archive import Archive
 from .bilevel import Bilevel
-from .evaluation import CONVERGED
+from .evaluation import CONVERGED, Counts
 from .holding import believable, hold
 from .inputs import check_count, check_positive, check_problem
 from .merging import merge
@@ -29,6 +29,7 @@ from .solves import Solves
 
 if TYPE_CHECKING:
     from .front import Front
+    from .point import Point
 
 KEPT_INSIDE = "kept inside its limits, so that it holds when it is flown"
 """What there is to say of a point that missed some."""
@@ -41,24 +42,25 @@ def polished(
     problem = front.compiled()
     check_problem(problem, transcription)
     known = front[[point.index for point in front if point.status == CONVERGED and point.trajectory is not None]]
-    solves, limit = len(known) if solves is None else solves, len(known) if limit is None else limit
+    count = max(len(known), 1)
+    solves, limit = count if solves is None else solves, count if limit is None else limit
     check_count("solves", solves, 0)
-    check_count("limit", limit, min(len(front.goals), len(known)))
+    check_count("limit", limit, min(len(front.goals), count))
     if verify is not None:
         check_positive("verify", verify)
     refuse_peaks(problem)
-    if not len(known):
-        return front
     nlp = _written(problem, transcription)
-    starts = np.array([nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None])
-    tolerance = float(front.stats["tolerance"])
-    evaluator = Bilevel(nlp, March(), tolerance)
-    # What is promised is what was found, on whichever mesh: nothing worse is to take its place.
-    begun = Archive(starts, known.F, np.minimum(known.violation, tolerance))
+    evaluator = Bilevel(nlp, March(), float(front.stats["tolerance"]))
     with Told(progress) as told, Monitor(None, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
         evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
-        archive = polish(begun, Solves(evaluator, solves), limit)
-        untouched = {z.tobytes() for z in starts}
+        left = Solves(evaluator, solves)
+        begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
+        if not len(begun):
+            found = front[:]
+            found.stats = _costs(front, evaluator.counts, monitor.elapsed, bool(monitor.reason))
+            return found
+        archive = polish(begun, left, limit)
+        untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         moved = np.zeros(len(Z), dtype=bool)
         if verify is not None:
@@ -70,17 +72,8 @@ def polished(
         certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
         # What was moved inside is no optimum of the problem as it is stated, but the nearest that can be flown.
         optimality = [None if inside else next(certified) for inside in moved]
-        taken = monitor.elapsed
-        interrupted = bool(monitor.reason)
-    counts, before = evaluator.counts, front.stats
-    stats = {
-        **before,
-        "gradient_solves": before["gradient_solves"] + counts.gradient_solves,
-        "inner_iterations": before["inner_iterations"] + counts.inner_iterations,
-        "wall_time": before["wall_time"] + taken,
-        "reproducible": before["reproducible"] and not (counts.clocked or interrupted),
-        **({"stopped": "interrupted"} if interrupted else {}),
-    }
+        taken, interrupted = monitor.elapsed, bool(monitor.reason)
+    stats = _costs(front, evaluator.counts, taken, interrupted)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
     found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
@@ -88,6 +81,34 @@ def polished(
     if not len(found):
         found.message = f"no point misses less than {verify:g} when it is flown"
     return found
+
+
+def _archive(nlp: NLP, known: Front, tolerance: float) -> Archive:
+    """Known points on this mesh. What is promised is what was found, on whichever mesh: nothing worse is to take its place."""
+    starts = [nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None]
+    return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
+
+
+def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
+    """What one solve makes of the least infeasible point: one point, or none."""
+    if closest is None or closest.trajectory is None:
+        return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
+    good = found.status == CONVERGED
+    return Archive(found.Z[good], found.F[good], found.violation[good])
+
+
+def _costs(front: Front, counts: Counts, taken: float, interrupted: bool) -> dict[str, Any]:
+    """The stats of a front, with what was spent beside."""
+    before = front.stats
+    return {
+        **before,
+        "gradient_solves": before["gradient_solves"] + counts.gradient_solves,
+        "inner_iterations": before["inner_iterations"] + counts.inner_iterations,
+        "wall_time": before["wall_time"] + taken,
+        "reproducible": before["reproducible"] and not (counts.clocked or interrupted),
+        **({"stopped": "interrupted"} if interrupted else {}),
+    }
 
 
 @lru_cache(maxsize=4)

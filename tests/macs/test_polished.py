@@ -63,6 +63,16 @@ def test_the_same_bits_again(rough, smooth):
     assert np.array_equal(rough.polished(FINE, solves=50).F, smooth.F)
 
 
+def test_it_begins_from_what_is_nearest_to_feasible_where_nothing_is(rough):
+    lost = NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=12, seed=1, inner="march")
+    assert not len(lost) and lost.closest is not None
+    found = lost.polished(FINE, solves=60, limit=12)
+    assert len(found) >= 6 and distance_to_curve(found.objectives, reference(20001)).max() < 1e-3
+    assert found.stats["evaluations"] == 12 and 1 < found.stats["gradient_solves"] <= 60
+    none = lost.polished(FINE, solves=0)
+    assert not len(none) and none.message == lost.message and none.closest is not None and none.stats["gradient_solves"] == 0
+
+
 def test_no_more_points_than_asked(rough):
     assert len(rough.polished(FINE, solves=20, limit=5)) == 5
 

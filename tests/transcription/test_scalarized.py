@@ -161,6 +161,19 @@ def test_a_peak_that_is_bounded_above() -> None:
     problem.constraint("thrust", problem.phases["trip"].peak(problem.phases["trip"]["u"] ** 2), upper=4.0)
     solved = solve(nlp_of(problem), [0, INF], [1, 1])
     assert solved.status == "converged" and solved.F[0] == pytest.approx(np.sqrt(2), abs=1e-6)
+    # The thrust of a bang-bang flight of time t is 4 / t^2 at least, squared.
+    nlp = nlp_of(problem)
+    inside = np.array([3.0 if "thrust" in label else 0.0 for label in nlp.g_labels])
+    slower = solve(nlp, [0, INF], [1, 1], margin=inside)
+    assert slower.status == "converged" and slower.F[0] == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_margin_leaves_what_has_no_room_in_its_middle() -> None:
+    """All other rows are equations: nothing changes, and a start that misses a margin is not held on to."""
+    nlp = nlp_of(two_wells())
+    plain = solve(nlp, [0, 0], [1, 1])
+    kept = solve(nlp, [0, 0], [1, 1], plain.z, margin=np.full(len(nlp.g_scale), 5.0))
+    assert kept.status == "converged" and close(kept, plain.F, 1e-8)
 
 
 @pytest.mark.parametrize(
@@ -227,6 +240,7 @@ def test_without_persistence_a_solve_out_of_iterations_is_not_begun_again() -> N
         ([0, 0], [1, INF], {}),
         ([0, 0], [1, 1], {"start": np.zeros(2)}),
         ([0, 0], [1, 1], {"ceiling": np.zeros(3)}),
+        ([0, 0], [1, 1], {"margin": np.zeros(1000)}),
     ],
 )
 def test_calls_that_make_no_sense(reference: list[float], weights: list[float], more: dict) -> None:
