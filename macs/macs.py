@@ -164,7 +164,7 @@ class MACS(Solver):
         ending.check(self)
         self._check_range("mesh_tolerance", "[1e-10, 1]", lambda x: 1e-10 <= x <= 1)
         if self.verify is not None:
-            self._check_range("verify", "(0, 1]", lambda x: 0 < x <= 1)
+            self._check_range("verify", "(0, inf)", lambda x: 0 < x < np.inf)
         if self.reseed not in ("all", "spread"):
             raise ValueError(f"MACS: reseed must be 'all' or 'spread', not {self.reseed!r}")
         self._check_range("rho", "(0, 1]", lambda x: 0 < x <= 1)

@@ -91,7 +91,7 @@ def _archive(nlp: NLP, known: Front, tolerance: float) -> Archive:
 
 def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
     """What one solve makes of the least infeasible point: one point, or none."""
-    if closest is None or closest.trajectory is None:
+    if closest is None or closest.trajectory is None or not np.isfinite([*closest.F, closest.violation]).all():
         return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
     found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
     good = found.status == CONVERGED
