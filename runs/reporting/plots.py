@@ -60,6 +60,8 @@ def front_figure(
             if reference is not None:
                 _draw_truth(ax, truth(reference, known) * _signs(known), _signs(known), (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
+                if not runs:  # none is finished; whoever comes after has the colour that is its own in all figures
+                    continue
                 points = [minimised(front, known) * _signs(known) for front in runs]
                 name = _runs(solver, len(runs), sum(not len(part) for part in points))
                 every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])

@@ -60,6 +60,13 @@ def test_arrays_without_a_shape_of_their_own_are_empty_runs():
     assert words(figure) == ["ours, 2 runs (1 empty)"]
 
 
+def test_a_solver_without_runs_is_not_in_the_legend():
+    with_it, without = (front_figure({**first, "ours": [A]}, goals=GOALS) for first in ({"late": [B]}, {"late": []}))
+    assert len(words(with_it)) == 2 and words(without) == [words(with_it)[1]]
+    colors = [figure.axes[0].get_lines()[-1].get_color() for figure in (with_it, without)]
+    assert colors[0] == colors[1], "the same as beside the other"
+
+
 def test_a_truth_of_few_points_is_no_line():
     figure = front_figure({"ours": [A]}, reference=TRUTH[::50], goals=GOALS)
     assert [line.get_linestyle() for line in figure.axes[0].get_lines()] == ["None", "None"]
