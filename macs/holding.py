@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
 from transcription.base import NLP
-from transcription.simulate import Simulation, simulate_all
-from transcription.trajectory import Trajectory
+from transcription.simulate import simulate_all
 
 from .bilevel import Bilevel
 from .dominance import nondominated
@@ -74,7 +72,8 @@ def hold(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -
 
 def _missing(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarray, holds: np.ndarray, verify: float) -> np.ndarray:
     """Fly the rows that are waiting: which of them miss something. Their `margins` grow by that; the others hold."""
-    flights = _flights(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], verify)
+    rtol, atol = _accuracy(verify)
+    flights = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
     holds[waiting] = [flight.violation <= verify for flight in flights]
     for row, flight in zip(waiting, flights, strict=True):
         margins[row] += MORE * _by_row(flight.violations, nlp.g_labels)
@@ -96,12 +95,12 @@ def believable(found: np.ndarray, known: Front, verify: float) -> Front:
         look = rows[apart & ~seen[rows]]
         if not len(look):
             return known[rows]
-        planned = [point.trajectory for point in known[look] if point.trajectory is not None]
         seen[look] = True
-        holds[look] = [flight.violation <= verify for flight in _flights(known.compiled(), planned, verify)]
+        rtol, atol = _accuracy(verify)
+        holds[look] = known[look].flown(tolerance=verify, rtol=rtol, atol=atol).status == CONVERGED
 
 
-def _flights(problem: CompiledProblem, planned: Sequence[Trajectory], verify: float) -> list[Simulation]:
-    """Fly trajectories, as exactly as the question is whether they miss something by more than `verify`."""
+def _accuracy(verify: float) -> tuple[float, float]:
+    """rtol and atol of an integrator that is as exact as the question whether something is missed by more than `verify`."""
     accuracy = min(PART * verify, PART)
-    return simulate_all(problem, planned, rtol=accuracy, atol=0.1 * accuracy)
+    return accuracy, 0.1 * accuracy

@@ -171,6 +171,7 @@ def test_a_peak_that_is_bounded_above() -> None:
 def test_a_margin_leaves_what_has_no_room_in_its_middle() -> None:
     """All other rows are equations: nothing changes, and a start that misses a margin is not held on to."""
     nlp = nlp_of(two_wells())
+    assert len(nlp.g_scale) and np.array_equal(nlp.g_lower, nlp.g_upper)
     plain = solve(nlp, [0, 0], [1, 1])
     kept = solve(nlp, [0, 0], [1, 1], plain.z, margin=np.full(len(nlp.g_scale), 5.0))
     assert kept.status == "converged" and close(kept, plain.F, 1e-8)
