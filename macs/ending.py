@@ -47,14 +47,21 @@ def check_transcription(settings: MACS, transcription: Transcription, problem: C
         refuse_peaks(problem)
 
 
-def finish(settings: MACS, front: Front, progress: bool) -> Front:
+def finish(settings: MACS, front: Front, time_limit: float | None, progress: bool) -> Front:
     """What is to be made of the front of a search that ended by itself."""
     if settings.polish_on is not None:
         solves = front.stats["evaluations"] // settings.polish_every
-        return front.polished(parse(settings.polish_on), solves=solves, limit=settings.archive, verify=settings.verify, progress=progress)
+        return front.polished(
+            parse(settings.polish_on),
+            solves=solves,
+            limit=settings.archive,
+            verify=settings.verify,
+            time_limit=time_limit,
+            progress=progress,
+        )
     if settings.mesh == "fixed" or not len(front):
         return front
-    refined = front.refine_mesh(tolerance=settings.mesh_tolerance, progress=progress)
+    refined = front.refine_mesh(tolerance=settings.mesh_tolerance, time_limit=time_limit, progress=progress)
     # A point that did not get there may promise too much: it is not believed to dominate any.
     believed = refined.F[[i for i, point in enumerate(refined) if not point.note]]
     return refined[np.flatnonzero(~np.any(dominates(believed, refined.F[:, None]), axis=1))]

@@ -226,7 +226,7 @@ class Front:
 
     # What it becomes
 
-    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, progress: bool = False) -> Front:
+    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool = False) -> Front:
         """The front with each point solved anew on a mesh of its own, refined until what the point promises can be flown.
 
         Errors are estimated by integration element by element, by looking at states, controls and path constraints between the nodes, and
@@ -242,6 +242,8 @@ class Front:
             flown. Controls may not leave their bounds at all, states and path constraints by the front's own tolerance.
         limit : int
             How many meshes are tried for each point.
+        time_limit : float, optional
+            Seconds after which the work ends with what there is; looked at, like Ctrl-C, before each solve.
         progress : bool
             Tell on the terminal how it stands.
 
@@ -258,7 +260,7 @@ class Front:
         """
         from .refining import refine_mesh
 
-        return refine_mesh(self, tolerance, limit, progress)
+        return refine_mesh(self, tolerance, limit, time_limit, progress)
 
     def polished(
         self,
@@ -267,6 +269,7 @@ class Front:
         solves: int | None = None,
         limit: int | None = None,
         verify: float | None = None,
+        time_limit: float | None = None,
         progress: bool = False,
     ) -> Front:
         """The front brought down to the Pareto front by gradient solves, whichever solver found it on whichever transcription.
@@ -288,6 +291,8 @@ class Front:
             By how much, in their scales, constraints may be missed when a point is flown. Points that miss more are solved once more, three
             times at most, inside of their limits by what they missed; these solves come beside, and `Point.note` tells of them. What still
             misses more then, also of the front's own points, is left out. Default: what the mesh says is believed.
+        time_limit : float, optional
+            Seconds after which the work ends with what there is; looked at, like Ctrl-C, before each solve.
         progress : bool
             Tell on the terminal how it stands.
 
@@ -304,7 +309,7 @@ class Front:
         """
         from .polished import polished
 
-        return polished(self, transcription, solves, limit, verify, progress)
+        return polished(self, transcription, solves, limit, verify, time_limit, progress)
 
     def flown(
         self,

@@ -263,9 +263,9 @@ class MACS(Solver):
         """Refuse to adapt meshes of methods whose meshes nobody knows how to refine, and to polish where gradients make no sense."""
         ending.check_transcription(self, transcription, problem)
 
-    def finish(self, front: Front, progress: bool) -> Front:
+    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
         """The front polished on another transcription, or with its meshes refined, where that is wanted."""
-        return ending.finish(self, front, progress)
+        return ending.finish(self, front, time_limit, progress)
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""

@@ -36,7 +36,13 @@ KEPT_INSIDE = "kept inside its limits, so that it holds when it is flown"
 
 
 def polished(
-    front: Front, transcription: Transcription, solves: int | None, limit: int | None, verify: float | None, progress: bool
+    front: Front,
+    transcription: Transcription,
+    solves: int | None,
+    limit: int | None,
+    verify: float | None,
+    time_limit: float | None,
+    progress: bool,
 ) -> Front:
     """See `Front.polished`."""
     problem = front.compiled()
@@ -48,16 +54,18 @@ def polished(
     check_count("limit", limit, min(len(front.goals), count))
     if verify is not None:
         check_positive("verify", verify)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
     refuse_peaks(problem)
     nlp = _written(problem, transcription)
     evaluator = Bilevel(nlp, March(), float(front.stats["tolerance"]))
-    with Told(progress) as told, Monitor(None, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
+    with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
         evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
         left = Solves(evaluator, solves)
         begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
         if not len(begun):
             found = front[:]
-            found.stats = _costs(front, evaluator.counts, monitor.elapsed, bool(monitor.reason))
+            found.stats = _costs(front, evaluator.counts, monitor.elapsed, monitor.reason)
             return found
         archive = polish(begun, left, limit)
         untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
@@ -72,8 +80,8 @@ def polished(
         certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
         # What was moved inside is no optimum of the problem as it is stated, but the nearest that can be flown.
         optimality = [None if inside else next(certified) for inside in moved]
-        taken, interrupted = monitor.elapsed, bool(monitor.reason)
-    stats = _costs(front, evaluator.counts, taken, interrupted)
+        taken, stopped = monitor.elapsed, monitor.reason
+    stats = _costs(front, evaluator.counts, taken, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
     found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
@@ -98,7 +106,7 @@ def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
     return Archive(found.Z[good], found.F[good], found.violation[good])
 
 
-def _costs(front: Front, counts: Counts, taken: float, interrupted: bool) -> dict[str, Any]:
+def _costs(front: Front, counts: Counts, taken: float, stopped: str) -> dict[str, Any]:
     """The stats of a front, with what was spent beside."""
     before = front.stats
     return {
@@ -106,8 +114,8 @@ def _costs(front: Front, counts: Counts, taken: float, interrupted: bool) -> dic
         "gradient_solves": before["gradient_solves"] + counts.gradient_solves,
         "inner_iterations": before["inner_iterations"] + counts.inner_iterations,
         "wall_time": before["wall_time"] + taken,
-        "reproducible": before["reproducible"] and not (counts.clocked or interrupted),
-        **({"stopped": "interrupted"} if interrupted else {}),
+        "reproducible": before["reproducible"] and not (counts.clocked or stopped),
+        **({"stopped": stopped} if stopped else {}),
     }
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +13,13 @@ from transcription.adaptation import COST, Verdict, judge, next_method
 from transcription.base import NLP
 from transcription.dfet import DFET
 from transcription.optimality import optimality
+from transcription.stopping import stopped_by, stopping
 from transcription.trajectory import Trajectory
 
 from .dominance import extremes
 from .evaluation import CONVERGED
 from .inputs import check_count, check_positive
+from .monitor import Monitor
 from .point import Point
 from .progress import Told
 from .resolving import Resolved, Resolver
@@ -37,14 +38,16 @@ LEAST_TOLERANCE = 1e-10
 """Below, double precision and the integrator cannot tell."""
 
 
-def refine_mesh(front: Front, tolerance: float, limit: int, progress: bool) -> Front:
+def refine_mesh(front: Front, tolerance: float, limit: int, time_limit: float | None, progress: bool) -> Front:
     """See `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
         raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
     check_count("limit", limit, 1)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
     front.compiled()
-    return Refinement(front, float(tolerance), int(limit)).go(progress) if len(front) else front
+    return Refinement(front, float(tolerance), int(limit)).go(time_limit, progress) if len(front) else front
 
 
 @dataclass
@@ -109,22 +112,19 @@ class Refinement:
         self.resolver = Resolver(self.ranges, front.F[self.good], 0.1 * tolerance)
         self.points = {i: self._begin(i) for i in self.good.tolist()}
 
-    def go(self, progress: bool = False) -> Front:
-        """The refined front; after Ctrl-C, what there is of it."""
+    def go(self, time_limit: float | None, progress: bool) -> Front:
+        """The refined front; after Ctrl-C or the time limit, what there is of it."""
         from .front import Front
 
-        started, interrupted = time.perf_counter(), False
-        try:
-            with Told(progress) as told:
-                self._polish()
-                for k in range(self.rounds):
-                    active = sum(point.active for point in self.points.values())
-                    told(f"meshes of the front: round {k + 1} of at most {self.rounds}, {active} of {len(self.front)} points")
-                    if not active:
-                        break
-                    self._round()
-        except KeyboardInterrupt:
-            interrupted = True
+        with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
+            self._polish()
+            for k in range(self.rounds):
+                active = sum(point.active for point in self.points.values())
+                told(f"meshes of the front: round {k + 1} of at most {self.rounds}, {active} of {len(self.front)} points")
+                if not active or stopping():
+                    break
+                self._round()
+            taken, stopped = monitor.elapsed, monitor.reason
         front, resolver = self.front, self.resolver
         rows = [self._columns(i) for i in range(len(front))]
         columns: dict[str, Any] = {key: [row[key] for row in rows] for key in rows[0]}
@@ -133,8 +133,8 @@ class Refinement:
             **front.stats,
             "gradient_solves": front.stats["gradient_solves"] + resolver.gradient_solves,
             "inner_iterations": front.stats["inner_iterations"] + resolver.inner_iterations,
-            "wall_time": front.stats["wall_time"] + time.perf_counter() - started,
-            "reproducible": front.stats["reproducible"] and not (resolver.clocked or interrupted),
+            "wall_time": front.stats["wall_time"] + taken,
+            "reproducible": front.stats["reproducible"] and not (resolver.clocked or stopped),
             "mesh_tolerance": self.tolerance,
         }
         return Front(
@@ -142,7 +142,7 @@ class Refinement:
             goals=front.goals,
             problem=self.problem,
             solver=front.solver,
-            stats=stats | ({"stopped": "interrupted"} if interrupted else {}),
+            stats=stats | ({"stopped": stopped} if stopped else {}),
             message=f"{reached} of {len(front)} points meet the mesh tolerance of {self.tolerance:.0e}.",
         )
 
@@ -166,7 +166,7 @@ class Refinement:
                 rough.setdefault(point.method, []).append(i)
         for method, members in rough.items():
             nlp = method.transcribe(self.problem)
-            for i in members:
+            for i in _still_wanted(members):
                 solved = self.resolver.solve(nlp, self.points[i].point.F, self.points[i].end, self._starts(i, nlp))
                 if solved.status == CONVERGED and solved.by_gradients:
                     self._take(self.points[i], method, solved)
@@ -184,14 +184,15 @@ class Refinement:
                     finer.setdefault(method, []).append(i)
         for method, members in finer.items():
             nlp = method.transcribe(self.problem)
-            for i in members:
+            for i in _still_wanted(members):
                 self._solve(i, method, nlp)
 
     def _solve(self, i: int, method: DFET, nlp: NLP) -> None:
         point = self.points[i]
         solved = self.resolver.solve(nlp, point.point.F, point.end, self._starts(i, nlp))
         if solved.status != CONVERGED:
-            point.active, point.trouble = False, f"on the next finer mesh it is '{solved.status}'"
+            if not stopping():
+                point.active, point.trouble = False, f"on the next finer mesh it is '{solved.status}'"
             return
         change = float((np.abs(solved.F - point.F) / self.ranges).max())
         self._take(point, method, solved)
@@ -245,6 +246,14 @@ class Refinement:
         row = {key: values[0] for key, values in trajectory_columns(solved.nlp, solved.z[None], self.front.stats["tolerance"]).items()}
         certified = optimality(solved.nlp, solved.z, self.ranges) if solved.by_gradients else None
         return row | {"optimality": certified, "notes": note}
+
+
+def _still_wanted(members: Iterable[int]) -> Iterator[int]:
+    """One after the other, until the work is to end."""
+    for i in members:
+        if stopping():
+            return
+        yield i
 
 
 def _untouched(point: Point, note: str) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, is_dataclass
@@ -26,6 +27,8 @@ from .results import black_box_front, trajectory_front
 from .running import ENDED, Run
 
 Callback = Callable[[Progress], Any]
+NO_TIME = 1e-6
+"""Seconds that are left when there are none: what comes then ends before its first solve."""
 
 
 class Solver(ABC):
@@ -79,8 +82,8 @@ class Solver(ABC):
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
-    def finish(self, front: Front, progress: bool) -> Front:
-        """What is left to do with the front of a search that ended by itself, told on the terminal or not. Nothing, for most solvers."""
+    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
+        """What is left to do with the front of a search that ended by itself, in so many seconds. Nothing, for most solvers."""
         return front
 
     def solve(
@@ -117,8 +120,8 @@ class Solver(ABC):
             drawn: "uniform", each variable by itself, as all those that are missing otherwise, but without the guess; "smooth", random
             profiles about the guess, see `transcription.Smooth`.
         time_limit : float, optional
-            Seconds after which the search ends with what it has; looked at, like Ctrl-C, before each batch and each solve by IPOPT. A
-            safety net: a run that it ends is recorded as not reproducible.
+            Seconds after which the search, and what may come after it, ends with what it has; looked at, like Ctrl-C, before each batch and
+            each solve by IPOPT. A safety net: a run that it ends is recorded as not reproducible.
         progress : bool
             Show how the search stands on the terminal.
         callback : callable, optional
@@ -173,8 +176,12 @@ class Solver(ABC):
                 **level,
             },
         )
+        began = time.perf_counter()
         front = run.go(time_limit, progress, callback, checkpoint)
-        return self.finish(front, progress) if front.stats["stopped"] in ENDED else front
+        if front.stats["stopped"] not in ENDED:
+            return front
+        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
+        return self.finish(front, left, progress)
 
     def minimize(
         self,

@@ -101,7 +101,8 @@ def _point(ground: Ground, paper: Mapping[str, Any]) -> str:
     words = ", ".join(
         f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, paper["point"], strict=True)
     )
-    return f"hypervolume in the objectives' units, up to {words}."
+    best = ground.reference(None)
+    return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, paper['point']):.5g}."
 
 
 def _objectives(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:

@@ -6,12 +6,14 @@ Bryson and Ho, "Applied Optimal Control", 1975, section 3.11: least effort is 4 
 from __future__ import annotations
 
 import signal
+import time
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from macs import MACS, Front
+from macs import MACS, Front, monitor
 from macs.bilevel import Bilevel
 from macs.holding import believable, hold
 from problems import Problem
@@ -155,6 +157,20 @@ class TestOfASearch:
         problem, kept = bryson_denham(), tmp_path / "kept"
         first, again = (solver.solve(problem, SHOOTING, evaluations=400, seed=1, checkpoint=kept) for _ in range(2))
         assert np.array_equal(first.F, again.F) and any(point.transcription == COARSE.to_dict() for point in again)
+
+    def test_its_time_limit_is_for_both(self, monkeypatch):
+        solve, late = Bilevel._refine, SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
+
+        def refine(self, *arguments):
+            found = solve(self, *arguments)
+            monkeypatch.setattr(monitor, "time", late)
+            return found
+
+        monkeypatch.setattr(Bilevel, "_refine", refine)
+        solver = MACS(polish_on="dfet:3x3", polish_every=20, verify=VERIFY)
+        found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, time_limit=600.0)
+        assert found.stats["evaluations"] == 400 and found.stats["stopped"] == "time limit" and not found.stats["reproducible"]
+        assert len(found) and found.stats["gradient_solves"] == 1, "of twenty, and more"
 
     @pytest.mark.parametrize(
         ("settings", "words"),

@@ -77,6 +77,12 @@ def test_no_more_points_than_asked(rough):
     assert len(rough.polished(FINE, solves=20, limit=5)) == 5
 
 
+def test_without_time_nothing_is_solved(rough):
+    found = rough.polished(FINE, time_limit=1e-9)
+    assert found.stats["stopped"] == "time limit" and found.stats["gradient_solves"] == 0
+    assert np.array_equal(found.F, rough.F)
+
+
 def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
     solve, solved = Bilevel._refine, []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import signal
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,7 @@ from synthetic_fronts import black_box, flights
 
 from macs import MACS, Front
 from macs.refining import Refinement
+from macs.resolving import Resolver
 from macs.results import trajectory_columns
 from macs.verification import verify
 from problems import Problem, load
@@ -136,18 +138,41 @@ def test_objectives_without_derivatives_are_solved_by_projection():
 
 
 def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
-    plain, calls = Refinement._solve, []
+    plain, solved = Refinement._solve, []
 
-    def interrupted(self, *arguments):
-        calls.append(1)
-        if len(calls) > 2:
-            raise KeyboardInterrupt
-        plain(self, *arguments)
+    def solve(self, i, *arguments):
+        solved.append(i)
+        plain(self, i, *arguments)
+        if len(solved) == 2:
+            signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Refinement, "_solve", interrupted)
+    monkeypatch.setattr(Refinement, "_solve", solve)
     front = coarse.refine_mesh()
+    assert len(solved) == 2
     assert len(front) == 5 and front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
     assert sum("not solved on a finer mesh" in point.note for point in front) == 3
+
+
+def test_ctrl_c_while_a_point_is_solved_says_nothing_of_that_point(coarse, monkeypatch):
+    plain = Resolver.solve
+
+    def solve(self, nlp, *arguments):
+        if nlp.transcription.to_dict() != coarse[0].transcription:
+            signal.raise_signal(signal.SIGINT)
+        return plain(self, nlp, *arguments)
+
+    monkeypatch.setattr(Resolver, "solve", solve)
+    front = coarse.refine_mesh()
+    assert front.stats["stopped"] == "interrupted"
+    assert all("not solved on a finer mesh" in point.note and "timeout" not in point.note for point in front)
+
+
+def test_a_time_limit_ends_it_too(coarse):
+    front = coarse.refine_mesh(time_limit=1e-6)
+    assert front.stats["stopped"] == "time limit" and front.stats["gradient_solves"] == coarse.stats["gradient_solves"]
+    assert np.array_equal(front.F, coarse.F)
+    with pytest.raises(ValueError, match="time_limit must be a positive number, not 0"):
+        coarse.refine_mesh(time_limit=0)
 
 
 def test_points_that_did_not_converge_stay_as_they_are():

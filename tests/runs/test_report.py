@@ -97,7 +97,8 @@ def test_volumes_and_objectives_beside_published_ones(folder, told):
     assert [float(ours[key]) for key in ("worst", "median", "best")] == pytest.approx(expected, rel=1e-12)
     broken = next(row for row in others if row["by"].startswith("broken"))
     assert [broken[key] for key in ("runs", "best", "worst")] == ["3", "0.0", "0.0"]
-    assert "up to time 10 s, distance 0 km" in told
+    union = Front.merge([run.front for run in store.runs() if run.finished])
+    assert f"up to time 10 s, distance 0 km; that of the union of 4 runs is {staircase(union.objectives):.5g}." in told
     with (folder / "report" / "published-3.csv").open() as file:
         rows = {(row["by"], row["statistic"]): row["distance [km]"] for row in csv.DictReader(file)}
     distances = np.concatenate([front.objectives[:, 1] for front in fronts])
