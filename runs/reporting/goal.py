@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from macs.front import Front
 from macs.inputs import unknown
 
 from ..measures.convergence import Band, History, band
@@ -96,9 +97,17 @@ class Goal:
 
     def history(self, run: Run, goals: Sequence[Objective]) -> History:
         """What a run had attained at each of its samples; NaN before it had a feasible point."""
-        k = [one.name for one in goals].index(self.objective)
+        k = self._place(goals)
         best = [goals[k].sign * min((row[k] for row in F), default=np.nan) for F in run.history["F"]]
         return np.array(run.history["evaluations"], dtype=float), np.fmax.accumulate(self.attained(np.array(best)))
+
+    def of_front(self, front: Front) -> float:
+        """What its best point attains; NaN if there is none."""
+        k = self._place(front.goals)
+        return float(self.attained(front.goals[k].sign * front.F[:, k].min())) if len(front) else np.nan
+
+    def _place(self, goals: Sequence[Objective]) -> int:
+        return [one.name for one in goals].index(self.objective)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +122,8 @@ class Attained:
     objective : Objective
     histories : (transcription, solver) -> one for each run
         Of failed runs, too, which attain nothing.
+    flown : (transcription, solver) -> what each run attained by points that hold when they are flown
+        Of failed runs, too. Empty where points are not flown.
     seconds : (transcription, solver) -> the time of each finished run
     """
 
@@ -120,26 +131,30 @@ class Attained:
     goal: Goal
     objective: Objective
     histories: Mapping[tuple[str, str], Sequence[History]]
+    flown: Mapping[tuple[str, str], Sequence[float]]
     seconds: Mapping[tuple[str, str], Sequence[float]]
 
     def tables(self) -> dict[str, Table]:
         """Name of a file -> table: what was attained in the end, and the evaluations to get there."""
         heads: list[Column | str] = [Column("transcription", grouped=True), "solver", "runs"]
         heads += [Column(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
+        heads += [Column("median as flown", digits=4)] if self.flown else []
         heads += [Column(f"evaluations to {share:g}") for share in self.goal.shares]
         heads += [Column("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
         for cell, runs in self.histories.items():
             b = band(runs, larger=True, moments=sum(len(x) for x, _ in runs))
-            final = [float(part[-1]) if np.isfinite(part[-1]) else None for part in (b.median, b.lower, b.upper)]
+            final: list[Cell] = [float(part[-1]) if np.isfinite(part[-1]) else None for part in (b.median, b.lower, b.upper)]
             seconds = self.seconds[cell]
             took = float(np.median(seconds)) if seconds else None
+            final += [_middle(self.flown[cell])] if self.flown else []
             rows.append([*cell, b.runs, *final, *(_reached(b, share) for share in self.goal.shares), took])
         unit = f" {self.objective.unit}" if self.objective.unit else ""
         notes = [
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
             "quartiles are over the runs; one without a feasible point has attained nothing. A dash: so many runs have not got there. "
-            "Values are what the transcription says of points, not what is flown."
+            "Values are what the transcription says of points"
+            + (", but those as flown, of the points that each run has in the end and that hold." if self.flown else ", not what is flown.")
         ]
         return {f"{self.problem}-goal-attainment": table(heads, rows, f"{self.problem}: goal attainment of {self.objective.name}.", notes)}
 
@@ -156,8 +171,8 @@ class Attained:
         return {f"{self.problem}-goal-attainment": figure}
 
 
-def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None) -> list[Attained]:
-    """The goal that a study gives on each of its problems; nothing if it gives none."""
+def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None, verify: float | None) -> list[Attained]:
+    """The goal that a study gives on each of its problems, also as flown if it verifies; nothing if it gives none."""
     if given is None:
         return []
     goal = Goal.of(given, {})
@@ -166,21 +181,30 @@ def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None) -> list
         here = [ground for ground in grounds if ground.problem == problem]
         goals = here[0].known.goals
         cells = {
-            (ground.place(solver), solver): (runs, ground.failures.get(solver, 0))
+            (ground.place(solver), solver): (runs, ground.fronts[solver], ground.failures.get(solver, 0))
             for ground in here
             for solver, runs in ground.runs.items()
             if len(runs) + ground.failures.get(solver, 0)
         }
         histories = {
             cell: [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
-            for cell, (runs, failed) in cells.items()
+            for cell, (runs, _, failed) in cells.items()
         }
-        seconds = {cell: [run.wall_time for run in runs] for cell, (runs, _) in cells.items()}
+        flown = {
+            cell: [*map(goal.of_front, fronts), *[np.nan] * failed] for cell, (_, fronts, failed) in cells.items() if verify is not None
+        }
+        seconds = {cell: [run.wall_time for run in runs] for cell, (runs, _, _) in cells.items()}
         objective = next(one for one in goals if one.name == goal.objective)
         known = {cell: told for cell, told in histories.items() if told}
         if known:
-            found.append(Attained(problem, goal, objective, known, seconds))
+            found.append(Attained(problem, goal, objective, known, flown, seconds))
     return found
+
+
+def _middle(values: Sequence[float]) -> float | None:
+    """The median, of which NaN is the worst; None if that is NaN."""
+    middle = float(np.median(np.nan_to_num(values, nan=-np.inf)))
+    return middle if np.isfinite(middle) else None
 
 
 def _reached(b: Band, share: float) -> int | None:

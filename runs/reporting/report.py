@@ -102,7 +102,7 @@ def report(
     for ground in _told(found) if progress else found:
         sections += _section(ground, store.definition, writer, figures)
     across: list[Attained | Changed] = [
-        *attained(found, store.definition.get("goal")),
+        *attained(found, store.definition.get("goal"), store.definition.get("verify")),
         *changes(found, store.definition.get("nominal"), store.definition.get("verify")),
     ]
     for part in across:
