@@ -161,7 +161,8 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
     studies = {name: Study.load(f"reentry-{name}") for name in ("nodes", "discretisations", "uncertainty")}
     for name, study in studies.items():
         assert f"reentry-{name}" in said and (study.inner, study.start, study.verify) == ("march", "smooth", 0.01)
-        assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)}
+        beside = {("MACS", 10_000)} if name == "uncertainty" else set()
+        assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)} | beside
         assert Study.load(f"reentry-{name}").quick().cells[0].evaluations <= 500
     assert [cell.transcription for cell in studies["nodes"].cells] == [f"shooting:{nodes}" for nodes in (100, 150, 200, 250)]
     loads = case1.reference()[:, 1]
@@ -175,7 +176,7 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
         assert cell.problem == f"{values} nodes"
     uncertain = studies["uncertainty"]
     assert uncertain.nominal == uncertain.cells[0].problem == "nominal"
-    data = [cell.details["problem"]["data"] for cell in uncertain.cells]
+    data = [cell.details["problem"]["data"] for cell in uncertain.cells if cell.solver == "NSGA-III"]
     assert [one.get("mass", MASS) / MASS for one in data] == pytest.approx([1.0, 1.05, 1.1, 1.0])
     assert [one.get("gravity") for one in data] == [None, None, None, "constant"]
     assert all(figure in uncertain.note for figure in ("32.05", "118.37", "32.13", "121.61"))
