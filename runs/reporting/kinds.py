@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 Figures = Mapping[str, Cell]
 """A row's figures by key."""
-OVER_ALL = "over the points of all runs; deviation and variance with divisor n - 1."
 STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
     "greatest": np.max,
     "least": np.min,
@@ -103,6 +102,13 @@ def _point(ground: Ground, paper: Mapping[str, Any]) -> str:
     )
     best = ground.reference(None)
     return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, paper['point']):.5g}."
+
+
+def _over_all(ground: Ground, paper: Mapping[str, Any]) -> str:
+    """What statistics are over, and of which solvers there are none."""
+    without = [solver for solver, fronts in ground.fronts.items() if fronts and not any(map(len, fronts))]
+    none = f" No run of {', '.join(without)} has a point that counts." if without else ""
+    return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
 
 
 def _objectives(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
@@ -232,11 +238,11 @@ KINDS: Mapping[str, Kind] = {
         needs={"point": _check_point},
         fits=_fit_point,
     ),
-    "objectives": Kind(lambda paper: None, _objectives, lambda ground, paper: OVER_ALL, statistics=True),
+    "objectives": Kind(lambda paper: None, _objectives, _over_all, statistics=True),
     "ends": Kind(
         lambda paper: {end["name"]: Column(end["name"], end.get("unit", ""), digits=4) for end in paper["ends"]},
         _ends,
-        lambda ground, paper: OVER_ALL,
+        _over_all,
         statistics=True,
         needs={"ends": _check_ends},
         fits=_fit_ends,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,14 @@ def test_volumes_and_objectives_beside_published_ones(folder, told):
     assert float(rows["the paper", "greatest"]) == 7.0
     for statistic, value in (("greatest", max(distances)), ("mean", np.mean(distances)), ("variance", np.var(distances, ddof=1))):
         assert float(rows["one, dfet:2x2", statistic]) == pytest.approx(value, rel=1e-12)
+
+
+def test_solvers_without_a_point_are_named_where_they_have_no_statistics(folder):
+    (ground,) = grounds(Store.open(folder), {})
+    fronts = {"one": ground.fronts["one"], "lost": [ground.known[:0]] * 2, "worse": [ground.known[:0]], "crashed": []}
+    paper = {"of": "objectives", "rows": [{**ROW, "statistic": "mean", "distance": 7.0}]}
+    text = published_tables([replace(ground, fronts=fronts, failures={})], [paper])["published"].text()
+    assert "divisor n - 1. No run of lost, worse has a point that counts." in text
 
 
 def staircase(points: np.ndarray) -> float:
