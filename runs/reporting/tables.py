@@ -15,6 +15,8 @@ from macs.plotting import label
 from macs.storage import write_whole
 from macs.tables import text_table
 
+COUNTED = 1e9
+"""Whole numbers below are written in full."""
 Cell = str | float | int | None
 """What stands in a table: words, a number, or None where there is nothing to say."""
 
@@ -143,13 +145,15 @@ class Table:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Significant digits, as a person would write them; NaN is a dash."""
+    """Significant digits, as a person would write them: large whole numbers, mostly counts, in full; NaN is a dash."""
     if np.isnan(value):
         return "-"
     if np.isinf(value):
         return "inf" if value > 0 else "-inf"
     if value == 0.0:
         return "0"
+    if 1e5 <= abs(value) < COUNTED and value == np.rint(value):
+        return f"{value:.0f}"
     rounded = float(f"{value:.{digits - 1}e}")
     if not 1e-3 <= abs(rounded) < 1e5:
         return f"{value:.{digits - 1}e}"
