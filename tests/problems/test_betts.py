@@ -6,7 +6,7 @@ import pytest
 
 from macs import optimize
 from problems import betts, betts_heating, load
-from transcription import DFET
+from transcription import DFET, MultipleShooting
 
 
 def test_the_optimum_is_near_on_a_coarse_mesh():
@@ -17,9 +17,10 @@ def test_the_optimum_is_near_on_a_coarse_mesh():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("method", [DFET(60, 4), MultipleShooting(400, control="linear")], ids=["collocated", "shot"])
 @pytest.mark.parametrize(("name", "room"), [("betts", betts), ("betts_heating", betts_heating)])
-def test_the_optimum_is_the_published_one(name, room):
-    point = optimize(load(name), DFET(60, 4))
+def test_the_optimum_is_the_published_one(name, room, method):
+    point = optimize(load(name), method)
     assert point.status == "converged" and point.optimality is not None and point.optimality < 1e-6
     assert point.objectives["cross-range"] == pytest.approx(room.CROSS_RANGE, abs=5e-4)
     assert point.trajectory["entry"].tf == pytest.approx(room.FINAL_TIME, abs=0.5)
