@@ -33,13 +33,14 @@ exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
 BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times would tell of the machine.
 
-inner   how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
-search  MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
-study   a study with two processes against one, and how much longer it takes than its runs do
+inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+population  120 re-entries flown and scored in one call, as a population search sends them, against one after the other
+search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+study       a study with two processes against one, and how much longer it takes than its runs do
 
 A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
 machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
-compiled; where there is a C compiler, the whole inner benchmark shows both."""
+compiled; where there is a C compiler, the whole inner benchmark and that of populations show both."""
 
 
 STUDY = """\
@@ -207,7 +208,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|search|study", nargs="?", help="which one (default: all)")
+    bench.add_argument("what", metavar="inner|population|search|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )

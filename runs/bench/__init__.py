@@ -1,5 +1,5 @@
-"""Ratios against the alternatives, measured side by side in one run: inner levels in `inner`, on the batches of `cases`; searches in
-`search`, batches of them in `study`."""
+"""Ratios against the alternatives, measured side by side in one run: inner levels in `inner`, on the batches of `cases`; populations flown
+in one call in `population`; searches in `search`, batches of them in `study`."""
 
 from .command import KINDS, bench
 

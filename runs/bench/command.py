@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from macs.monitor import Stopped
 
-from . import inner, search, study
+from . import inner, population, search, study
 from .measured import Row, save
 
-KINDS = ("inner", "search", "study")
+KINDS = ("inner", "population", "search", "study")
+REPORTS: Mapping[str, Callable[[Sequence[Row]], str]] = {
+    "inner": inner.report,
+    "population": population.report,
+    "search": search.report,
+    "study": study.report,
+}
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
@@ -22,7 +28,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
         ended = _run(kind, rows, quick)
         measured += [(kind, row) for row in rows]
         if rows:
-            print({"inner": inner.report, "search": search.report, "study": study.report}[kind](rows), end="\n\n", flush=True)
+            print(REPORTS[kind](rows), end="\n\n", flush=True)
         if ended:
             print("interrupted: this is what there was to say by then", file=sys.stderr)
             break
@@ -36,6 +42,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
+        "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
         "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),
     }

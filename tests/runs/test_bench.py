@@ -16,7 +16,7 @@ import pytest
 
 from macs.monitor import Stopped
 from problems import goddard, load
-from runs.bench import command, inner, search, study
+from runs.bench import command, inner, population, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -43,6 +43,7 @@ def coarse(name):
 def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
+    monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
@@ -80,6 +81,18 @@ def test_batches_are_what_the_search_sends():
             assert 0.0 < nlp.distance(nlp.first_guess(candidates), warm).mean() < 0.1 * len(nlp.free) ** 0.5
 
 
+def test_populations_in_one_call_and_one_by_one(monkeypatch):
+    monkeypatch.setenv("MACS_COMPILE", "0")
+    rows: list[Row] = []
+    population.bench_population(rows, population.Effort(rounds=2, calls=1, candidates=4, method="shooting:130"))
+    assert [row.who for row in rows] == [population.SINGLY, population.TOGETHER]
+    assert [row.case for row in rows] == ["reentry_case1, shooting:130, 4 candidates"] * 2
+    assert rows[0].values["speed"] == [1.0, 1.0]
+    one, many = (np.array(row.values["candidates"]) for row in rows)
+    np.testing.assert_allclose(many / one, rows[1].values["speed"])
+    assert f"at best {max(many):.0f}, {'met' if max(many) >= 2500 else 'MISSED'}" in population.report(rows)
+
+
 def test_searches_for_the_same_time_and_points(small):
     case = search.Search("goddard", goddard.reference, 10_000, 100, "at least 0.999")
     rows: list[Row] = []
@@ -98,12 +111,19 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    assert said.out.index("INNER LEVELS") < said.out.index("SEARCHES") < said.out.index("STUDIES") < said.out.index(f"values in {path}")
+    assert (
+        said.out.index("INNER LEVELS")
+        < said.out.index("POPULATIONS")
+        < said.out.index("SEARCHES")
+        < said.out.index("STUDIES")
+        < said.out.index(f"values in {path}")
+    )
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
+    assert "in one call, without a compiler: asked at least 2500 candidates a second, at best " in said.out
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "search", "study"}
+    assert {row["benchmark"] for row in table} == {"inner", "population", "search", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -138,7 +158,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, search"]),
+        (["bench", "studies"], ["studies", "study", "inner, population, search"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

@@ -1,0 +1,100 @@
+"""Populations: all candidates of a generation flown in one call, against one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems import load
+from transcription import Smooth, Transcription, parse
+from transcription.batched import compiler
+from transcription.inner import March
+
+from ..steps import Steps
+from .inner import compiling
+from .measured import Column, Row, short, table
+
+CASE, METHOD = "reentry_case1", "shooting:200"
+SINGLY, TOGETHER, COMPILED = "one by one", "in one call", "in one call, compiled"
+ASKED = 2_500
+"""Candidates a second in one call, without a compiler, on the machine that this was written on when it is idle."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured: rounds, calls in each of which the quickest counts, candidates of a call, and on what."""
+
+    rounds: int = 5
+    calls: int = 5
+    candidates: int = 120
+    method: str = METHOD
+
+
+QUICK = Effort(rounds=2, calls=2)
+
+
+def bench_population(rows: list[Row], effort: Effort) -> None:
+    """Measure; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    problem, method = load(CASE), parse(effort.method)
+    X = Smooth().draw(problem, method, effort.candidates, np.random.default_rng(0))
+    case = f"{CASE}, {effort.method}, {effort.candidates} candidates"
+    plain = _flier(method, "0")
+    contenders: dict[str, Callable[[], None]] = {SINGLY: lambda: [plain(x[None]) for x in X][-1], TOGETHER: lambda: plain(X)}
+    if compiler():
+        quick = _flier(method, "always")
+        contenders[COMPILED] = lambda: quick(X)
+    found = {who: Row(case, who) for who in contenders}
+    with Steps("populations", effort.rounds + 1) as steps:
+        steps.begin("to begin with")
+        for work in contenders.values():
+            work()  # functions are made
+        for i in range(effort.rounds):
+            steps.begin(f"round {i + 1}")
+            seconds = {who: min(_timed(work) for _ in range(1 if who == SINGLY else effort.calls)) for who, work in contenders.items()}
+            for who, taken in seconds.items():
+                found[who].add(speed=seconds[SINGLY] / taken, candidates=effort.candidates / taken)
+            if i == 0:
+                rows += found.values()
+
+
+def _flier(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
+    """What flies candidates (k, d), with functions that are compiled or not, see `compiling`."""
+    with compiling(when):
+        nlp = method.transcribe(load(CASE))
+
+    def fly(candidates: np.ndarray) -> None:
+        with compiling(when):
+            March().solve(nlp, candidates)
+
+    return fly
+
+
+def _timed(work: Callable[[], None]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def report(rows: Sequence[Row]) -> str:
+    """What was measured, and what was asked."""
+    speed = next(row for row in rows if row.who == TOGETHER).of("candidates", np.max)
+    verdict = "met" if speed >= ASKED else "MISSED"
+    lines = [
+        "POPULATIONS: what a population search sends, flown and scored in one call, against one candidate after the other, in turn;",
+        "median, least and greatest of few rounds. Candidates a second tell of the machine and of what else it does.",
+        "",
+        table(rows, COLUMNS),
+        "",
+        f"in one call, without a compiler: asked at least {ASKED} candidates a second, at best {speed:.0f}, {verdict}",
+    ]
+    return "\n".join(lines)
+
+
+COLUMNS: tuple[Column, ...] = (
+    ("times as", "fast", lambda row: "1" if row.who == SINGLY else row.spread("speed")),
+    ("candidates", "a second", lambda row: short(row.of("candidates"))),
+    ("", "rounds", lambda row: str(len(row.values["speed"]))),
+)
