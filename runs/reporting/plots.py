@@ -23,7 +23,8 @@ from .paper import COLUMN, PAGE, legend, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARKERS = "o^sDvPX"
+MARKERS = "o^sDvPX*"
+"""One more than there are colours, so that of nine solvers no two look alike."""
 
 
 def front_figure(

@@ -55,6 +55,12 @@ def test_all_points_of_all_runs_and_the_truth(tmp_path):
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
 
 
+def test_no_two_of_many_solvers_look_alike():
+    figure = front_figure({f"solver {k}": [foreign(A, GOALS)] for k in range(20)})
+    looks = {(line.get_color(), line.get_marker()) for line in figure.axes[0].get_lines()}
+    assert len(looks) == 20
+
+
 def test_arrays_without_a_shape_of_their_own_are_empty_runs():
     figure = front_figure({"ours": [foreign(A, GOALS), np.empty((0, 0))]})
     assert words(figure) == ["ours, 2 runs (1 empty)"]
