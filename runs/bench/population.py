@@ -25,7 +25,7 @@ ASKED = 2_500
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds, calls in each of which the quickest counts, candidates of a call, and on what."""
+    """How much is measured: rounds, how often each contender works in one, of which the quickest counts, candidates, and on what."""
 
     rounds: int = 5
     calls: int = 5
@@ -53,7 +53,7 @@ def bench_population(rows: list[Row], effort: Effort) -> None:
             work()  # functions are made
         for i in range(effort.rounds):
             steps.begin(f"round {i + 1}")
-            seconds = {who: min(_timed(work) for _ in range(1 if who == SINGLY else effort.calls)) for who, work in contenders.items()}
+            seconds = {who: min(_timed(work) for _ in range(effort.calls)) for who, work in contenders.items()}
             for who, taken in seconds.items():
                 found[who].add(speed=seconds[SINGLY] / taken, candidates=effort.candidates / taken)
             if i == 0:
