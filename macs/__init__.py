@@ -1,13 +1,13 @@
 """Floor 3: the search over several objectives, and the fronts that it finds."""
 
 from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
-from .evaluation import Evaluation, Evaluator
+from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
-from .gradient import optimize, payoff, sweep
-from .macs import MACS
-from .monitor import Progress
+from .gradient_tools import optimize, payoff, sweep
+from .io.interrupts import Progress
 from .point import Point
-from .solver import Solver
+from .search.macs import MACS
+from .solvers.solver import Solver
 
 __all__ = [
     "MACS",

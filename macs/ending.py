@@ -10,13 +10,13 @@ from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from transcription.base import Transcription
 from transcription.catalogue import parse
-from transcription.dfet import DFET
+from transcription.dfet.method import DFET
 
-from .dominance import dominates
 from .front import Front
+from .pareto.dominance import dominates
 
 if TYPE_CHECKING:
-    from .macs import MACS
+    from .search.macs import MACS
 
 
 def check(settings: MACS) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
 
-from .decisions import Decisions
+from .fronts.decision_table import Decisions
+from .fronts.provenance import Source
 from .point import Point
 from .rows import by_first, column, frozen, number, shared
-from .source import Source
 from .stats import STATS, versions
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from problems import Problem
     from transcription.base import Transcription
-    from transcription.trajectory import Trajectory
+    from transcription.trajectories.trajectory import Trajectory
 
 
 class Front:
@@ -258,7 +258,7 @@ class Front:
         ValueError
             For a black box, a problem that cannot be found, another transcription than DFET, and arguments that make no sense.
         """
-        from .refining import refine_mesh
+        from .gradients.mesh_refinement import refine_mesh
 
         return refine_mesh(self, tolerance, limit, time_limit, progress)
 
@@ -307,7 +307,7 @@ class Front:
         ValueError
             For a black box, a problem that cannot be found, peaks that gradient tools refuse, and arguments that make no sense.
         """
-        from .polished import polished
+        from .gradients.front_polish import polished
 
         return polished(self, transcription, solves, limit, verify, time_limit, progress)
 
@@ -344,7 +344,7 @@ class Front:
         ValueError
             For a black box, a problem that cannot be found, and one of which the points cannot be.
         """
-        from .flown import flown
+        from .fronts.simulated import flown
 
         return flown(self, problem, tolerance, rtol, atol, method)
 
@@ -358,25 +358,25 @@ class Front:
         columns : mapping, optional
             More columns: header -> n values.
         """
-        from .tables import front_table
+        from .fronts.tables import front_table
 
         return front_table(self, defects, columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the objectives: two as a scatter, three with the third as colour, more as parallel coordinates. Returns the Axes."""
-        from .plotting import draw_front
+        from .fronts.front_plot import draw_front
 
         return draw_front(self, ax)
 
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group."""
-        from .dataset import phase_dataset, root_dataset
+        from .fronts.dataset import phase_dataset, root_dataset
 
         return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write objectives, violation, status and decisions, one row a point, under a header that names units."""
-        from .storage import save_csv
+        from .fronts.files import save_csv
 
         save_csv(self, path)
 
@@ -388,7 +388,7 @@ class Front:
         OSError
             If the folder is missing or cannot be written to, or the disk is full; a file that was there before is still there.
         """
-        from .storage import save
+        from .fronts.files import save
 
         save(self, path)
 
@@ -409,7 +409,7 @@ class Front:
         ValueError
             If it is not a front, is damaged, of another version of the format, or of another problem.
         """
-        from .storage import load
+        from .fronts.files import load
 
         return load(path, problem)
 
@@ -424,6 +424,6 @@ class Front:
         ValueError
             If there is none, or they differ in problem or objectives, or black boxes in variables.
         """
-        from .merging import merge
+        from .fronts.merging import merge
 
         return merge(fronts)

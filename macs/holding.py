@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from transcription.base import NLP
-from transcription.simulate import simulate_all
+from transcription.trajectories.simulate import simulate_all
 
-from .bilevel import Bilevel
-from .dominance import nondominated
-from .evaluation import CONVERGED
+from .evaluation.bilevel import Bilevel
+from .evaluation.evaluator import CONVERGED
+from .pareto.dominance import nondominated
 
 if TYPE_CHECKING:
     from .front import Front

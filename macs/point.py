@@ -8,11 +8,11 @@ import numpy as np
 
 if TYPE_CHECKING:
     from problems.compiled import Variable
-    from transcription.simulate import Simulation
-    from transcription.trajectory import Trajectory
+    from transcription.trajectories.simulate import Simulation
+    from transcription.trajectories.trajectory import Trajectory
 
     from .front import Front
-    from .source import Source
+    from .fronts.provenance import Source
 
 
 class Point:
@@ -125,13 +125,13 @@ class Point:
         problem = self._front.compiled()
         if self.trajectory is None:
             raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
-        from transcription.simulate import simulate
+        from transcription.trajectories.simulate import simulate
 
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Draw states, controls and path constraints over time; returns the array of Axes, one for each of them."""
-        from .drawing import draw_point
+        from .fronts.flight_plot import draw_point
 
         return draw_point(self, figure)
 

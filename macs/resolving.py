@@ -9,9 +9,9 @@ import numpy as np
 
 from transcription.base import NLP
 from transcription.inner import Ipopt
-from transcription.scalarized import Solved, scalarize
+from transcription.nlp.scalarized import Solved, scalarize
 
-from .evaluation import CONVERGED
+from .evaluation.evaluator import CONVERGED
 
 DRIFT = 1e-3
 """A point that gets worse by more than this, in ranges of the front, may have lost its way: other starts are tried too."""

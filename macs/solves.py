@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .archive import Archive
-from .evaluation import FAILED, Evaluation, Evaluator
+from .evaluation.evaluator import FAILED, Evaluation, Evaluator
+from .pareto.archive import Archive
 
 
 @dataclass

@@ -7,12 +7,12 @@ from math import comb
 
 import numpy as np
 
-from .directions import simplex_lattice
+from .pareto.directions import simplex_lattice
 
 METHODS = ("pascoletti-serafini", "epsilon")
 
 Task = tuple[np.ndarray, np.ndarray]
-"""Reference and weights, as `transcription.scalarized.scalarize` takes them."""
+"""Reference and weights, as `transcription.nlp.scalarized.scalarize` takes them."""
 
 
 def check_points(points: int, m: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .betts import betts
+from .cases.betts import betts
 from .problem import Problem
 
 HEATING_RATE = 70.0

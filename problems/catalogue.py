@@ -14,14 +14,14 @@ from typing import Any
 from .problem import Problem
 
 CASES: dict[str, tuple[str, str]] = {
-    "goddard": ("problems.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
-    "orbit_rise": ("problems.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
-    "orbit_rise_full": ("problems.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
-    "landing_site": ("problems.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
-    "reentry_case1": ("problems.reentry.case1:problem", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
-    "reentry_case2": ("problems.reentry.case2:problem", "the same within narrow limits"),
-    "reentry_case3": ("problems.reentry.case3:problem", "the same around three no-fly zones"),
-    "betts": ("problems.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
+    "goddard": ("problems.cases.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
+    "orbit_rise": ("problems.cases.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
+    "orbit_rise_full": ("problems.cases.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
+    "landing_site": ("problems.cases.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
+    "reentry_case1": ("problems.cases.reentry.case1:problem", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
+    "reentry_case2": ("problems.cases.reentry.case2:problem", "the same within narrow limits"),
+    "reentry_case3": ("problems.cases.reentry.case3:problem", "the same around three no-fly zones"),
+    "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.betts_heating:problem", "the same with a limit to the heating rate"),
 }
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from macs.tables import duration, text_table
+from macs.fronts.tables import duration, text_table
 
-from .making.watching import reason
+from .batch.watching import reason
 
 if TYPE_CHECKING:
-    from .store import Summary
+    from .batch.store import Summary
 
 LINE = 200
 """Longest reason, in characters."""

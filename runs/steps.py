@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any, TextIO
 
-from macs.monitor import Monitor, Stopped
-from macs.progress import EVERY, minutes
+from macs.io.console import EVERY, minutes
+from macs.io.interrupts import Monitor, Stopped
 
 
 class Steps(AbstractContextManager["Steps"]):

@@ -8,22 +8,23 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.inputs import check_count, check_positive
+from macs.solvers.start import check_count, check_positive
 from transcription import Smooth
 
-from . import combining, studyfile
+from .batch import cells as combining
+from .batch import file as studyfile
+from .batch.store import Store, Summary
 from .cell import Cell
 from .measures.given import check_reference
-from .reporting.changed import check as check_nominal
-from .reporting.goal import Goal
-from .reporting.published import check as check_paper
-from .reporting.published import check_against
-from .store import Store, Summary
+from .report.changed_data import check as check_nominal
+from .report.goal import Goal
+from .report.published import check as check_paper
+from .report.published import check_against
 from .terms import INNER, check_inner, sampling, written
 
 if TYPE_CHECKING:
-    from .reporting.report import Report
-from .making.work import Payload
+    from .report.report import Report
+from .execution.task import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
 
@@ -188,7 +189,7 @@ class Study:
         KeyboardInterrupt
             Ctrl-C; the same again goes on.
         """
-        from .making.executing import execute
+        from .batch.running import execute
 
         return execute(self, out, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
@@ -208,7 +209,7 @@ class Study:
     ) -> Report:
         """Tables and figures of the runs that `out` has; see `reporting.report.report`. Raises ValueError if it holds another study,
         or none."""
-        from .reporting.report import report
+        from .report.report import report
 
         Store.open(out).check(self.definition())
         return report(out, foreign=foreign, figures=figures, progress=progress)

@@ -6,13 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from macs.inputs import drawing, unknown
+from macs.solvers.start import drawing, unknown
 from problems import Problem
 from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED
 
-from .studyfile import told
+from .batch.file import told
 
 TERMS = ("transcription", "evaluations", "inner", "start")
 """What a solver may work with instead of what the others do."""

@@ -9,8 +9,8 @@ import numpy as np
 from macs.front import Front
 from problems import Problem
 from problems.compiled import CompiledProblem, Objective, Variable
-from transcription.polynomials import nodes
-from transcription.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from transcription.numerics.polynomials import nodes
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
 def state_problem(name: str = "two legs", speed: float = 3.0) -> Problem:

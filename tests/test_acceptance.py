@@ -7,7 +7,8 @@ import pytest
 from fronts import distance_to_curve, inverted_distance
 
 from macs import MACS, Front
-from problems import goddard, load, orbit_rise
+from problems import load
+from problems.cases import goddard, orbit_rise
 from transcription import DFET
 
 pytestmark = pytest.mark.slow

@@ -2,12 +2,12 @@
 
 from .base import NLP, Transcription
 from .catalogue import from_dict, parse, word
-from .dfet import DFET
+from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
-from .shooting import MultipleShooting, SingleShooting
-from .simulate import Simulation
+from .shooting.method import MultipleShooting, SingleShooting
 from .smooth import Smooth
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from .trajectories.simulate import Simulation
+from .trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 __all__ = [
     "DFET",

@@ -15,12 +15,12 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import NLP, Profile, Transcription, expanded
-from .batched import Batched
-from .guess import along
-from .layout import Layout
-from .phase_writer import Ends, PhaseWriter, Rows
-from .reduced import Reduced
-from .trajectory import Trajectory
+from .numerics.batched import Batched
+from .phases.guess import along
+from .phases.layout import Layout
+from .phases.reduced import Reduced
+from .phases.writer import Ends, PhaseWriter, Rows
+from .trajectories.trajectory import Trajectory
 
 PEAK_SAMPLES = 1024
 

@@ -14,11 +14,11 @@ import numpy as np
 from problems.compiled import CompiledProblem, Variable
 from problems.problem import Problem
 
-from .batched import Batched
-from .trajectory import Trajectory
+from .numerics.batched import Batched
+from .trajectories.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .reduced import Reduced
+    from .phases.reduced import Reduced
 
 
 class Transcription(ABC):

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import Transcription
-from .control_law import DEGREES
-from .dfet import DFET
-from .runge_kutta import TABLEAUX
-from .shooting import MultipleShooting, SingleShooting
+from .dfet.method import DFET
+from .shooting.control_law import DEGREES
+from .shooting.method import MultipleShooting, SingleShooting
+from .shooting.runge_kutta import TABLEAUX
 
 METHODS: dict[str, type[Transcription]] = {"DFET": DFET, "SingleShooting": SingleShooting, "MultipleShooting": MultipleShooting}
 EXAMPLES = (

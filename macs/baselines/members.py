@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..archive import Archive
-from ..dominance import nondominated
-from ..evaluation import Evaluator
-from ..search import box_of
+from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Archive
+from ..pareto.dominance import nondominated
+from ..search.loop import box_of
 from . import degrees
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..directions import tchebycheff
-from ..evaluation import Evaluator
-from ..social import pair_up
-from . import handling as handlings
-from .baseline import Baseline
+from ..evaluation.evaluator import Evaluator
+from ..pareto.directions import tchebycheff
+from ..search.social import pair_up
+from . import constraints as handlings
 from .members import Members
 from .population import State
+from .pymoo_adapter import Baseline
 from .reference import check_directions, population_size, reference_directions
 
 

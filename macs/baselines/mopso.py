@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..dominance import nondominated
-from ..evaluation import Evaluator
-from ..search import box_of
-from . import handling as handlings
+from ..evaluation.evaluator import Evaluator
+from ..pareto.dominance import nondominated
+from ..search.loop import box_of
+from . import constraints as handlings
 from .grid import hypercubes, roulette, thin_out
 from .members import Members, evaluate, full_vectors
 from .particles import flown, improved, inertia, velocities

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation import Evaluator
-from . import handling as handlings
-from .baseline import Baseline, rows_of
+from ..evaluation.evaluator import Evaluator
+from . import constraints as handlings
 from .members import Members
 from .population import State
+from .pymoo_adapter import Baseline, rows_of
 
 
 @dataclass

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation import Evaluator
-from .baseline import Baseline
+from ..evaluation.evaluator import Evaluator
 from .members import Members
 from .population import State
+from .pymoo_adapter import Baseline
 
 UNRANKED = -1
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..box import Box
-from ..dominance import dominates
+from ..evaluation.box import Box
+from ..pareto.dominance import dominates
 
 
 def inertia(share: float, first: float, last: float) -> float:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..archive import Archive, least_violated
-from ..dominance import nondominated
-from ..evaluation import Evaluator
-from ..inputs import check_count
-from ..search import box_of
-from ..solver import Solver
-from . import handling as handlings
+from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Archive, least_violated
+from ..pareto.dominance import nondominated
+from ..search.loop import box_of
+from ..solvers.solver import Solver
+from ..solvers.start import check_count
+from . import constraints as handlings
 from .degrees import DEGREES
 from .members import Members, shown
 

@@ -7,8 +7,8 @@ from math import comb
 
 import numpy as np
 
-from ..archive import spread
-from ..directions import simplex_lattice
+from ..pareto.archive import spread
+from ..pareto.directions import simplex_lattice
 
 DEFAULT = 100
 """Without any wish: the finest lattice that has no more directions. 100 for two objectives and 91 for three, as is customary."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from macs.monitor import Stopped
+from macs.io.interrupts import Stopped
 
 from . import inner, population, search, study
 from .measured import Row, save

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.tables import text_table
+from macs.fronts.tables import text_table
 from transcription import NLP
-from transcription.batched import compiler
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, March, Newton
 from transcription.inner.base import CONVERGED
+from transcription.numerics.batched import compiler
 
 from ..steps import Steps
 from .cases import BATCH, INNER, Batch, Case

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.tables import text_table
+from macs.fronts.tables import text_table
 
-from ..reporting.tables import short
+from ..report.tables import short
 
 __all__ = ["Column", "Row", "save", "short", "table"]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from problems import load
 from transcription import Smooth, Transcription, parse
-from transcription.batched import compiler
 from transcription.inner import March
+from transcription.numerics.batched import compiler
 
 from ..steps import Steps
 from .inner import compiling

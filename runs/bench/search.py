@@ -9,9 +9,10 @@ import numpy as np
 
 import transcription
 from macs import MACS, Front, sweep
-from macs.archive import spread
-from macs.monitor import Stopped
-from problems import Problem, goddard, landing_site, load, orbit_rise
+from macs.io.interrupts import Stopped
+from macs.pareto.archive import spread
+from problems import Problem, load
+from problems.cases import goddard, landing_site, orbit_rise
 from transcription import Transcription
 from transcription.stopping import stopped_by
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.front import Front
-from macs.inputs import unknown
+from macs.solvers.start import unknown
 from problems.compiled import Objective
 
 from .references import called, closed_form, foreign, read

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 import moocore
 import numpy as np
 
-from macs.dominance import nondominated
-from macs.evaluation import CONVERGED
+from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.pareto.dominance import nondominated
 
 JOINED = 0.02
 """Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from macs.dominance import nondominated
-from macs.evaluation import CONVERGED
+from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.plotting import label
+from macs.fronts.front_plot import label
+from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
 from problems.compiled import Objective
 

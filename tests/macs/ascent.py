@@ -5,7 +5,7 @@ Its dynamics are a quadrature of the angles, and a candidate is projected on the
 
 import numpy as np
 
-from macs.evaluation import Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 
 THRUST, GRAVITY, ALTITUDE = 4e-3, 1.6e-3, 10.0
 SCALE = np.array([12.0, 20.0])

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from macs.directions import simplex_lattice
-from macs.dominance import nondominated
+from macs.pareto.directions import simplex_lattice
+from macs.pareto.dominance import nondominated
 
 Plain = tuple[Callable[[np.ndarray], np.ndarray], list[tuple[float, float]], np.ndarray]
 """A function, its bounds, and some 1000 (3 objectives: 5000) points of its front, evenly spread."""

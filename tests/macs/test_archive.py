@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.archive import Archive, insert, pair_energies, spread
-from macs.dominance import dominates, extremes
+from macs.pareto.archive import Archive, insert, pair_energies, spread
+from macs.pareto.dominance import dominates, extremes
 
 
 def empty(m):

@@ -4,10 +4,10 @@ import copy
 
 import numpy as np
 
-from macs.attempts import Attempts
-from macs.evaluation import Counts, Evaluation, Evaluator
-from macs.macs import MACS
-from macs.search import box_of
+from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
+from macs.search.loop import box_of
+from macs.search.macs import MACS
+from macs.search.trials import Attempts
 
 
 class Sticky(Evaluator):

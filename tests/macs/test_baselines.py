@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from ascent import Ascent
 from fronts import distance_to_curve
+from macs.evaluation.evaluator.blackbox import BlackBox
 from plain import dtlz
 
 from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from macs.baselines.reference import reference_directions
-from macs.blackbox import BlackBox
-from macs.dominance import nondominated
-from macs.evaluation import Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
+from macs.pareto.dominance import nondominated
 from problems import load
-from problems.goddard import reference
+from problems.cases.goddard import reference
 from transcription import DFET
 
 SMALL = [

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
+from macs.evaluation.evaluator.blackbox import BlackBox, read_bounds
 from pymoo.core.problem import ElementwiseProblem
 from pymoo.problems import get_problem
-
-from macs.blackbox import BlackBox, read_bounds
 
 
 def two(X):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from macs.evaluation.evaluator.blackbox import BlackBox
+from macs.evaluation.evaluator.box import Box
 
-from macs import breeding
-from macs.blackbox import BlackBox
-from macs.box import Box
-from macs.macs import MACS
+from macs.search import breeding
+from macs.search.macs import MACS
 
 SEEDS = st.integers(0, 2**32 - 1)
 

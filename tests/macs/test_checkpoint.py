@@ -21,12 +21,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, bilevel, checkpoint, monitor, polish
-from macs.solver import Solver
+from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front
+from macs.evaluation import bilevel
+from macs.gradients import polish
+from macs.io import interrupts as monitor
+from macs.solvers import checkpoint
+from macs.solvers.solver import Solver
 from problems import load
 from transcription import DFET
 from transcription.inner import Ipopt
-from transcription.scalarized import Solved
+from transcription.nlp.scalarized import Solved
 
 MESH = DFET(3, 2)
 BOX = [(0.0, 1.0)] * 5

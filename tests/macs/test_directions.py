@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.directions import draw, normalised, pool, simplex_lattice, tchebycheff
+from macs.pareto.directions import draw, normalised, pool, simplex_lattice, tchebycheff
 
 
 @given(st.integers(1, 6), st.integers(1, 300))

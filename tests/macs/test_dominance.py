@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.dominance import constrained_dominates, dominates, extremes, nondominated
+from macs.pareto.dominance import constrained_dominates, dominates, extremes, nondominated
 
 FRONTS = st.integers(1, 4).flatmap(
     lambda m: arrays(float, st.tuples(st.integers(1, 15), st.just(m)), elements=st.integers(0, 4).map(float))

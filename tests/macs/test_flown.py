@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from macs import NSGA2, Front
-from macs.flown import best
+from macs.fronts.simulated import best
 from problems import Problem
 from transcription import DFET, SingleShooting
 

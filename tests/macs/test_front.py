@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
-from macs.dominance import nondominated
 from macs.front import Front
+from macs.fronts.provenance import Source
+from macs.fronts.tables import duration, numbers
+from macs.pareto.dominance import nondominated
 from macs.point import Point
-from macs.source import Source
-from macs.tables import duration, numbers
 from problems.compiled import Variable
 
 

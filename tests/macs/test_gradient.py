@@ -14,8 +14,8 @@ from smooth_problems import compass, corners, shuttle, slide, still, two_wells, 
 from macs import Front, optimize, payoff, sweep
 from macs.targets import targets
 from problems import Problem, load
-from problems.goddard import reference as goddard_reference
-from problems.orbit_rise import reference as orbit_reference
+from problems.cases.goddard import reference as goddard_reference
+from problems.cases.orbit_rise import reference as orbit_reference
 from transcription import DFET
 
 MESH = DFET(4, 2)

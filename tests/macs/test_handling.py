@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.baselines.handling import by_objectives, excess, feasible_first, objective, penalty, told
-from macs.dominance import constrained_dominates, dominates
+from macs.baselines.constraints import by_objectives, excess, feasible_first, objective, penalty, told
+from macs.pareto.dominance import constrained_dominates, dominates
 
 VALUES = st.floats(-1e9, 1e9).map(lambda value: round(value, 3))
 VIOLATIONS = st.sampled_from([0.0, 1e-9, 1e-6, 2e-6, 0.5, 0.5000001, 3.0, 1e9, np.inf])

@@ -12,10 +12,11 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from macs.evaluation.evaluator.bilevel import Bilevel
 
-from macs import MACS, Front, monitor
-from macs.bilevel import Bilevel
+from macs import MACS, Front
 from macs.holding import believable, hold
+from macs.io import interrupts as monitor
 from problems import Problem
 from transcription import DFET, SingleShooting
 from transcription.inner import March

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from macs.evaluation.evaluator.box import Box
 
-from macs.box import Box
-from macs.individual import coordinate_step, differential, distinct_others, inertia
-from macs.social import current_to_rand, nearest, pair_up
+from macs.search.individual import coordinate_step, differential, distinct_others, inertia
+from macs.search.social import current_to_rand, nearest, pair_up
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from macs.evaluation.evaluator.blackbox import BlackBox
+from macs.evaluation.evaluator.box import Box
 from moocore import igd
 from plain import zdt
 
 from macs import MOPSO, MOPSOCD
 from macs.baselines.grid import hypercubes, roulette, thin_out
 from macs.baselines.particles import flown, improved, inertia, velocities
-from macs.blackbox import BlackBox
-from macs.box import Box
-from macs.catalogue import solver
-from macs.dominance import nondominated
-from macs.evaluation import Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
+from macs.pareto.dominance import nondominated
+from macs.solvers.catalogue import solver
 
 PLAIN = Box(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
 ROUND = Box(np.zeros(2), np.ones(2), np.array([True, False]))

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from macs.packing import BIT_GENERATORS, pack, unpack
+from macs.solvers.packing import BIT_GENERATORS, pack, unpack
 
 
 @dataclass
@@ -102,7 +102,7 @@ def assert_same(one: Any, two: Any) -> None:
 
 
 def through_file(value: Any, kind: Any) -> Any:
-    from macs.checkpoint import _from_bytes, _to_bytes
+    from macs.solvers.checkpoint import _from_bytes, _to_bytes
 
     arrays: list[np.ndarray] = []
     header = {"format": "MACS checkpoint", "version": 1, "state": pack(value, kind, arrays)}

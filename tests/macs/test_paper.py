@@ -4,12 +4,12 @@ import copy
 
 import numpy as np
 import pytest
+from macs.evaluation.evaluator.blackbox import BlackBox
 
-from macs.archive import Archive
-from macs.attempts import Attempts
-from macs.blackbox import BlackBox
-from macs.macs import MACS
-from macs.search import assign, box_of, individual_actions, social_actions
+from macs.pareto.archive import Archive
+from macs.search.loop import assign, box_of, individual_actions, social_actions
+from macs.search.macs import MACS
+from macs.search.trials import Attempts
 
 
 def schaffer(X):

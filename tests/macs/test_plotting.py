@@ -11,8 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights
 
-from macs.drawing import _dense
-from macs.plotting import blank_figure
+from macs.fronts.flight_plot import _dense
+from macs.fronts.front_plot import blank_figure
 
 
 @pytest.fixture(autouse=True)

@@ -3,8 +3,8 @@ from __future__ import annotations
 import io
 import time
 
-from macs.monitor import Progress
-from macs.progress import Display, clock, count, minutes
+from macs.io.console import Display, clock, count, minutes
+from macs.io.interrupts import Progress
 
 
 def standing(evaluations: int = 1200, elapsed: float = 12.0, archive: int = 4, **failures: int) -> Progress:

@@ -12,15 +12,15 @@ from fronts import distance_to_curve
 from synthetic_fronts import black_box, flights
 
 from macs import MACS, Front
-from macs.refining import Refinement
+from macs.fronts.builders import trajectory_columns
+from macs.fronts.verification import verify
+from macs.gradients.mesh_refinement import Refinement
 from macs.resolving import Resolver
-from macs.results import trajectory_columns
-from macs.verification import verify
 from problems import Problem, load
-from problems.goddard import reference
+from problems.cases.goddard import reference
 from transcription import DFET
 from transcription.inner import Ipopt
-from transcription.scalarized import scalarize
+from transcription.nlp.scalarized import scalarize
 
 
 def front_of(problem, nlp, Z) -> Front:

@@ -7,19 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 from fronts import distance_to_curve, inverted_distance
+from macs.evaluation.evaluator.bilevel import Bilevel
 
 from macs import MACS
-from macs.archive import Archive
-from macs.bilevel import Bilevel
-from macs.evaluation import CONVERGED, Counts, Evaluation, Evaluator
-from macs.polish import polish
-from macs.refinement import allowed
-from macs.search import SearchState, begin, conclude
+from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
+from macs.gradients.polish import polish
+from macs.pareto.archive import Archive
+from macs.search.gradient_action import allowed
+from macs.search.loop import SearchState, begin, conclude
 from macs.solves import Solves
-from problems import Problem, goddard, load, orbit_rise
+from problems import Problem, load
+from problems.cases import goddard, orbit_rise
 from transcription import DFET
 from transcription.inner import Auto, Newton
-from transcription.optimality import optimality
+from transcription.nlp.optimality import optimality
 from transcription.stopping import stopped_by, stopping
 
 

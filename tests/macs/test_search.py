@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from ascent import Ascent
 from fronts import distance_to_curve, inverted_distance, mean_distance
+from macs.evaluation.evaluator.blackbox import BlackBox
 from plain import dtlz, uf, zdt
 
-from macs.blackbox import BlackBox
-from macs.dominance import dominates
-from macs.macs import MACS
-from problems.goddard import reference
+from macs.pareto.dominance import dominates
+from macs.search.macs import MACS
+from problems.cases.goddard import reference
 
 
 def run(settings, box, budget, seed=1, start=None):

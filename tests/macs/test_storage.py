@@ -15,10 +15,11 @@ from hypothesis.extra.numpy import arrays
 from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
 import problems
-from macs import MACS, storage
-from macs.dataset import ARRAYS, VERSION, _arrays
+from macs import MACS
 from macs.front import Front
-from macs.source import Source
+from macs.fronts import files as storage
+from macs.fronts.dataset import ARRAYS, VERSION, _arrays
+from macs.fronts.provenance import Source
 from problems.compiled import Variable
 from transcription import DFET
 

@@ -9,7 +9,7 @@ from synthetic_fronts import black_box, flights
 
 import problems
 from macs import MACS, Front
-from macs.verification import verify
+from macs.fronts.verification import verify
 from transcription import DFET, parse
 
 

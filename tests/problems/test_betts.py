@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from macs import optimize
-from problems import betts, betts_heating, load
+from problems import betts_heating, load
+from problems.cases import betts
 from transcription import DFET, MultipleShooting
 
 

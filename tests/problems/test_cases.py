@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from problems import goddard, load
+from problems import load
+from problems.cases import goddard
 
 
 def test_the_shortest_ascent_is_bang_bang():

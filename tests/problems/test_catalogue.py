@@ -75,16 +75,16 @@ def test_the_cases_of_the_paper_are_there():
 def test_unknown_names_are_told_what_there_is():
     refused(lambda: load("godard"), "godard", "goddard")
     refused(lambda: load(""), "goddard")
-    refused(lambda: load("problems.goddard"), "problems.goddard")
+    refused(lambda: load("problems.cases.goddard"), "problems.cases.goddard")
     refused(lambda: load("no.such.module:f"), "no.such.module")
     refused(lambda: load(".relative:f"), ".relative")
-    refused(lambda: load("problems.goddard:nothing"), "problems.goddard", "nothing")
-    refused(lambda: load("problems.goddard:"), "problems.goddard")
+    refused(lambda: load("problems.cases.goddard:nothing"), "problems.cases.goddard", "nothing")
+    refused(lambda: load("problems.cases.goddard:"), "problems.cases.goddard")
     refused(lambda: load("missing.py:problem"), "missing.py")
 
 
 def test_a_case_from_a_module():
-    assert load("problems.goddard:problem").name == "goddard"
+    assert load("problems.cases.goddard:problem").name == "goddard"
 
 
 def test_a_case_from_a_file(case, monkeypatch):

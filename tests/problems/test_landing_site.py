@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from macs import optimize
-from macs.dominance import nondominated
-from problems import landing_site, load
+from macs.pareto.dominance import nondominated
+from problems import load
+from problems.cases import landing_site
 from runs import gd
 from transcription import DFET
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from problems import orbit_rise
+from problems.cases import orbit_rise
 
 A = orbit_rise.ACCELERATION
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from statements import refused
 
 from problems import load
-from problems.reentry import case1, case2, case3, statement, vehicle
+from problems.cases.reentry import case1, case2, case3, statement, vehicle
 from transcription import DFET, Trajectory
 
 STATES = ["altitude", "longitude", "latitude", "speed", "flight-path angle", "heading", "angle of attack", "bank angle"]

@@ -12,9 +12,9 @@ import pytest
 from moocore import hypervolume, is_nondominated
 from test_reentry import STATES, by_hand
 
-from problems.reentry import case1, case2, case3, statement
+from problems.cases.reentry import case1, case2, case3, statement
 from transcription import DFET
-from transcription.scalarized import scalarize
+from transcription.nlp.scalarized import scalarize
 
 LIMITS = {"case1": (200, 280, 2.5), "case2": (150, 250, 1.25), "case3": (200, 280, 2.5)}
 ROOMS = {"case1": case1, "case2": case2, "case3": case3}
@@ -25,7 +25,7 @@ SIGNS = [-1.0, 1.0, 1.0, 1.0]
 
 
 def table(case: str) -> np.ndarray:
-    with files("problems.reentry").joinpath(f"{case}.csv").open() as file:
+    with files("problems.cases.reentry").joinpath(f"{case}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 

@@ -6,7 +6,7 @@ import moocore
 import numpy as np
 import pytest
 
-from macs.dominance import nondominated
+from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 from runs import hypervolume
 from runs.measures.attainment import attainment, staircase

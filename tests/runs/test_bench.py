@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from macs.monitor import Stopped
-from problems import goddard, load
+from macs.io.interrupts import Stopped
+from problems import load
+from problems.cases import goddard
 from runs.bench import command, inner, population, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short

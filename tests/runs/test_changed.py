@@ -12,10 +12,10 @@ from misbehaving import Plain, glide
 from macs import NSGA2, Front
 from problems import Problem
 from runs import Study
-from runs.reporting.changed import FLOWN, MANY, Changed, changed_figure, changes
-from runs.reporting.ground import grounds
-from runs.reporting.report import report
-from runs.store import Store
+from runs.batch.store import Store
+from runs.report.changed_data import FLOWN, MANY, Changed, changed_figure, changes
+from runs.report.comparison import grounds
+from runs.report.report import report
 
 CART = '''
 from problems import Problem

@@ -144,7 +144,7 @@ def test_a_search_on_shooting_is_polished_on_dfet(capsys):
 
 
 def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
-    from runs.commands import make_solver
+    from runs.cli.parser.commands import make_solver
 
     assert make_solver("macs") == macs.MACS()
     assert make_solver("MACS", plain=True, mesh="adaptive") == macs.MACS(refine=False, mesh="adaptive")
@@ -205,7 +205,7 @@ def test_a_wrong_call_is_answered_in_one_line(capsys, call, words):
 
 def test_a_folder_that_cannot_be_written_to_is_found_first(capsys, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)
-    monkeypatch.setattr("macs.solver.Solver.solve", lambda *_, **__: pytest.fail("the work started"))
+    monkeypatch.setattr("macs.solvers.solver.Solver.solve", lambda *_, **__: pytest.fail("the work started"))
     assert "not writable" in wrong(capsys, "solve", "goddard")
 
 

@@ -12,12 +12,12 @@ from misbehaving import Plain, glide
 from macs import Front
 from problems.compiled import Objective
 from runs import Study
+from runs.batch.store import Run
 from runs.cell import Cell
 from runs.cli import main
-from runs.reporting.goal import Attained, Goal, attained
-from runs.reporting.ground import Ground
-from runs.reporting.report import report
-from runs.store import Run
+from runs.report.comparison import Ground
+from runs.report.goal import Attained, Goal, attained
+from runs.report.report import report
 
 GOALS = (Objective("cost", unit="kg"), Objective("range", unit="km", sense="maximize"))
 COST = {"objective": "cost", "best": 2.0, "worst": 10.0}

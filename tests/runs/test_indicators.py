@@ -8,7 +8,8 @@ import pytest
 
 import runs
 from macs import MACS, Front
-from problems import goddard, load, orbit_rise
+from problems import load
+from problems.cases import goddard, orbit_rise
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
 from runs.measures.indicators import distance_to_curve, inverted_distance

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from macs import Front
-from problems import goddard
+from problems.cases import goddard
 from problems.compiled import Objective
 from runs import gd, hypervolume
 from runs.measures.references import closed_form, foreign, read, union
@@ -92,7 +92,7 @@ def test_tables_that_are_none(tmp_path, text, words):
 def test_closed_forms():
     assert closed_form("goddard").tolist() == goddard.reference().tolist()
     assert closed_form("orbit_rise_full").shape == (241, 2)
-    assert closed_form("problems.goddard:problem").shape == (2001, 2)
+    assert closed_form("problems.cases.goddard:problem").shape == (2001, 2)
     with pytest.raises(ValueError, match="there is no problem 'godard'"):
         closed_form("godard")
     assert closed_form("betts_heating").tolist() == [[30.6255]]

@@ -13,14 +13,14 @@ from misbehaving import Crashing, Plain, glide
 from macs import Front
 from problems import load
 from runs import Study, gd, igd
+from runs.batch.store import Store
 from runs.cli import main
-from runs.making.work import Outcome
+from runs.execution.task import Outcome
 from runs.measures.given import look_up
-from runs.reporting.ground import grounds
-from runs.reporting.published import check, published_tables
-from runs.reporting.report import _plain, _Writer, report
-from runs.reporting.tables import table
-from runs.store import Store
+from runs.report.comparison import grounds
+from runs.report.published import check, published_tables
+from runs.report.report import _plain, _Writer, report
+from runs.report.tables import table
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
 WORDS = {"source": "a paper", "note": "thirty runs", "differs": "everything"}

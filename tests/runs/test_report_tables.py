@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from runs.measures.statistics import pairwise, summarise
-from runs.reporting.statistics_tables import comparison_table, overall_table, summary_table
-from runs.reporting.tables import Column, escaped, latex_number, short, table
+from runs.report.statistics_tables import comparison_table, overall_table, summary_table
+from runs.report.tables import Column, escaped, latex_number, short, table
 
 EXAMPLE = table(
     [Column("case", grouped=True), "solver", Column("GD", "1", digits=2), "runs"],

@@ -18,8 +18,8 @@ import pytest
 from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow, glide
 
 from runs import Study
-from runs.making.work import perform
-from runs.store import Store
+from runs.batch.store import Store
+from runs.execution.task import perform
 from transcription import DFET
 
 HERE = Path(__file__).parent
@@ -220,7 +220,7 @@ def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
 
 
 def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkeypatch):
-    import runs.store as store
+    import runs.batch.store as store
 
     real = store.write_whole
     written = []

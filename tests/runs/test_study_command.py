@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from problems.reentry import case1
-from problems.reentry.vehicle import MASS
-from runs import Study, studyfile
+from problems.cases.reentry import case1
+from problems.cases.reentry.vehicle import MASS
+from runs import Study
+from runs.batch import file as studyfile
+from runs.batch.store import Store
+from runs.batch.watching import Watch
 from runs.cli import main
-from runs.making.watching import Watch
-from runs.making.work import Outcome
-from runs.store import Store
+from runs.execution.task import Outcome
 from transcription import SingleShooting, parse
 
 GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")

@@ -13,11 +13,11 @@ import pytest
 
 pytest.importorskip("distributed")
 
+from runs.execution.cluster import cluster
 from test_study import Inline, numbers, slow, stamps, wait_for
 
+from runs.batch.running import Deserted
 from runs.cli import main
-from runs.making.cluster import cluster
-from runs.making.executing import Deserted
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from test_study import Inline
 from macs import NSGA2
 from problems import Problem
 from runs import Study
-from runs.reporting.ground import EACH, grounds
-from runs.store import Store
+from runs.batch.store import Store
+from runs.report.comparison import EACH, grounds
 from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}

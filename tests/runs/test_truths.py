@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from macs.evaluation import CONVERGED, INFEASIBLE
-from runs import truths
+from macs.evaluation.evaluator import CONVERGED, INFEASIBLE
 from runs.steps import Steps
-from runs.truths import Truth, Unsolved
-from transcription.scalarized import Solved
+from runs.truths import reentry as truths
+from runs.truths.reentry import Truth, Unsolved
+from transcription.nlp.scalarized import Solved
 
 NAMES = ("cross-range", "heat load", "oscillation", "peak heating rate")
 

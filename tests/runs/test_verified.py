@@ -14,9 +14,9 @@ from test_study import Inline
 from macs import MACS, NSGA2, Front
 from problems import Problem
 from runs import Study
-from runs.reporting.ground import grounds
-from runs.reporting.published import check, published_tables
-from runs.store import Store
+from runs.batch.store import Store
+from runs.report.comparison import grounds
+from runs.report.published import check, published_tables
 
 ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
 ROW = {"problem": "braking", "by": "the paper"}
@@ -126,7 +126,7 @@ def test_a_flight_that_fails_costs_no_run(tmp_path, monkeypatch, caplog):
     def fails(front, tolerance):
         raise RuntimeError("no air")
 
-    monkeypatch.setattr("runs.making.work.record", fails)
+    monkeypatch.setattr("runs.execution.task.record", fails)
     assert study().run(tmp_path / "out", executor=Inline()).finished == 4
     assert "could not be flown" in caplog.text
 

@@ -81,7 +81,7 @@ def test_bases_agree_where_both_are_exact():
     z = flown(first, k=1)[0]
     phase = first.unpack(z)["swing"]
     points = np.array([-0.9, -0.2, 0.4, 1.0])
-    from transcription import polynomials
+    from transcription.numerics import polynomials
 
     solve = np.linalg.inv(polynomials.basis_matrix("bernstein", order, points))
     other = second.first_guess(candidates(second, 1))

@@ -12,7 +12,7 @@ from test_dfet import rates_of
 
 from problems import Problem, load
 from transcription import DFET, from_dict
-from transcription.phase_mesh import PhaseMesh
+from transcription.phases.mesh import PhaseMesh
 
 UNEVEN = (0.0, 0.1, 0.35, 0.9, 1.0)
 

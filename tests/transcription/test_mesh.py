@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from problems import Problem
 from transcription import DFET
-from transcription.adaptation import judge, next_method
-from transcription.errors import decay_rates, phase_errors
 from transcription.mesh import HIGHEST, cuts, degrees, refine, split
-from transcription.polynomials import gauss_legendre, legendre_coefficients
-from transcription.simulate import simulate
+from transcription.meshes.adaptation import judge, next_method
+from transcription.meshes.errors import decay_rates, phase_errors
+from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
+from transcription.trajectories.simulate import simulate
 
 EDGES = np.array([0.0, 0.2, 0.5, 1.0])
 NONE = np.full(3, np.nan)

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from problems import Problem, load
-from transcription import DFET, batched
+from transcription import DFET
 from transcription.inner import Auto, Ipopt, March, Newton
 from transcription.inner.least_distance import least_distance
+from transcription.numerics import batched
 
 
 def candidates(nlp, count, seed=0):

@@ -10,8 +10,8 @@ from smooth_problems import corners, nlp_of, shuttle, slide, still, two_wells, v
 from problems import Problem, load
 from transcription import DFET, NLP
 from transcription.inner import inner_solver
-from transcription.optimality import optimality
-from transcription.scalarized import scalarize
+from transcription.nlp.optimality import optimality
+from transcription.nlp.scalarized import scalarize
 
 SPAN = 4.0
 """Of the parameters of `two_wells`."""

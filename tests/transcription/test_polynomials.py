@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.interpolate import BarycentricInterpolator, BPoly
 
-from transcription import polynomials as pl
+from transcription.numerics import polynomials as pl
 
 LEAST = {"lobatto": 0, "legendre": 0, "closed-legendre": 2, "bernstein": 0}
 bases = st.sampled_from(sorted(LEAST)).flatmap(lambda b: st.tuples(st.just(b), st.integers(LEAST[b], 12)))

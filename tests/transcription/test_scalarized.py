@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells, vector, with_peak
 
 from problems import load
-from problems.goddard import reference
+from problems.cases.goddard import reference
 from transcription import DFET, NLP
 from transcription.inner import inner_solver
-from transcription.scalarized import Solved, scalarize
+from transcription.nlp.scalarized import Solved, scalarize
 
 INF = np.inf
 RANGES = np.array([141.0, 0.9])

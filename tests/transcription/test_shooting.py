@@ -10,16 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from transcription.shooting.method.runge_kutta import TABLEAUX
 
 from macs import MACS, Front, optimize
-from problems import Problem, goddard, load
+from problems import Problem, load
+from problems.cases import goddard
 from transcription import DFET, MultipleShooting, SingleShooting, from_dict, parse
 from transcription import word as said
 from transcription.base import largest
 from transcription.inner import inner_solver
-from transcription.runge_kutta import TABLEAUX
-from transcription.simulate import simulate
 from transcription.step_mesh import StepMesh
+from transcription.trajectories.simulate import simulate
 
 KINDS = ("constant", "linear", "spline")
 
@@ -298,7 +299,7 @@ def test_single_and_multiple_shooting_have_the_same_optimum():
 
 
 def test_a_long_chain_is_not_written_out_for_derivatives(monkeypatch):
-    from transcription import shooting_phase
+    from transcription.shooting import phase as shooting_phase
 
     plain = optimize(load("goddard"), SingleShooting(11), objective="flight time")
     monkeypatch.setattr(shooting_phase, "LONG", 0)

@@ -10,8 +10,8 @@ from cases import candidates, decay, flown, integrator, oscillator, solved
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
 from transcription.inner import inner_solver
-from transcription.sampling import excursions
-from transcription.simulate import simulate, simulate_all
+from transcription.trajectories.limits import excursions
+from transcription.trajectories.simulate import simulate, simulate_all
 
 
 def fly(nlp, z, **options):

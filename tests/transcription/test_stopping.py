@@ -10,7 +10,7 @@ from macs import sweep
 from problems import load
 from transcription import DFET
 from transcription.inner import Auto, Ipopt
-from transcription.scalarized import scalarize
+from transcription.nlp.scalarized import scalarize
 from transcription.stopping import stopped_by, stopping
 
 

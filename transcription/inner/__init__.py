@@ -1,9 +1,9 @@
 """The inner level: candidate -> nearest feasible point, status, distance moved."""
 
-from .auto import Auto
 from .base import InnerResult, InnerSolver
 from .catalogue import NAMED, inner_solver
 from .ipopt import Ipopt
+from .levels import Auto
 from .march import March
 from .newton import Newton
 

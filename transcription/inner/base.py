@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import NLP, largest
-from ..programs import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+from ..nlp.scaling import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
 

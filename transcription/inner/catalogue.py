@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .auto import Auto
 from .base import InnerSolver
 from .ipopt import Ipopt
+from .levels import Auto
 from .march import March
 
 NAMED: dict[str, InnerSolver] = {

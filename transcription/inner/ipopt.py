@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ..base import NLP, expanded
-from ..programs import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from ..nlp.scaling import SAID, back_in_bounds, origin, quiet, scaled_bounds
 from ..stopping import stopping
 from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import NLP
-from ..reduced import Flown, Reduced
+from ..phases.reduced import Flown, Reduced
 from .anderson import Anderson
 from .base import INFEASIBLE, InnerResult, InnerSolver, result, started
 from .least_distance import least_distance

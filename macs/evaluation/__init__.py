@@ -1,0 +1,1 @@
+"""What can be searched: the contract, optimal control problems and black boxes."""

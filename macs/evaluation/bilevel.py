@@ -1,0 +1,92 @@
+"""A problem as something to search: each candidate is made feasible by the inner level before its objectives are looked at."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from problems.peaks import refuse_peaks
+from transcription.base import NLP
+from transcription.inner import InnerSolver
+from transcription.nlp.scalarized import scalarize
+from transcription.smooth import Smooth
+
+from .evaluator import Counts, Evaluation, Evaluator
+
+PATIENCE = 100
+"""Iterations after which a gradient solve is given up: most take some tens, and for the time of one that wanders others find more."""
+
+
+class Bilevel(Evaluator):
+    """The two-level problem of Ricciardi, Vasile and Maddock (IEEE CEC 2016), eq. (13).
+
+    The full vector is that of the NLP; free are parameters, times, free initial states and controls; the other entries, the states, are
+    where the inner solve starts from: those of the point from which a candidate was made.
+
+    Parameters
+    ----------
+    nlp : NLP
+    inner : InnerSolver
+    tolerance : float
+        Largest scaled residual of a feasible point.
+    start : Smooth, optional
+        How candidates look that a search begins with. Default: each variable by itself.
+    """
+
+    def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float, start: Smooth | None = None) -> None:
+        self.nlp, self.inner, self.tolerance, self.start = nlp, inner, tolerance, start
+        self.free = nlp.free
+        self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
+        self.m_known = len(nlp.problem.goals)
+        self.counts = Counts()
+        try:
+            refuse_peaks(nlp.problem)
+            self.has_gradients = True
+        except ValueError:  # a peak that is maximised, say: the search goes on without derivatives
+            self.has_gradients = False
+
+    def opening(self, candidates: np.ndarray) -> np.ndarray:
+        """See `Evaluator.opening`."""
+        return candidates if self.start is None else self.start.shaped(self.nlp, candidates)
+
+    def first_guess(self, candidates: np.ndarray) -> np.ndarray:
+        """See `NLP.first_guess`."""
+        return self.nlp.first_guess(candidates)
+
+    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
+
+        def itemise() -> np.ndarray:
+            return self.nlp.by_constraint(self.nlp.residuals(found.z)[1] if found.residuals is None else found.residuals)
+
+        evaluation = Evaluation(
+            found.z, found.F, found.violation, found.status, clocked=found.clocked, fallbacks=found.fallbacks, itemise=itemise
+        )
+        return evaluation, int(np.sum(found.iterations))
+
+    def _refine(
+        self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
+    ) -> tuple[Evaluation, int]:
+        found = []
+        inside = [None] * len(starts) if margins is None else margins
+        for start, reference, weight, margin in zip(starts, references, weights, inside, strict=True):
+            solved = scalarize(
+                self.nlp,
+                start,
+                reference=reference,
+                weights=weight,
+                margin=margin,
+                tolerance=self.tolerance,
+                max_iterations=PATIENCE,
+                persistent=False,
+            )
+            if not solved.begun:
+                break
+            found.append(solved)
+        evaluation = Evaluation(
+            Z=np.array([solved.z for solved in found]).reshape(-1, starts.shape[1]),
+            F=np.array([solved.F for solved in found]).reshape(-1, references.shape[1]),
+            violation=np.array([solved.violation for solved in found]),
+            status=np.array([solved.status for solved in found], dtype="<U10"),
+            clocked=any(solved.clocked for solved in found),
+        )
+        return evaluation, sum(solved.iterations for solved in found)

@@ -1,0 +1,1 @@
+"""Fronts as data, and functions of them: tables, files, pictures, verification."""

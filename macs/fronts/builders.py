@@ -1,0 +1,114 @@
+"""From what a search ends with to a Front in the user's words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective, Variable
+from transcription.base import NLP
+from transcription.nlp.optimality import optimality
+from transcription.stopping import stopping
+from transcription.trajectories.limits import excursions
+
+from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
+from ..front import Front
+from ..pareto.archive import Archive
+from ..point import Point
+from .tables import counted
+
+
+def trajectory_front(
+    nlp: NLP,
+    archive: Archive,
+    closest: Archive,
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+    *,
+    certified: bool,
+) -> Front:
+    """A front of the trajectories in an archive, `certified` with their optimality; objectives count in the front's ranges there."""
+    if len(archive):
+        found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
+        return vectors_front(nlp, archive.Z, solver, stats, optimality=found)
+    nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
+    return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+
+
+def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
+    """The optimality of vectors (k, n), objectives counting in `ranges` (m,); None of those for which the work is to end early."""
+    return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
+
+
+def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Front:
+    """A front of vectors (k, n) of an NLP; `more` is for `Front`.
+
+    Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
+    """
+    # An empty front, too, says what its vectors are of.
+    given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
+    return Front(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
+
+
+def nearest_misses(nearest: Point) -> str:
+    """What keeps the least infeasible point from being feasible."""
+    label, amount = max(nearest.violations.items(), key=lambda item: item[1])
+    return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
+
+
+def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
+    """What a Front holds of vectors (k, n) of one NLP: k entries each."""
+    k = len(Z)
+    F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    flights = [nlp.unpack(z) for z in Z]
+    return {
+        "F": F,
+        "decision": Z,
+        "violation": violation,
+        "status": _status(violation, tolerance),
+        "variables": [nlp.variables] * k,
+        "violations": [nlp.violations(z) for z in Z],
+        "trajectories": flights,
+        "excursions": [excursions(nlp.problem, flight) for flight in flights],
+        "transcription": [nlp.transcription.to_dict()] * k,
+    }
+
+
+def black_box_front(
+    archive: Archive,
+    closest: Archive,
+    goals: Sequence[Objective],
+    variables: Sequence[Variable],
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+) -> Front:
+    """A front of plain decisions."""
+
+    def of(points: Archive, **more: Any) -> Front:
+        return Front(
+            F=points.F,
+            decision=points.Z,
+            violation=points.violation,
+            status=_status(points.violation, stats["tolerance"]),
+            goals=goals,
+            variables=variables,
+            solver=solver,
+            stats=stats,
+            **more,
+        )
+
+    if len(archive) or not len(closest):
+        return of(archive, message="" if len(archive) else _nothing(stats))
+    nearest, violation = of(closest)[0], closest.violation[0]
+    why = f"the nearest violates the constraints by {violation:.2g}" if np.isfinite(violation) else "every one of them failed"
+    return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
+
+
+def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
+    return np.where(violation <= tolerance, CONVERGED, np.where(np.isfinite(violation), INFEASIBLE, FAILED))
+
+
+def _nothing(stats: Mapping[str, Any]) -> str:
+    return f"nothing feasible in {counted(stats['evaluations'], 'evaluation')}"

@@ -1,0 +1,176 @@
+"""Drawing one point: the states, controls and path constraints of its flight over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import Limit, Variable
+
+from .front_plot import COLORS, GREY, STYLE, label, new_figure
+
+if TYPE_CHECKING:
+    from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
+
+    from ..point import Point
+
+DENSE = np.linspace(-1.0, 1.0, 41)
+"""Where a polynomial is drawn, on each element."""
+
+
+def draw_point(point: Point, figure: Any = None) -> np.ndarray:
+    """Draw a flight: a panel for each state, then control, then path constraint, all phases on one axis of time.
+
+    Lines are the method's own polynomials, element by element, so that jumps show; dots are its nodes; dashes are bounds, where they are
+    near enough to be drawn without flattening what is between them. Panels name them always.
+
+    Parameters
+    ----------
+    point : Point
+    figure : matplotlib Figure, optional
+        An empty one to draw into.
+
+    Returns
+    -------
+    array of Axes, one for each panel
+
+    Raises
+    ------
+    ValueError
+        For a point without a trajectory.
+    """
+    import matplotlib
+
+    flight = point.trajectory
+    if flight is None:
+        raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        panels = quantities(flight)
+        columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
+        rows = -(-len(panels) // columns)
+        if figure is None:
+            figure = new_figure(3.6 * columns + 0.4, 1.75 * rows + 0.6)
+        else:
+            figure.set_size_inches(3.6 * columns + 0.4, 1.75 * rows + 0.6)
+        grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+        for ax, (name, kind) in zip(grid, panels, strict=False):
+            _draw_panel(ax, flight, name, kind)
+        for ax in grid[len(panels) :]:
+            ax.remove()
+        _finish(figure, grid[: len(panels)], columns, flight, point)
+    return grid[: len(panels)]
+
+
+def quantities(flight: Trajectory) -> list[tuple[str, str]]:
+    """Names of all states, then controls, then path constraints, each once, and what they are."""
+    kinds = {
+        "state": [v.name for phase in flight.phases for v in phase.state_variables],
+        "control": [v.name for phase in flight.phases for v in phase.control_variables],
+        "path": [limit.name for phase in flight.phases for limit in phase.path_limits],
+    }
+    return [(name, kind) for kind, names in kinds.items() for name in dict.fromkeys(names)]
+
+
+def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a state or control along every element, with gaps (NaN) between them; of a path constraint at the nodes."""
+    for variables, on_element in ((phase.state_variables, phase.state.on_element), (phase.control_variables, phase.controls_on)):
+        for index, variable in enumerate(variables):
+            if variable.name == name:
+                return _dense(phase.state.edges, on_element, index, variable.period)
+    return phase.time, phase[name]
+
+
+def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
+    drawn: list[np.ndarray] = []
+    limits: list[tuple[PhaseTrajectory, Variable | Limit]] = []
+    for k, phase in enumerate(flight.phases):
+        owners: dict[str, Sequence[Variable | Limit]] = {
+            "state": phase.state_variables,
+            "control": phase.control_variables,
+            "path": phase.path_limits,
+        }
+        index = next((i for i, owner in enumerate(owners[kind]) if owner.name == name), None)
+        if index is None:
+            continue
+        color = COLORS[k % len(COLORS)]
+        values, (times, line) = phase[name], along(phase, name)
+        ax.plot(times, line, color=color, lw=0.9 if kind == "path" else 1.3)
+        drawn.append(line[np.isfinite(line)])
+        ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
+        drawn.append(values)
+        limits.append((phase, owners[kind][index]))
+    _bounds(ax, np.concatenate(drawn), limits)
+    ax.set_ylabel(label(name, getattr(limits[0][1], "unit", "")))
+    ranges = dict.fromkeys(_range(limit) for _, limit in limits)
+    ax.set_title("; ".join(ranges), loc="right", fontsize=7, color=GREY, pad=2)
+
+
+def _dense(
+    edges: np.ndarray, on_element: Callable[[int, np.ndarray], np.ndarray], index: int, period: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values along every element, with a gap (NaN) where one ends and the next begins, and where a periodic value wraps."""
+    gap = np.array([np.nan])
+    times: list[np.ndarray] = []
+    values: list[np.ndarray] = []
+    for j, (left, right) in enumerate(pairwise(edges)):
+        line = on_element(j, DENSE)[:, index]
+        if period:
+            line = np.where(np.append(np.abs(np.diff(line)) > 0.5 * period, False), np.nan, line)
+        times += [0.5 * (left + right) + 0.5 * (right - left) * DENSE, gap]
+        values += [line, gap]
+    return np.concatenate(times), np.concatenate(values)
+
+
+def _bounds(ax: Any, values: np.ndarray, limits: list[tuple[PhaseTrajectory, Variable | Limit]]) -> None:
+    """Dashes at the bounds that are within one range of the values."""
+    values = values[np.isfinite(values)]
+    low, high = (values.min(), values.max()) if len(values) else (0.0, 1.0)
+    reach = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    near = [
+        (phase, bound)
+        for phase, limit in limits
+        for bound in dict.fromkeys((limit.lower, limit.upper))
+        if np.isfinite(bound) and low - reach <= bound <= high + reach
+    ]
+    for phase, bound in near:
+        ax.plot([phase.t0, phase.tf], [bound, bound], color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
+        low, high = min(low, bound), max(high, bound)
+    margin = 0.06 * max(high - low, reach)
+    ax.set_ylim(low - margin, high + margin)
+
+
+def _range(limit: Variable | Limit) -> str:
+    """The bounds in words of mathematics: [0, 40], or the one that is finite."""
+    low, high = (f"{value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}") for value in (limit.lower, limit.upper))
+    if np.isinf(limit.lower):
+        return f"\N{LESS-THAN OR EQUAL TO} {high}"
+    if np.isinf(limit.upper):
+        return f"\N{GREATER-THAN OR EQUAL TO} {low}"
+    return f"= {low}" if limit.lower == limit.upper else f"in [{low}, {high}]"
+
+
+def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, point: Point) -> None:
+    """Times, the borders and names of the phases, and which point it is."""
+    unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flight.phases))
+    for i, ax in enumerate(axes):
+        for phase in flight.phases[1:]:
+            ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
+        ax.tick_params(labelbottom=i >= len(axes) - columns)
+    figure.supxlabel(label("time", unit), fontsize=9)
+    ax = axes[0]
+    first, last = flight.phases[0].t0, max(phase.tf for phase in flight.phases)
+    ax.set_xlim(first - 0.015 * (last - first), last + 0.015 * (last - first))
+    if len(flight) > 1:
+        from matplotlib.lines import Line2D
+
+        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(flight)]
+        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
+    goals = point._front.goals
+    values = ", ".join(
+        f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}"
+        for goal, value in zip(goals, point.objectives.values(), strict=True)
+    )
+    figure.suptitle(values, fontsize=9, x=0.01, ha="left")

@@ -1,0 +1,193 @@
+"""Drawing fronts. Works without a display: pyplot is only asked for a figure when the caller gives no Axes."""
+
+from __future__ import annotations
+
+import io
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..point import Point
+from .files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..front import Front
+
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
+"""Okabe and Ito's, with a wine red for black, which references are near to: people with any colour vision tell them apart."""
+GREY = "#666666"
+STYLE = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 6),
+}
+
+
+def new_figure(width: float, height: float) -> Any:
+    """A figure that `pyplot.show` will show where there is a display, and one that can be saved anywhere."""
+    try:
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=(width, height), layout="constrained")
+    except ImportError:
+        # The backend that the environment names needs a display, or a toolkit, that is not here.
+        from matplotlib.figure import Figure
+
+        return Figure(figsize=(width, height), layout="constrained")
+
+
+def blank_figure() -> Any:
+    """A figure of no window, for files."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(5.5, 4.0), layout="constrained")
+
+
+def save_picture(what: Front | Point, path: str | PathLike[str]) -> None:
+    """Draw a front, or the flight of a point, into a file whose suffix says its kind."""
+    import matplotlib
+
+    figure = blank_figure()
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        if isinstance(what, Point):
+            what.plot(figure)
+        else:
+            figure.set_size_inches(*_size(what))
+            what.plot(figure.add_subplot())
+    suffix = Path(path).suffix.lstrip(".").lower()
+    picture = io.BytesIO()
+    figure.savefig(picture, format=suffix, dpi=200)
+    write_whole(path, picture.getvalue())
+
+
+def _size(front: Front) -> tuple[float, float]:
+    return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
+
+
+def draw_front(front: Front, ax: Axes | None = None) -> Axes:
+    """Draw the objectives of a front.
+
+    One objective: against the point's number. Two: a scatter. Three: the third as colour (or in space, on 3-D Axes). More: parallel
+    coordinates. Points that did not converge are hollow.
+
+    Parameters
+    ----------
+    front : Front
+    ax : Axes, optional
+        Where to draw; a new figure's otherwise.
+
+    Returns
+    -------
+    Axes
+    """
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        if ax is None:
+            ax = new_figure(*_size(front)).add_subplot()
+        if len(front.goals) > 3:
+            _parallel(front, ax)
+        else:
+            _scatter(front, ax)
+        ax.set_title(_title(front), loc="left", color=GREY)
+    return ax
+
+
+def label(name: str, unit: str) -> str:
+    """`name [unit]`, for an axis."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def better(goal: Objective) -> str:
+    """An axis' label that says where it is better. On an upright axis, left is down."""
+    text = label(goal.name, goal.unit)
+    return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"
+
+
+def _title(front: Front) -> str:
+    name = front.source.name if front.source else front.solver.get("name", "")
+    if not len(front):
+        return f"{name}: no feasible point" if name else "no feasible point"
+    return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
+
+
+def _scatter(front: Front, ax: Any) -> None:
+    if not len(front):
+        ax.text(0.5, 0.9, front.message, transform=ax.transAxes, ha="center", va="center", wrap=True, color=GREY)
+        front = front if front.closest is None else front.closest.alone()
+    values, good = front.objectives, front.status == "converged"
+    if values.shape[1] == 1:
+        values = np.column_stack([np.arange(len(values)), values])
+    goals = front.goals if len(front.goals) > 1 else (Objective("point"), *front.goals)
+    third = values.shape[1] == 3 and ax.name != "3d"
+    axes = values.T[:2] if third else values.T
+    color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
+    drawn = ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color)
+    if (~good).any():
+        ax.scatter(*axes[:, ~good], s=26, facecolors="none", edgecolors=GREY, linewidths=0.9, zorder=2, label="not feasible")
+        ax.legend(frameon=False)
+    if third and good.any():
+        ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
+    for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
+        getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
+    if len(front.goals) == 2 and good.sum() > 1:
+        _mark_extremes(front, ax)
+
+
+def _mark_extremes(front: Front, ax: Any) -> None:
+    """Ring the best point of each of two objectives, and name them in a legend."""
+    F = np.where((front.status == "converged")[:, None], front.F, np.inf)
+    for k, goal in enumerate(front.goals):
+        best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
+        x, y = front.objectives[best]
+        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {goal.unit}' if goal.unit else ''} (#{best})"
+        marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
+        ax.scatter([x], [y], zorder=4, label=text, **marker)
+    ax.legend(frameon=True, framealpha=0.85, edgecolor="none", loc="best")
+
+
+def _parallel(front: Front, ax: Any) -> None:
+    """One upright axis for each objective, better at the top, a line for each point, coloured by the first objective."""
+    import matplotlib
+
+    F, values = front.F, front.objectives
+    finite = np.where(np.isfinite(F), F, np.nan)
+    if len(front) and not np.isnan(finite).all():
+        best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
+    else:
+        best = worst = np.zeros(F.shape[1])
+    height = 1.0 - (F - best) / np.where(worst > best, worst - best, 1.0)
+    shade = matplotlib.colormaps["viridis"]
+    for i, row in enumerate(height):
+        good = front.status[i] == "converged"
+        ax.plot(row, color=shade(0.85 * row[0]) if good else GREY, lw=1.0, alpha=0.85, ls="-" if good else ":")
+    signs = np.array([goal.sign for goal in front.goals])
+    for k in range(values.shape[1]):
+        ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
+        for level, value in ((1.015, best[k] * signs[k]), (-0.015, worst[k] * signs[k])):
+            ax.text(k, level, f"{value + 0.0:.4g}", ha="center", va="bottom" if level > 0.5 else "top", fontsize=8)
+    ax.grid(False)
+    ax.set_xlim(-0.3, len(front.goals) - 0.7)
+    ax.set_ylim(-0.12, 1.12)
+    ax.set_xticks(range(len(front.goals)), [f"{label(goal.name, goal.unit)}\n{goal.sense[:3]}" for goal in front.goals])
+    ax.set_yticks([0, 1], ["worst", "best"])
+    ax.tick_params(length=0)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_visible(False)

@@ -1,0 +1,107 @@
+"""What a front's points turn out to be when somebody flies them: as they are stated, or under other data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Limit, Variable
+from transcription.trajectories.limits import excess
+from transcription.trajectories.simulate import simulate_all
+
+from ..evaluation.evaluator import CONVERGED, INFEASIBLE
+from ..front import Front
+from ..pareto.dominance import nondominated
+from ..rows import frozen
+from .provenance import Source
+
+if TYPE_CHECKING:
+    from problems import Problem
+    from transcription.trajectories.trajectory import Trajectory
+
+
+def flown(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
+    """The front as flown, in the same order; see `Front.flown`."""
+    if not (tolerance >= 0):
+        raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
+    known = front.compiled()
+    if problem is None:
+        compiled = known
+    else:
+        compiled = problem if isinstance(problem, CompiledProblem) else problem.compile()
+        check_alike(known, compiled)
+    missing = [point.index for point in front if point.trajectory is None]
+    if missing:
+        raise ValueError(f"point {missing[0]} has no trajectory to fly: its status is '{front[missing[0]].status}'")
+    planned = [point.trajectory for point in front if point.trajectory is not None]
+    flights = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
+    violations = [{**flight.violations, **_decided(plan, compiled)} for flight, plan in zip(flights, planned, strict=True)]
+    signs = compiled.signs
+    F = np.array([list(flight.objectives.values()) for flight in flights]).reshape(len(front), len(signs)) * signs
+    found = judged(front, F, np.array([max(one.values(), default=0.0) for one in violations]), tolerance)
+    found._violations = violations
+    found._trajectories = [flight.trajectory for flight in flights]
+    found._problem, found.source = compiled, Source.of(compiled)
+    return found
+
+
+def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
+    """By how much, scaled, what a trajectory decides is outside the bounds of a problem, which need not be its own: times, initial states,
+    controls at the nodes, parameters."""
+    found: dict[str, float] = {}
+
+    def look(values: Any, limits: Sequence[Variable | Limit], where: str) -> None:
+        amounts = excess(np.atleast_2d(values), limits)
+        found.update({f"{where}{v.name}": float(amount) for v, amount in zip(limits, amounts, strict=True)})
+
+    for phase in problem.phases:
+        flight = planned[phase.name]
+        duration = Limit("duration", *phase.duration, phase.tf.scale)
+        look([flight.t0, flight.tf, flight.tf - flight.t0], [phase.t0, phase.tf, duration], f"bounds of {phase.name}.")
+        starts = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.initial, strict=True)]
+        look(flight.edge_states[0], starts, f"initial value of {phase.name}.")
+        free = [k for k, v in enumerate(phase.controls) if not v.period]
+        look(flight.controls[:, free], [phase.controls[k] for k in free], f"bounds of {phase.name}.")
+    look([planned.parameters[v.name] for v in problem.parameters], problem.parameters, "bounds of ")
+    return found
+
+
+def judged(front: Front, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Front:
+    """The front with other objectives (n, m), all minimised, and violations (n,); a point converged if it violates nothing by more."""
+    found = front[:]
+    found.F, found.violation = frozen(F), frozen(violation)
+    found.status = frozen(np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE))
+    found._optimality = [None] * len(front)
+    found.stats["tolerance"] = float(tolerance)
+    return found
+
+
+def best(front: Front) -> np.ndarray:
+    """Which points (k,) converged and are not dominated by others that did, by the first objective."""
+    converged = np.flatnonzero(front.status == CONVERGED)
+    kept = converged[nondominated(front.F[converged])]
+    return kept[np.argsort(front.objectives[kept, 0], kind="stable")]
+
+
+def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
+    """Raise ValueError unless what one problem decides can be flown under the other."""
+
+    def parts(problem: CompiledProblem) -> dict[str, list[str]]:
+        named = {
+            f"{kind} of phase '{phase.name}'": [v.name for v in variables]
+            for phase in problem.phases
+            for kind, variables in (("states", phase.states), ("controls", phase.controls))
+        }
+        phases, parameters = [phase.name for phase in problem.phases], [v.name for v in problem.parameters]
+        objectives = [f"{goal.sense} {goal.name} [{goal.unit}]" for goal in problem.goals]
+        return {"phases": phases, "parameters": parameters, "objectives": objectives, **named}
+
+    ours, theirs = parts(known), parts(other)
+    for what, names in ours.items():
+        if theirs.get(what) != names:
+            raise ValueError(
+                f"points of '{known.name}' cannot be flown under '{other.name}': {what} are {', '.join(theirs.get(what, [])) or 'none'} "
+                f"there and {', '.join(names) or 'none'} here"
+            )

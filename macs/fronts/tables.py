@@ -1,0 +1,180 @@
+"""Fronts as plain text, for terminals, logs and appendices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..front import Front
+    from ..point import Point
+
+LEFT = str.ljust
+RIGHT = str.rjust
+
+
+def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
+    """Columns of equal width under a rule.
+
+    Parameters
+    ----------
+    headers : lines of cells
+    rows : n rows of cells
+    left : bool for each column
+        Set flush left instead of right.
+    """
+    cells = [*headers, *rows]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(left))]
+    lines = ["  ".join((LEFT if flush else RIGHT)(cell, w) for cell, w, flush in zip(row, widths, left, strict=True)) for row in cells]
+    lines.insert(len(headers), "  ".join("-" * w for w in widths))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def numbers(values: Any) -> list[str]:
+    """A column of numbers, all with the same decimals: six significant digits, and at least four of the column's range."""
+    values = np.asarray(values, dtype=float) + 0.0
+    finite = values[np.isfinite(values)]
+    largest = np.abs(finite).max(initial=0.0)
+    if largest and not 1e-3 <= largest < 1e8:
+        return [f"{value:.5e}" for value in values]
+    digits = 5 - _decade(largest)
+    span = np.ptp(finite) if len(finite) else 0.0
+    if span > 1e-9 * largest:
+        digits = max(digits, 3 - _decade(span))
+    digits = int(np.clip(digits, 0, 11 - _decade(largest)))
+    return [f"{value:.{digits}f}" for value in values]
+
+
+def front_table(front: Front, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+    """A headline, a row for each point and a footer: what `Front.table` returns."""
+    more = {**({} if defects is None else {"defect": defects}), **(columns or {})}
+    for header, values in more.items():
+        if len(values) != len(front):
+            raise ValueError(f"column '{header}' has {len(values)} entries, the front has {len(front)} points")
+    if not len(front):
+        return "\n".join([headline(front), "", *_nothing(front)])
+    titles, units, cells, left = ["#"], [""], [[str(i) for i in range(len(front))]], [False]
+
+    def add(title: str, unit: str, column: list[str], flush: bool = False) -> None:
+        titles.append(title)
+        units.append(unit)
+        cells.append(column)
+        left.append(flush)
+
+    for goal, values in zip(front.goals, front.objectives.T, strict=True):
+        add(goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", numbers(values))
+    add("violation", "", [f"{value:.1e}" for value in front.violation])
+    for header, values in more.items():
+        add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
+    certified = [point.optimality for point in front]
+    if any(value is not None for value in certified):
+        add("optimality", "", ["-" if value is None else f"{value:.1e}" for value in certified])
+    add("status", "", front.status.tolist(), True)
+    if len({id(one) for one in front.transcriptions}) > 1:
+        add("elements", "", [_elements(point) for point in front])
+    if front.source is not None:
+        add("between nodes", "leaves bounds", [_excursion(point.excursions) for point in front], True)
+    table = text_table([titles, units], list(zip(*cells, strict=True)), left)
+    return "\n".join([headline(front), "", table, "", *_footer(front)]).rstrip()
+
+
+def headline(front: Front) -> str:
+    """Problem, points, transcription, and what they cost, on one line."""
+    seed, count = front.stats["seed"], len(front)
+    parts = [
+        counted(count, "point") if count else "no feasible point",
+        _transcribed(front),
+        front.solver.get("name", ""),
+        counted(front.stats["evaluations"], "evaluation"),
+        counted(front.stats["gradient_solves"], "gradient solve") if front.stats["gradient_solves"] else "",
+        "" if seed is None else f"seed {seed}" if not isinstance(seed, list) else f"{len(seed)} seeds",
+        duration(front.stats["wall_time"]),
+    ]
+    return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
+
+
+def _transcribed(front: Front) -> str:
+    """How the problem was written for the points, or for the nearest where there is none."""
+    given = front if len(front) or front.closest is None else front.closest.alone()
+    distinct = list({id(one): one for one in given.transcriptions if one is not None}.values())
+    if not distinct:
+        return ""
+    if len(distinct) == 1 and not distinct[0]["settings"].get("mesh"):
+        return call(distinct[0]["method"], distinct[0]["settings"])
+    methods = ", ".join(dict.fromkeys(one["method"] for one in distinct))
+    return f"{methods} on {'one refined mesh' if len(distinct) == 1 else f'{len(distinct)} meshes'}"
+
+
+def _elements(point: Point) -> str:
+    """Elements of each phase."""
+    flight = point.trajectory
+    return "?" if flight is None else "+".join(str(len(phase.state.edges) - 1) for phase in flight.values())
+
+
+def counted(number: int, what: str) -> str:
+    """1 evaluation, 10 000 evaluations."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}".replace(",", " ")
+
+
+def call(name: str, settings: Mapping[str, Any]) -> str:
+    """A method and its settings, as one would type them: `DFET(elements=4, order=6)`."""
+    return f"{name}({', '.join(f'{key}={value!r}' for key, value in settings.items() if value is not None)})"
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 0.25 s, 3.6 s, 4 min 05 s, 2 h 03 min."""
+    if seconds < 60:
+        return f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _decade(value: float) -> int:
+    return int(np.floor(np.log10(value))) if value else 0
+
+
+def _excursion(found: Mapping[str, float] | None) -> str:
+    if found is None:
+        return "?"
+    if not found:
+        return "-"
+    name = max(found, key=lambda key: found[key])
+    rest = f", {len(found) - 1} more" if len(found) > 1 else ""
+    return f"{name} by {found[name]:.2g}{rest}"
+
+
+def _footer(front: Front) -> list[str]:
+    lines = []
+    leaving = [
+        (max(found.values()), max(found, key=lambda key: found[key]), i) for i, point in enumerate(front) if (found := point.excursions)
+    ]
+    if leaving:
+        amount, name, index = max(leaving)
+        who = (
+            f"{len(leaving)} of {counted(len(front), 'point')} {'leaves its' if len(leaving) == 1 else 'leave their'} bounds between nodes"
+        )
+        lines.append(f"{who}: {name} of point {index} by {amount:.2g} of its scale at most.")
+    elif front.source is not None and all(point.excursions is not None for point in front):
+        lines.append("No point leaves its bounds between nodes.")
+    bad = int((front.status != "converged").sum())
+    if bad:
+        lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
+    if front.stats["fallbacks"]:
+        lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went from the fast inner level to IPOPT.")
+    if not front.stats["reproducible"]:
+        why = front.stats.get("stopped", "budget")
+        ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"
+        lines.append(f"{ended}: the same seed need not give this front again.")
+    lines += [f"Point {point.index}: {point.note}" for point in front if point.note]
+    if front.message:
+        lines.append(front.message)
+    return lines
+
+
+def _nothing(front: Front) -> list[str]:
+    lines = [front.message or "There is no point."]
+    if front.closest is not None:
+        lines += ["", "The least infeasible point:", "", front_table(front.closest.alone()).split("\n", 2)[2]]
+    return lines

@@ -1,0 +1,218 @@
+"""Is a front what it says? Three questions to every point, none of which trusts the search that found it.
+
+1. Are the trajectories that are stored those of the decision vectors that are stored?
+2. Does the transcription, evaluated anew, give the objectives that are stored, and a feasible point?
+3. Flown by an independent integrator, do the controls lead where the transcription says, to a feasible flight and to its objectives?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from transcription import from_dict
+from transcription.base import NLP, Transcription
+from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.trajectory import PhaseTrajectory
+
+from ..evaluation.evaluator import CONVERGED
+from ..front import Front
+from ..point import Point
+
+EQUAL = 1e-9
+"""Numbers that another run of the same arithmetic on another machine may give, in scales."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What one point answered.
+
+    Attributes
+    ----------
+    point : int
+    mismatch : float
+        Largest scaled difference between stored and recomputed trajectories.
+    violation : float
+        Of the transcription, evaluated anew at the stored decision.
+    objectives : float
+        Largest difference between stored and recomputed objectives, relative to the larger of 1 and the objective.
+    defect : float
+        Largest defect of the independent integration.
+    flown : float
+        Largest violation of the flown trajectory.
+    missed : float
+        Largest difference between the objectives that are stored and those that are flown, integrals and peaks included, in
+        `objective_scales`.
+    reasons : tuple of str
+        Why the point fails; empty if it does not.
+    """
+
+    point: int
+    mismatch: float
+    violation: float
+    objectives: float
+    defect: float
+    flown: float
+    missed: float
+    reasons: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Nothing is wrong with the point."""
+        return not self.reasons
+
+
+def verify(
+    front: Front,
+    *,
+    tolerance: float,
+    rtol: float = 1e-10,
+    atol: float = 1e-11,
+    method: str = "DOP853",
+    transcription: Transcription | None = None,
+) -> list[Check]:
+    """Check every point of a front.
+
+    Parameters
+    ----------
+    front : Front
+        Of a problem that is known or can be loaded.
+    tolerance : float
+        Largest defect, violation and miss of a flown trajectory that pass. The transcription's own violation is held against the front's
+        tolerance.
+    rtol, atol, method
+        Of the integrator; see `Point.simulate`.
+    transcription : Transcription, optional
+        That of the front, if it is none of this project's.
+
+    Returns
+    -------
+    list of Check
+        One for each point.
+
+    Raises
+    ------
+    ValueError
+        If the front is of a black box, or its problem or transcription cannot be made again.
+    """
+    problem = front.compiled()
+    nlps: dict[Transcription, NLP] = {}
+
+    def nlp_of(point: Point) -> NLP:
+        if point.transcription is None:
+            raise ValueError("the front does not say how its problem was transcribed")
+        method = transcription or from_dict(point.transcription)
+        if method not in nlps:
+            nlps[method] = method.transcribe(problem)
+        nlp = nlps[method]
+        if tuple(v.name for v in nlp.variables) != tuple(v.name for v in point.variables):
+            raise ValueError(
+                f"the decision vector of point {point.index} ({len(point.variables)} entries) is not that of its transcription "
+                f"({len(nlp.variables)} entries)"
+            )
+        return nlp
+
+    scales, limit = objective_scales(front), front.stats["tolerance"]
+
+    def check(index: int, point: Point, nlp: NLP) -> Check:
+        mismatch, where = _mismatch(point, nlp)
+        objectives, violation, worst = _recomputed(point, nlp)
+        defect, flown, most, miss = _flown(point, problem, scales, rtol, atol, method)
+        failures = (
+            (not mismatch <= EQUAL, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
+            (not objectives <= EQUAL, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
+            (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, recomputed {violation:.1e}"),
+            (point.status != CONVERGED, f"its status is '{point.status}'"),
+            (not violation <= limit, f"violates '{worst}' by {violation:.1e} (tolerance {limit:.0e})"),
+            (not defect <= tolerance, f"flown, it ends {defect:.1e} away (tolerance {tolerance:.1e})"),
+            (not flown <= tolerance, f"flown, it violates '{most}' by {flown:.1e} (tolerance {tolerance:.1e})"),
+            (not miss <= tolerance, f"flown, its objectives differ by {miss:.1e} (tolerance {tolerance:.1e})"),
+        )
+        return Check(index, mismatch, violation, objectives, defect, flown, miss, tuple(reason for wrong, reason in failures if wrong))
+
+    # All of them first: what is wrong with the front as such is said before any flight.
+    programs = [nlp_of(point) for point in front]
+    return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
+
+
+def objective_scales(front: Front) -> np.ndarray:
+    """What counts as one in each objective (m,): its own scale, or the largest size or the range that it has on the front."""
+    largest = np.abs(front.F).max(axis=0, initial=0.0)
+    found = np.maximum(largest, np.ptp(front.F, axis=0) if len(front) else 0.0)
+    given = [goal.scale or 0.0 for goal in front.goals]
+    return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
+
+
+def missed(flight: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives, by name, and those of its flight, divided by `scales` (m,)."""
+    difference = np.abs([flight.objectives[name] - value for name, value in objectives.items()])
+    return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
+
+
+def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:
+    """Largest scaled difference between the stored trajectory and that of the decision vector, and what differs."""
+    stored, remade = point.trajectory, nlp.unpack(point.decision)
+    if stored is None or list(stored) != list(remade):
+        return np.inf, "phases"
+    differences = {"parameters": _difference(list(stored.parameters.values()), list(remade.parameters.values()), nlp.problem.parameters)}
+    for name, phase in remade.items():
+        for kind, difference in _phase_differences(stored[name], phase).items():
+            differences[f"{kind} of phase '{name}'"] = difference
+    where = max(differences, key=lambda key: differences[key])
+    return differences[where], where
+
+
+def _phase_differences(one: PhaseTrajectory, two: PhaseTrajectory) -> dict[str, float]:
+    span = [max(abs(two.t0), abs(two.tf), two.tf - two.t0)]
+    states, controls = two.state_variables, two.control_variables
+    same_bases = (one.state.basis, one.control.basis) == (two.state.basis, two.control.basis)
+    return {
+        "times": max(
+            _difference(one.time[:, None], two.time[:, None], span),
+            _difference(one.state.edges[:, None], two.state.edges[:, None], span),
+            _difference(one.control.edges[:, None], two.control.edges[:, None], span),
+        ),
+        "states": max(
+            _difference(one.states, two.states, states),
+            _difference(one.state.coefficients, two.state.coefficients, states),
+        ),
+        "controls": max(
+            _difference(one.controls, two.controls, controls),
+            _difference(one.control.coefficients, two.control.coefficients, controls),
+        ),
+        "path constraints": _difference(one.paths, two.paths, two.path_limits),
+        "bases": 0.0 if same_bases else np.inf,
+    }
+
+
+def _difference(one: Any, two: Any, scales: Sequence[Any]) -> float:
+    """Largest difference of two arrays, columns divided by their scales; infinite where shapes differ or only one is a number."""
+    a, b = np.asarray(one, dtype=float), np.asarray(two, dtype=float)
+    if a.shape != b.shape:
+        return np.inf
+    scale = np.array([getattr(item, "scale", item) for item in scales], dtype=float)
+    difference = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.abs(a - b)) / scale
+    return float(np.where(np.isnan(difference), np.inf, difference).max(initial=0.0))
+
+
+def _recomputed(point: Point, nlp: NLP) -> tuple[float, float, str]:
+    """How far the stored objectives are off, the violation, and the constraint that is violated most."""
+    F, violation = nlp.evaluate(point.decision[None])
+    off = np.abs(F[0] - point.F) / np.maximum(1.0, np.abs(F[0]))
+    violations = nlp.violations(point.decision)
+    return float(np.where(np.isnan(off), np.inf, off).max()), float(violation[0]), max(violations, key=lambda key: violations[key])
+
+
+def _flown(
+    point: Point, problem: CompiledProblem, scales: np.ndarray, rtol: float, atol: float, method: str
+) -> tuple[float, float, str, float]:
+    """Largest defect and violation of the flown controls, the constraint that is violated most, and the objectives' largest miss."""
+    if point.trajectory is None:
+        return np.inf, np.inf, "everything", np.inf
+    flight = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
+    worst = max(flight.violations, key=lambda key: flight.violations[key], default="")
+    return flight.max_defect, flight.violation, worst, missed(flight, point.objectives, scales)

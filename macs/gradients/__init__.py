@@ -1,0 +1,1 @@
+"""Points by derivatives: best of several starts, polish, mesh refinement."""

@@ -1,0 +1,125 @@
+"""A front brought down to the Pareto front by gradients, on a transcription that is made for them, whoever found it on whichever."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.peaks import refuse_peaks
+from transcription.base import NLP, Transcription
+from transcription.inner import March
+from transcription.stopping import stopped_by
+
+from ..evaluation.bilevel import Bilevel
+from ..evaluation.evaluator import CONVERGED, Counts
+from ..fronts.builders import certificates, vectors_front
+from ..fronts.merging import merge
+from ..holding import believable, hold
+from ..io.console import Told
+from ..io.interrupts import Monitor
+from ..pareto import archive as archives
+from ..pareto.archive import Archive
+from ..search.gradient_action import ranges
+from ..solvers.start import check_count, check_positive, check_problem
+from ..solves import Solves
+from .polish import polish
+
+if TYPE_CHECKING:
+    from ..front import Front
+    from ..point import Point
+
+KEPT_INSIDE = "kept inside its limits, so that it holds when it is flown"
+"""What there is to say of a point that missed some."""
+
+
+def polished(
+    front: Front,
+    transcription: Transcription,
+    solves: int | None,
+    limit: int | None,
+    verify: float | None,
+    time_limit: float | None,
+    progress: bool,
+) -> Front:
+    """See `Front.polished`."""
+    problem = front.compiled()
+    check_problem(problem, transcription)
+    known = front[[point.index for point in front if point.status == CONVERGED and point.trajectory is not None]]
+    count = max(len(known), 1)
+    solves, limit = count if solves is None else solves, count if limit is None else limit
+    check_count("solves", solves, 0)
+    check_count("limit", limit, min(len(front.goals), count))
+    if verify is not None:
+        check_positive("verify", verify)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
+    refuse_peaks(problem)
+    nlp = _written(problem, transcription)
+    evaluator = Bilevel(nlp, March(), float(front.stats["tolerance"]))
+    with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
+        evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
+        left = Solves(evaluator, solves)
+        begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
+        if not len(begun):
+            found = front[:]
+            found.stats = _costs(front, evaluator.counts, monitor.elapsed, monitor.reason)
+            return found
+        archive = polish(begun, left, limit)
+        untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
+        Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
+        moved = np.zeros(len(Z), dtype=bool)
+        if verify is not None:
+            evaluator.before_batch = lambda: told("polish: points that miss something when flown are solved once more")
+            Z, holds, moved = hold(evaluator, Z, ranges(archive.F), verify)
+            Z, moved = Z[holds], moved[holds]
+            known = believable(nlp.evaluate(Z)[0], known, verify)
+        told(f"polish: how near to optimal {len(Z)} points are")
+        certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
+        # What was moved inside is no optimum of the problem as it is stated, but the nearest that can be flown.
+        optimality = [None if inside else next(certified) for inside in moved]
+        taken, stopped = monitor.elapsed, monitor.reason
+    stats = _costs(front, evaluator.counts, taken, stopped)
+    notes = [KEPT_INSIDE if inside else "" for inside in moved]
+    found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
+    found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
+    found.solver, found.stats = dict(front.solver), stats
+    if not len(found):
+        found.message = f"no point misses less than {verify:g} when it is flown"
+    return found
+
+
+def _archive(nlp: NLP, known: Front, tolerance: float) -> Archive:
+    """Known points on this mesh. What is promised is what was found, on whichever mesh: nothing worse is to take its place."""
+    starts = [nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None]
+    return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
+
+
+def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
+    """What one solve makes of the least infeasible point: one point, or none."""
+    if closest is None or closest.trajectory is None or not np.isfinite([*closest.F, closest.violation]).all():
+        return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
+    found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
+    good = found.status == CONVERGED
+    return Archive(found.Z[good], found.F[good], found.violation[good])
+
+
+def _costs(front: Front, counts: Counts, taken: float, stopped: str) -> dict[str, Any]:
+    """The stats of a front, with what was spent beside."""
+    before = front.stats
+    return {
+        **before,
+        "gradient_solves": before["gradient_solves"] + counts.gradient_solves,
+        "inner_iterations": before["inner_iterations"] + counts.inner_iterations,
+        "wall_time": before["wall_time"] + taken,
+        "reproducible": before["reproducible"] and not (counts.clocked or stopped),
+        **({"stopped": stopped} if stopped else {}),
+    }
+
+
+@lru_cache(maxsize=4)
+def _written(problem: CompiledProblem, transcription: Transcription) -> NLP:
+    """The problem by this method: fronts of one problem share it, and all that is compiled of it."""
+    return transcription.transcribe(problem)

@@ -1,0 +1,141 @@
+"""Gradient solves from several starts, with memory: whatever was found before is where the next one may begin."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from transcription.base import NLP
+from transcription.nlp.scalarized import Solved, scalarize
+
+from ..evaluation.evaluator import CONVERGED, Counts
+
+HOPELESS = 100.0
+"""Propagated states that miss bounds or constraints by more scales than this are worse to start from than a straight line."""
+
+LIMIT, BETTER = 1e-8, 1e-7
+"""By what fraction of an objective's range a limit may be missed, and by what alpha an answer counts as better than another."""
+
+
+class Descents:
+    """Solves scalarised problems of one NLP, each from the best vector known for it and from random candidates, and counts.
+
+    Parameters
+    ----------
+    nlp : NLP
+    given : array (k, n), optional
+        Vectors known from the beginning.
+    starts : int
+        From how many vectors each problem is solved.
+    rng : numpy.random.Generator
+        Draws the random candidates.
+    tolerance : float
+        Largest scaled residual of a feasible point.
+
+    Attributes
+    ----------
+    counts : Counts
+        Gradient solves, iterations, failures by status.
+    """
+
+    def __init__(self, nlp: NLP, given: np.ndarray | None, starts: int, rng: np.random.Generator, tolerance: float) -> None:
+        self.nlp, self.starts, self.tolerance, self.counts = nlp, starts, tolerance, Counts(failures=Counter())
+        self._rng = rng
+        self._known = np.empty((0, len(nlp.variables))) if given is None else given
+        self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
+        self._violation: np.ndarray = np.empty(0)
+        if given is not None:
+            self._F, self._violation = nlp.evaluate(given)
+
+    def solve(
+        self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
+    ) -> Solved:
+        """The best of what `starts` solves find; see `scalarize` for reference, weights and ceiling (m,).
+
+        The first begins at `start` (n,), or at what is best for the purpose of all that is known.
+        """
+        first = start if start is not None else self._nearest(reference, weights)
+        found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
+        for _ in range(self.starts - len(found)):
+            found.append(self._from_anywhere(reference, weights, ceiling))
+        return self.better(found, reference, weights)
+
+    def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
+        """One solve from a vector (n,)."""
+        solved = scalarize(self.nlp, start, reference=reference, weights=weights, ceiling=ceiling, tolerance=self.tolerance)
+        self.counts.gradient_solves += solved.begun
+        self.counts.inner_iterations += solved.iterations
+        self.counts.clocked += solved.clocked
+        if solved.status != CONVERGED:
+            self.counts.failures[solved.status] += 1
+        else:
+            self._known = np.vstack([self._known, solved.z])
+            self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
+        return solved
+
+    def lexicographic(self, i: int) -> Solved:
+        """Least objective i, then the others in their order, each without giving up what came before."""
+        m = len(self.nlp.problem.goals)
+        ceiling = np.full(m, np.inf)
+        best = None
+        for j in [i, *(k for k in range(m) if k != i)]:
+            reference, weights = np.where(np.arange(m) == j, 0.0, np.inf), np.eye(m)[j]
+            solved = self.solve(reference, weights, None if best is None else ceiling, None if best is None else best.z)
+            if best is None or solved.status == CONVERGED:
+                best = solved
+            if best.status != CONVERGED:
+                break
+            # No slack: where the front is steep, what it gives away in one objective is its square root in another.
+            ceiling[j] = best.F[j]
+        assert best is not None
+        return best
+
+    def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
+        """How good points (k, m) are for a scalarised problem: the alpha that they allow, and what they miss of limits and constraints.
+
+        Limits are measured in the ranges that objectives have among the known points. `strict`: what misses any is infinitely bad, as an
+        answer is; otherwise it may still be a good start.
+        """
+        used, moving = reference < np.inf, (reference < np.inf) & (weights > 0)
+        alpha = np.max((F[:, moving] - reference[moving]) / weights[moving], axis=1, initial=-np.inf)
+        hard = used & ~moving
+        ranges = np.ptp(self._F[:, hard], axis=0) if len(self._F) else np.ones(hard.sum())
+        over = (np.maximum(F[:, hard] - reference[hard], 0.0) / np.where(ranges > 0, ranges, 1.0)).sum(axis=1)
+        missed = over + np.where(violation <= self.tolerance, 0.0, violation)
+        merit = alpha + np.where(missed > LIMIT, np.inf, 0.0) if strict else alpha + missed
+        return np.where(np.isfinite(merit), merit, np.inf)
+
+    def better(self, found: list[Solved], reference: np.ndarray, weights: np.ndarray) -> Solved:
+        """The best of several solves of one problem: what converged before what did not; of these the lesser alpha, or violation."""
+        F, violation = np.array([solved.F for solved in found]), np.array([solved.violation for solved in found])
+        failed = np.array([solved.status != CONVERGED for solved in found])
+        merit = np.where(failed, violation, self.merits(reference, weights, F, violation))
+        return found[np.lexsort((merit, failed))[0]]
+
+    def rival(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
+        """A known vector (n,) that is clearly better for a problem than its own answer; None if there is none."""
+        if not len(self._known):
+            return None
+        merits = self.merits(reference, weights, self._F, self._violation, strict=True)
+        own = self.merits(reference, weights, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
+        return self._known[np.argmin(merits)] if merits.min() < own - BETTER else None
+
+    def _nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
+        """The known vector (n,) that is best to start from."""
+        return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
+
+    def _from_anywhere(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> Solved:
+        """A solve from a random candidate: with the states that it flies, and if that leads nowhere with guessed ones."""
+        nlp = self.nlp
+        lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
+        guessed = nlp.first_guess((lower + self._rng.random(len(lower)) * span)[None])
+        flown = nlp.march(guessed)
+        usable = np.isfinite(flown).all() and nlp.evaluate(flown)[1][0] <= HOPELESS
+        attempts = [flown[0], guessed[0]] if usable else [guessed[0]]
+        found: list[Solved] = []
+        for start in attempts:
+            found.append(self.from_vector(start, reference, weights, ceiling))
+            if found[-1].status == CONVERGED:
+                break
+        return self.better(found, reference, weights)

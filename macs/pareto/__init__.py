@@ -1,0 +1,1 @@
+"""Pure functions of objectives: dominance, directions, the archive."""

@@ -1,0 +1,71 @@
+"""Individual actions: what an agent tries by itself, in the order inertia, pattern search, differential evolution.
+
+Each function proposes one point for each of k agents, from their positions X (k, d) in the unit box; none evaluates anything. The search
+sends the proposals of all agents together, and goes on with those that had no success (Ricciardi and Vasile 2015, section 3.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..evaluation.box import Box
+
+
+def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:
+    """Go on along the velocity, by a random fraction of it.
+
+    Parameters
+    ----------
+    X, velocity : arrays (k, d)
+    rho : array (k,)
+        Relative radius of each agent.
+    shorten : bool
+        Whether the step is shortened until it stays in the box, as in the paper. Otherwise its end is put back into the box: one variable
+        close to a bound does not stop all the others.
+
+    Returns
+    -------
+    array (k, d)
+        The proposals. A row equals that of X where the velocity is zero or pushes out of the box.
+    """
+    step = box.stop_outward(X, rho[:, None] * velocity)
+    fraction = rng.random(len(X)) * (box.reach(X, step) if shorten else 1.0)
+    return box.put_back(X + fraction[:, None] * step)
+
+
+def coordinate_step(box: Box, X: np.ndarray, coordinate: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Move one coordinate of each point by a step (k,) in units of span, and put it back in the box."""
+    trial = X.copy()
+    trial[np.arange(len(X)), coordinate] += step
+    return np.where(trial == X, X, box.put_back(trial))
+
+
+def differential(box: Box, X: np.ndarray, donors: np.ndarray, F: float, CR: float, rng: np.random.Generator) -> np.ndarray:
+    """Differential evolution: from x along (x3 - x) + F (x1 - x2), in a random part of the coordinates, by a random fraction.
+
+    Parameters
+    ----------
+    X : array (k, d)
+    donors : array (3, k, d)
+        x1, x2 and x3 of each agent: three others, all different (Storn and Price 1997).
+    F, CR : float
+        Weight of the difference; probability that a coordinate takes part. One coordinate always does.
+
+    Returns
+    -------
+    array (k, d)
+    """
+    first, second, third = donors
+    step = box.difference(third, X) + F * box.difference(first, second)
+    part = rng.random(X.shape) < CR
+    part[np.arange(len(X)), rng.integers(X.shape[1], size=len(X))] = True
+    step = box.stop_outward(X, np.where(part, step, 0.0))
+    fraction = rng.random(len(X)) * box.reach(X, step)
+    return box.put_back(X + fraction[:, None] * step)
+
+
+def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.random.Generator) -> np.ndarray:
+    """For each of k agents, `count` different others of a population, (count, k) of int; too few others are repeated in turn."""
+    scores = rng.random((len(agents), population))
+    scores[np.arange(len(agents)), agents] = np.inf
+    return np.argsort(scores, axis=1)[:, np.arange(count) % max(population - 1, 1)].T

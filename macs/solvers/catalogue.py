@@ -1,0 +1,45 @@
+"""Solvers by name: for the command line ("macs") and for studies."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from typing import Any
+
+from .solver import Solver
+from .start import unknown
+
+SOLVERS: dict[str, str] = {
+    "macs": "macs.search.macs:MACS",
+    "nsga2": "macs.baselines.nsga2:NSGA2",
+    "nsga3": "macs.baselines.nsga3:NSGA3",
+    "moead": "macs.baselines.moead:MOEAD",
+    "mopso": "macs.baselines.mopso:MOPSO",
+    "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
+}
+"""Where each class is, imported only when it is asked for."""
+
+
+def solver_class(name: str) -> type[Solver]:
+    """The class behind a name. Raises ValueError that tells the names there are."""
+    place = SOLVERS.get(name.lower())
+    if place is None:
+        raise ValueError(unknown("solver", name, SOLVERS))
+    module, _, item = place.partition(":")
+    return getattr(importlib.import_module(module), item)
+
+
+def solver(name: str, **settings: Any) -> Solver:
+    """A solver by name, with its settings.
+
+    Raises
+    ------
+    ValueError
+        There is no such solver or setting, or a setting is out of its range.
+    """
+    kind = solver_class(name)
+    known = inspect.signature(kind).parameters
+    for key in settings:
+        if key not in known:
+            raise ValueError(unknown(f"setting of solver '{name}'", key, known))
+    return kind(**settings)

@@ -1,0 +1,264 @@
+"""The contract of this floor: a solver has settings, begins and advances a search, and so solves problems and minimises functions."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, is_dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Objective, Variable
+from problems.problem import Problem
+from transcription.base import Transcription
+from transcription.inner import InnerSolver, inner_solver
+from transcription.smooth import Smooth
+
+from ..evaluation.bilevel import Bilevel
+from ..evaluation.blackbox import BlackBox
+from ..evaluation.evaluator import Evaluator
+from ..front import Front
+from ..fronts.builders import black_box_front, trajectory_front
+from ..io.interrupts import Progress
+from .run import ENDED, Run
+from .start import beginning, check_freedom, check_problem, check_run, decisions, drawing
+
+Callback = Callable[[Progress], Any]
+NO_TIME = 1e-6
+"""Seconds that are left when there are none: what comes then ends before its first solve."""
+
+
+class Solver(ABC):
+    """A search over several objectives.
+
+    An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state is all that it knows
+    between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
+
+    So that runs can be kept in a checkpoint, and go on from it to the same bits, the state is a dataclass, of the very class that `begin`
+    (or what `makes_state` names) is annotated to return; names in that annotation and in those of the fields are known at run time, not
+    only to type checkers. Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator,
+    dataclasses of these, and lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full: `X | None` may be missing,
+    other unions are refused, and so is `Any`. It is rebuilt from its fields alone, without `__init__`. Hence nothing else may change
+    between two iterations, neither in the solver nor in what the state refers to; no generator may be in two fields; and arrays that are
+    changed in place must not share their memory with others. An error says which field does not comply. Budget and evaluator are not the
+    state's to keep.
+    """
+
+    @abstractmethod
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """Evaluate a first population, of which the full vectors `start` (k, D) are the first; returns the state."""
+
+    @abstractmethod
+    def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
+        """One iteration, within the budget of evaluations."""
+
+    def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
+        """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers.
+
+        If the work is to end early (`transcription.stopping`), it leaves what it has. A checkpoint may keep the state before each of its
+        batches: called with that, it has to go on to the same bits.
+        """
+
+    def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
+        """What the state adds to the `stats` of a front, as plain data. Nothing, for most solvers."""
+        return {}
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        """The method that is annotated to return the class of the state, which checkpoints have to know."""
+        return self.begin
+
+    @property
+    def certifies(self) -> bool:
+        """Whether points of its fronts are to carry their `optimality`."""
+        return False
+
+    def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
+        """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
+
+    def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
+        """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
+
+    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
+        """What is left to do with the front of a search that ended by itself, in so many seconds. Nothing, for most solvers."""
+        return front
+
+    def solve(
+        self,
+        problem: Problem | CompiledProblem,
+        transcription: Transcription,
+        *,
+        evaluations: int,
+        seed: int | None = None,
+        inner: str | InnerSolver = "auto",
+        tolerance: float = 1e-6,
+        start: Any = None,
+        time_limit: float | None = None,
+        progress: bool = False,
+        callback: Callback | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Front:
+        """Search an optimal control problem for its Pareto front.
+
+        Parameters
+        ----------
+        problem : Problem
+        transcription : Transcription
+        evaluations : int
+            How many candidates may be sent to the inner level; never exceeded.
+        seed : int, optional
+            The same one gives the same bits. None draws one, which `stats` record.
+        inner : str or InnerSolver
+            "auto", "march", "ipopt", "ipopt-feasibility", or one of your own.
+        tolerance : float
+            Largest scaled residual of a feasible point.
+        start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
+            Decisions to begin with: all variables, or the free ones only; after the problem's guess, if there is one. Or how candidates are
+            drawn: "uniform", each variable by itself, as all those that are missing otherwise, but without the guess; "smooth", random
+            profiles about the guess, see `transcription.Smooth`.
+        time_limit : float, optional
+            Seconds after which the search, and what may come after it, ends with what it has; looked at, like Ctrl-C, before each batch and
+            each solve by IPOPT. A safety net: a run that it ends is recorded as not reproducible.
+        progress : bool
+            Show how the search stands on the terminal.
+        callback : callable, optional
+            Called with a `Progress` after every iteration; the search ends if it returns True.
+        checkpoint : path, optional
+            A file that the run is kept in, now and then and whenever it ends. The same call goes on where it was, whether the run was
+            killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been. What was done
+            since the last write is done again; writes are between iterations, and between the gradient solves that end a search, a second
+            or more apart. So is a first population that was not finished. `time_limit` counts from each call, `stats["wall_time"]` sums
+            them up. Of a run that has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined
+            again. All that decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and
+            seed; a seed of None takes over that of the file. Should the file not be writable any more in the middle of the run, the search
+            goes on, logs a warning, and `stats["checkpoint"]` says why.
+
+        Returns
+        -------
+        Front
+            Feasible, mutually non-dominated points. Empty if none was found: then `message` says why, and `closest` is the nearest.
+
+        Raises
+        ------
+        ValueError
+            If the problem is stated wrongly, an argument makes no sense, or the checkpoint is damaged or of another run, before any work.
+        OSError
+            If the checkpoint could not be written, before any work.
+        """
+        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        check_problem(problem, transcription)
+        solver = inner_solver(inner)
+        nlp = transcription.transcribe(problem)
+        self.check_transcription(transcription, nlp.problem)
+        check_freedom(nlp)
+        self.check_objectives(len(nlp.problem.goals))
+        about = self._about()
+        level = {"inner": inner if isinstance(inner, str) else repr(inner)}
+        drawn = drawing(start)
+        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
+        certified = self.certifies and evaluator.has_gradients
+        run = Run(
+            self,
+            evaluator,
+            goals=lambda: nlp.problem.goals,
+            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level, certified=certified),
+            budget=evaluations,
+            seed=seed,
+            start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
+            what={
+                "solver": about,
+                "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
+                "transcription": transcription.to_dict(),
+                "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
+                **level,
+            },
+        )
+        began = time.perf_counter()
+        front = run.go(time_limit, progress, callback, checkpoint)
+        if front.stats["stopped"] not in ENDED:
+            return front
+        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
+        return self.finish(front, left, progress)
+
+    def minimize(
+        self,
+        function: Any,
+        bounds: Any = None,
+        *,
+        evaluations: int,
+        seed: int | None = None,
+        constraints: Callable[[np.ndarray], np.ndarray] | None = None,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        senses: Sequence[str] | None = None,
+        tolerance: float = 1e-6,
+        start: Any = None,
+        time_limit: float | None = None,
+        progress: bool = False,
+        callback: Callback | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+    ) -> Front:
+        """Search a plain vector function, or a pymoo Problem, for its Pareto front.
+
+        Parameters
+        ----------
+        function : callable or pymoo Problem
+            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)` with G <= 0 where feasible. A row with NaN is a failed evaluation.
+        bounds : pairs, pair of arrays, or mapping
+            d pairs; (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
+        evaluations : int
+            How many rows of X may be evaluated; never exceeded.
+        constraints : callable, optional
+            `constraints(X) -> G`, G <= 0 where feasible.
+        names, units, senses : sequences of str, optional
+            Of the objectives; senses are "minimize" or "maximize".
+        seed, tolerance, start, time_limit, progress, callback, checkpoint
+            As for `solve`. Of the function, a checkpoint only knows its bounds and names: that it is the same one is the caller's to say.
+
+        Returns
+        -------
+        Front
+
+        Raises
+        ------
+        ValueError
+            If an argument, or what the function returns, makes no sense, or the checkpoint is damaged or of another run.
+        OSError
+            If the checkpoint could not be written, before any work.
+        """
+        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
+        if box.m_known is not None:
+            self.check_objectives(box.m_known)
+        sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
+        variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
+
+        about = self._about()
+
+        def goals() -> tuple[Objective, ...]:
+            return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
+
+        run = Run(
+            self,
+            box,
+            goals=goals,
+            make_front=lambda state, stats: black_box_front(state.archive, state.closest, goals(), variables, about, stats),
+            budget=evaluations,
+            seed=seed,
+            start=None if start is None else decisions(start, variables),
+            what={
+                "solver": about,
+                "bounds": {v.name: (v.lower, v.upper) for v in variables},
+                "objectives": {"number": box.m_known, "names": names, "units": units, "senses": senses},
+                "constraints": constraints is not None,
+            },
+        )
+        return run.go(time_limit, progress, callback, checkpoint)
+
+    def _about(self) -> dict[str, Any]:
+        if not is_dataclass(self):
+            raise TypeError(f"{type(self).__name__} must be a dataclass of its settings, which its fronts record")
+        return {"name": type(self).__name__, "settings": asdict(self)}

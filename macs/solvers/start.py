@@ -1,0 +1,155 @@
+"""Checks of what a solver is given, before any work."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Variable
+from problems.problem import Problem
+from transcription.base import NLP, Transcription
+from transcription.smooth import Smooth
+
+from ..front import Front
+from ..fronts.files import check_target
+from ..point import Point
+
+STARTS = ("uniform", "smooth")
+"""How first candidates are drawn."""
+OTHER = "start: the points are of other variables; a start belongs to one problem"
+
+
+def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
+    """Raise ValueError for arguments of `solve` and `minimize` that make no sense, OSError for a checkpoint that cannot be written."""
+    check_count("evaluations", evaluations, 1)
+    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
+        raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
+    check_positive("tolerance", tolerance)
+    if time_limit is not None:
+        check_positive("time_limit", time_limit)
+    if callback is not None and not callable(callback):
+        raise ValueError(f"callback must be callable, not {callback!r}")
+    if checkpoint is not None:
+        if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
+            raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
+        check_target(checkpoint)
+
+
+def check_positive(name: str, value: Any) -> None:
+    """Raise ValueError that names what is no positive number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Raise ValueError unless `value` is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def unknown(what: str, word: Any, known: Iterable[str]) -> str:
+    """What to say of a word that is none of those known: the nearest, and all."""
+    words = [*known]
+    near = difflib.get_close_matches(str(word), words, n=1)
+    return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
+
+
+def check_problem(problem: Any, transcription: Any) -> None:
+    """Raise ValueError if these are no problem and no transcription."""
+    if not isinstance(problem, Problem | CompiledProblem):
+        raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
+    if not isinstance(transcription, Transcription):
+        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
+
+
+def check_freedom(nlp: NLP) -> None:
+    """Raise ValueError if there is nothing to search."""
+    if not len(nlp.free):
+        raise ValueError(
+            f"problem '{nlp.problem.name}' leaves nothing to decide: no control, no parameter, no free time and no free initial state"
+        )
+
+
+def drawing(start: Any) -> Smooth | str | None:
+    """How first candidates are to be drawn, if `start` says that and not which they are: a `Smooth`, or "uniform"."""
+    if not isinstance(start, str):
+        return start if isinstance(start, Smooth) else None
+    if start not in STARTS:
+        raise ValueError(f"{unknown('start', start, STARTS)}; or give a Front, Points or an array of decisions")
+    return Smooth() if start == "smooth" else start
+
+
+def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
+    """Full vectors to begin with: what the caller gave, after what the problem's user guessed, if that is wanted; None if there is nothing.
+
+    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
+    meshes are interpolated.
+    """
+    rows = []
+    if guess and np.isfinite(nlp.guess).any():
+        middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
+        rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
+    points = _points(start)
+    if points:
+        rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
+    elif start is not None:
+        given = _array(start)
+        if given.shape[1] == len(nlp.free) != len(nlp.variables):
+            rows.append(nlp.first_guess(decisions(given, [nlp.variables[i] for i in nlp.free])))
+        else:
+            rows.append(decisions(given, nlp.variables))
+    return np.vstack(rows) if rows else None
+
+
+def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
+    """Decisions (k, D) to begin with, checked against their bounds.
+
+    Raises
+    ------
+    ValueError
+        If they have another length, are no numbers, or lie outside the bounds; the message names the variable.
+    """
+    points = _points(start)
+    for point in points:
+        if [v.name for v in point.variables] != [v.name for v in variables]:
+            raise ValueError(OTHER)
+    Z = _array([point.decision for point in points] or start)
+    if Z.shape[1] != len(variables):
+        raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected")
+    lower, upper, scale = (np.array([getattr(v, name) for v in variables]) for name in ("lower", "upper", "scale"))
+    wrong = ~np.isfinite(Z) | (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        v = variables[column]
+        raise ValueError(f"start: decision {row} has {v.name} = {Z[row, column]:g}, outside its bounds ({v.lower:g}, {v.upper:g})")
+    return np.clip(Z, lower, upper)
+
+
+def _points(start: Any) -> list[Point]:
+    """The Points that a start consists of; none if it is an array."""
+    points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Front | list | tuple) else []
+    return points if all(isinstance(point, Point) for point in points) else []
+
+
+def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
+    """The vector (n,) of a point, interpolated if it is on another mesh."""
+    if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
+        return point.decision
+    if point.source is None or point.source.fingerprint != nlp.problem.fingerprint or point.trajectory is None:
+        raise ValueError(OTHER)
+    return nlp.interpolate(point.trajectory)
+
+
+def _array(start: Any) -> np.ndarray:
+    try:
+        Z = np.atleast_2d(np.array(start, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError("start must be a Front, Points or an array of decisions, all of one length") from None
+    if Z.ndim != 2:
+        raise ValueError(f"start must have two dimensions (points, variables), not {Z.ndim}")
+    return Z

@@ -1,0 +1,188 @@
+"""The re-entry of a shuttle with four objectives, stated for whatever limits and no-fly zones a case has.
+
+Chai, Savvaris, Tsourdos, Xia and Chai, "Solving multiobjective constrained trajectory optimization problem by an extended evolutionary
+algorithm", IEEE Transactions on Cybernetics 50(4), 2020, eqs. (5)-(11). Where it leaves something open, it is chosen here: the angles at
+the beginning, the gains of the lag equations, the bounds of the states (no flight of interest leaves them). The final latitude is called
+longitude once, which is a slip; the heat load is in kBtu/ft2, the only unit in which it has the values of the paper's tables; and the
+integral of the rate of the flight-path angle, which would be a mere difference between its ends, is that of its absolute value.
+
+The absolute value and the peak are exact in the search; gradient tools bound them from above, which is the same where they are minimised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, pi, radians
+from typing import Any
+
+import casadi as ca
+
+from ... import checks
+from ...phase import Phase
+from ...problem import Problem
+from . import vehicle
+from .nominal import guess
+from .vehicle import FOOT
+
+START = {
+    "altitude": 260000 * FOOT,
+    "longitude": 0.0,
+    "latitude": 0.0,
+    "speed": 25600 * FOOT,
+    "flight-path angle": radians(-1.0),
+    "heading": radians(90.0),
+    "angle of attack": radians(17.4),
+    "bank angle": radians(-75.0),
+}
+END = {"altitude": 80000 * FOOT, "speed": 2500 * FOOT, "flight-path angle": radians(-5.0)}
+BOUNDS = {
+    "altitude": (20e3, 120e3),
+    "longitude": (-pi, pi),
+    "latitude": (-0.48 * pi, 0.48 * pi),
+    "speed": (300.0, 8500.0),
+    "flight-path angle": (radians(-80.0), radians(80.0)),
+    "heading": (-pi, pi),
+    "angle of attack": (0.0, radians(40.0)),
+    "bank angle": (radians(-90.0), radians(1.0)),
+}
+SCALES = {state: abs(value) for state, value in END.items()}
+"""What counts as one: for all that is limited its limit, so that a violation of 0.01 is 1 % of it."""
+UNITS = {"altitude": "m", "speed": "m/s"}
+"""The others are in rad."""
+ANGLES = ("angle of attack", "bank angle")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The most that a flight may take: heating rate, Btu/ft2/s; dynamic pressure, lbf/ft2; load, in weights."""
+
+    heating_rate: float
+    dynamic_pressure: float
+    load_factor: float
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A circle on the map, all in degrees, over which no flight may go."""
+
+    longitude: float
+    latitude: float
+    radius: float
+
+
+def reentry(
+    name: str,
+    limits: Limits,
+    zones: Sequence[Zone] = (),
+    *,
+    mass: float = vehicle.MASS,
+    gravity: str = "newtonian",
+    lag_gain: float = 0.1,
+    final_time: float = 2000.0,
+    altitude_tolerance: float = 3000 * FOOT,
+    speed_tolerance: float = 350 * FOOT,
+    angle_tolerance: float = radians(1.0),
+) -> Problem:
+    """State a case.
+
+    Parameters
+    ----------
+    name : str
+    limits : Limits
+    zones : Zones
+    mass : float
+        kg; 92079 by default.
+    gravity : "newtonian" or "constant"
+    lag_gain : float
+        Of the lag equations of both angles, 1/s: they follow their commands within some 1 / lag_gain seconds.
+    final_time : float
+        s.
+    altitude_tolerance, speed_tolerance, angle_tolerance : float
+        How far altitude, m, speed, m/s, and flight-path angle, rad, at the end may be from 80000 ft, 2500 ft/s and -5 degrees.
+
+    Returns
+    -------
+    Problem
+        One phase, "entry".
+
+    Raises
+    ------
+    ValueError
+        For data that make no sense, by their names.
+    """
+    if gravity not in vehicle.GRAVITIES:
+        raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, vehicle.GRAVITIES))}, not {gravity!r}")
+    mass, lag_gain, final_time = (
+        _positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
+    )
+    given = {"altitude": altitude_tolerance, "speed": speed_tolerance, "flight-path angle": angle_tolerance}
+    problem = Problem(name)
+    phase = problem.phase("entry", t0=0.0, tf=final_time)
+    for state, tolerance in given.items():
+        _check_tolerance(tolerance, state, f"{name}: the tolerance of the final {state}")
+    states = declare(phase, START, {state: END[state] for state, tolerance in given.items() if tolerance == 0})
+    for angle in ANGLES:
+        phase.control(f"{angle} command", bounds=BOUNDS[angle], unit="rad")
+    rates = vehicle.rates(states, states["angle of attack"], states["bank angle"], mass, gravity)
+    turning = rates["flight-path angle"]
+    rates |= {angle: lag_gain * (phase[f"{angle} command"] - phase[angle]) for angle in ANGLES}
+    phase.dynamics(**rates)
+
+    altitude, speed, attack = phase["altitude"], phase["speed"], phase["angle of attack"]
+    heating = vehicle.heating_rate(altitude, speed, attack)
+    pressure, load = vehicle.dynamic_pressure(altitude, speed), vehicle.load_factor(altitude, speed, attack, mass, gravity)
+    for word, value, limit in (
+        ("heating rate", heating, limits.heating_rate),
+        ("dynamic pressure", pressure, limits.dynamic_pressure),
+        ("load factor", load, limits.load_factor),
+    ):
+        phase.path(word, value, upper=limit, scale=limit)
+    for number, zone in enumerate(zones, 1):
+        east, north = (degrees(1.0) * phase[word] - getattr(zone, word) for word in ("longitude", "latitude"))
+        phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, scale=zone.radius)
+
+    for state, tolerance in given.items():
+        if tolerance > 0:
+            # Eq. (10): rows of their own, as what counts as one at the end is what is left open there.
+            error = phase.final(states[state]) - END[state]
+            problem.constraint(f"final {state}", error, lower=-tolerance, upper=tolerance, scale=tolerance)
+
+    problem.maximize("cross-range", degrees(1.0) * phase.final(phase["latitude"]), unit="deg")
+    problem.minimize("heat load", 1e-3 * phase.integral(heating), unit="kBtu/ft2")
+    problem.minimize("oscillation", phase.integral(ca.fabs(turning)), unit="rad")
+    problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
+
+    guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
+    # Commands within bounds everywhere, and fine enough that most of what is feasible on it is so as flown, to 1 % of each limit. It takes
+    # seconds to make a candidate feasible: they are scored as they fly, and what is worth it is left to the gradients.
+    problem.default_transcription = "dfet:50x2:bernstein:1"
+    problem.default_evaluations = 700
+    problem.default_inner, problem.default_start = "march", "smooth"
+    problem.verify_tolerance = 2e-2
+    return problem
+
+
+def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) -> dict[str, ca.MX]:
+    """States of a flight, from `start`, which names them all, to what is given of the `end`; returns their symbols."""
+    return {
+        name: phase.state(
+            name, bounds=BOUNDS[name], initial=value, final=end.get(name), unit=UNITS.get(name, "rad"), scale=SCALES.get(name)
+        )
+        for name, value in start.items()
+    }
+
+
+def _check_tolerance(tolerance: Any, state: str, what: str) -> None:
+    if checks.number(tolerance, what) < 0:
+        raise ValueError(f"{what} must not be negative, not {tolerance:g}")
+    low, high = BOUNDS[state]
+    if not low <= END[state] - tolerance <= END[state] + tolerance <= high:
+        raise ValueError(f"{what}: {END[state]:g} +- {tolerance:g} is outside its bounds, {low:g} to {high:g}")
+
+
+def _positive(value: Any, what: str) -> float:
+    number = checks.number(value, what)
+    if number <= 0:
+        raise ValueError(f"{what} must be positive, not {number:g}")
+    return number

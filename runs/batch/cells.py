@@ -1,0 +1,213 @@
+"""From what a study is given to its cells: every problem with each of its transcriptions and every solver, by labels."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from macs.fronts.tables import call
+from macs.solvers import catalogue
+from macs.solvers.solver import Solver
+from macs.solvers.start import check_count
+from problems import Problem, load
+from problems.compiled import CompiledProblem
+from transcription import Transcription, parse, word
+
+from ..cell import Cell
+from ..execution.task import Payload
+from ..terms import check as check_terms
+from ..terms import of_problem
+from .file import plain, told
+
+
+def combine(
+    problems: Any,
+    transcriptions: Any,
+    solvers: Any,
+    evaluations: Any,
+    terms: Mapping[str, Mapping[str, Any]],
+    inner: str | None,
+    start: Any,
+) -> list[tuple[Cell, Payload]]:
+    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
+
+    Parameters are those of `Study`. Raises ValueError that names what makes no sense.
+    """
+    stated = {label: _problem(label, given) for label, given in _labelled("problems", problems, _name_of_problem).items()}
+    methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers, _name_of_solver).items()}
+    schemes = _schemes(transcriptions, stated)
+    budgets = _budgets(evaluations, stated)
+    check_terms(terms, methods)
+    own_budgets = {}
+    for label, given in terms.items():
+        if "evaluations" in given:
+            with told(f"terms of '{label}'"):
+                own_budgets[label] = _budgets(given["evaluations"], stated)
+    combined = []
+    for label, problem in stated.items():
+        compiled = _compiled(label, problem)
+        with told(f"problems: '{label}'"):
+            theirs = of_problem(problem, inner, start)
+        common = [one for one in methods if "transcription" not in terms.get(one, {})]
+        offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
+        offered += [
+            (name, scheme, [method_label])
+            for method_label in methods
+            if method_label not in common
+            for name, scheme in _named_schemes(terms[method_label]["transcription"]).items()
+        ]
+        for scheme_label, scheme, method_labels in offered:
+            stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
+            for method_label in method_labels:
+                method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
+                budget = own_budgets.get(method_label, budgets)[label]
+                own |= {"evaluations": budget} if method_label in own_budgets else {}
+                place = f"{label}, {scheme_label}, {method_label}"
+                with told(place):
+                    method.check_objectives(len(compiled.goals))
+                    method.check_transcription(scheme, compiled)
+                details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
+                details |= {"terms": own} if own else {}
+                cell = Cell(label, scheme_label, method_label, budget, plain(details))
+                combined.append((cell, (stated_so, _pickled(place, method))))
+    return combined
+
+
+def problems(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, CompiledProblem]:
+    """The problems of what `combine` gave, by label."""
+    stated = {cell.problem: payload[0] for cell, payload in combined}
+    return {label: pickle.loads(payload)[0] for label, payload in stated.items()}
+
+
+def solvers(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, Solver]:
+    """The solvers of what `combine` gave, by label."""
+    return {label: pickle.loads(payload) for label, payload in {cell.solver: payload[1] for cell, payload in combined}.items()}
+
+
+def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:
+    """{label: one} for one, several, or a mapping of them."""
+    if isinstance(given, Mapping):
+        found = dict(given)
+    else:
+        found = {}
+        for one in given if isinstance(given, list | tuple) else [given]:
+            label = name_of(one)
+            if label in found:
+                raise ValueError(f"{what}: '{label}' is there twice; give each a label, {{label: ...}}")
+            found[label] = one
+    if not found:
+        raise ValueError(f"{what}: there are none")
+    for label in found:
+        if not isinstance(label, str) or not label.strip():
+            raise ValueError(f"{what}: a label must be a word, not {label!r}")
+    return found
+
+
+def _name_of_problem(one: Any) -> str:
+    return one.name if isinstance(one, Problem | CompiledProblem) else str(one)
+
+
+def _name_of_solver(one: Any) -> str:
+    return type(one).__name__.lower() if isinstance(one, Solver) else str(one)
+
+
+def _name_of_scheme(one: Any) -> str:
+    """As on the command line, where it can be said there: so the same method has the same label, however it was given."""
+    if not isinstance(one, Transcription):
+        return str(one)
+    about = one.to_dict()
+    return word(one) or call(about["method"], about["settings"])
+
+
+def _problem(label: str, given: Any) -> Problem | CompiledProblem:
+    data = dict(given) if isinstance(given, Mapping) else {}
+    name = data.pop("problem", None) if isinstance(given, Mapping) else given
+    if isinstance(name, Problem | CompiledProblem) and not data:
+        return name
+    if not isinstance(name, str):
+        raise ValueError(f"problems: '{label}' must be a name, a Problem, or a table with its name as problem = ..., not {given!r}")
+    with told("problems", anything=f"'{name}' does not load"):
+        return load(name, **data)
+
+
+def _compiled(label: str, problem: Problem | CompiledProblem) -> CompiledProblem:
+    with told("problems", anything=f"'{label}' is stated wrongly"):
+        return problem.compile() if isinstance(problem, Problem) else problem
+
+
+def _identity(problem: CompiledProblem) -> dict[str, Any]:
+    """What a problem is told by. Where its file lies is none of it: a study may move."""
+    return {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
+
+
+def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, dict[str, Transcription]]:
+    """Transcriptions by label, for each problem."""
+    if isinstance(given, Mapping) and set(given) & set(problems):
+        return {label: _named_schemes(one) for label, one in _by_problem("transcriptions", given, problems).items()}
+    if given is not None:
+        common = _named_schemes(given)
+        return dict.fromkeys(problems, common)
+    return {label: _named_schemes(_own("transcriptions", label, one, "default_transcription")) for label, one in problems.items()}
+
+
+def _named_schemes(given: Any) -> dict[str, Transcription]:
+    return {label: _scheme(label, one) for label, one in _labelled("transcriptions", given, _name_of_scheme).items()}
+
+
+def _scheme(label: str, given: Any) -> Transcription:
+    if isinstance(given, str):
+        with told("transcriptions"):
+            return parse(given)
+    if not isinstance(given, Transcription):
+        raise ValueError(f"transcriptions: '{label}' must be a word such as dfet:4x6 or a Transcription, not {given!r}")
+    return given
+
+
+def _solver(label: str, given: Any) -> Solver:
+    if isinstance(given, Solver):
+        return given
+    settings = dict(given) if isinstance(given, Mapping) else {"solver": given}
+    name = settings.pop("solver", None)
+    if not isinstance(name, str):
+        raise ValueError(f"solvers: '{label}' must be a name, a Solver, or a table with its name as solver = \"macs\", not {given!r}")
+    with told("solvers"):
+        return catalogue.solver(name, **settings)
+
+
+def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, int]:
+    if given is None:
+        found = {label: _own("evaluations", label, one, "default_evaluations") for label, one in problems.items()}
+    else:
+        found = _by_problem("evaluations", given, problems) if isinstance(given, Mapping) else dict.fromkeys(problems, given)
+    for label, budget in found.items():
+        check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
+    return {label: int(budget) for label, budget in found.items()}
+
+
+def _by_problem(what: str, given: Mapping[str, Any], problems: Mapping[str, Any]) -> dict[str, Any]:
+    """A value for each problem, by labels."""
+    for label in given:
+        if label not in problems:
+            raise ValueError(f"{what}: there is no problem '{label}'; there are {', '.join(problems)}")
+    for label in problems:
+        if label not in given:
+            raise ValueError(f"{what}: none for problem '{label}'")
+    return {label: given[label] for label in problems}
+
+
+def _own(what: str, label: str, problem: Problem | CompiledProblem, name: str) -> Any:
+    if isinstance(problem, CompiledProblem):
+        raise ValueError(f"{what}: problem '{label}' is compiled and has none of its own; say which")
+    return getattr(problem, name)
+
+
+def _pickled(place: str, *what: Any) -> bytes:
+    """Bytes that another process can make the same of: one thing, or a tuple of several."""
+    for one in what:
+        if type(one).__module__ == "__main__":
+            raise ValueError(f"{place}: other processes cannot import {type(one).__name__} from a script; put it into a module of its own")
+    try:
+        return pickle.dumps(what if len(what) > 1 else what[0])
+    except Exception as error:
+        raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error

@@ -1,0 +1,7 @@
+"""`python -m runs.cli.parser`."""
+
+import sys
+
+from .parser import main
+
+sys.exit(main())

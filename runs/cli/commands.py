@@ -1,0 +1,275 @@
+"""The commands behind the command line: each takes the parsed arguments, prints, and returns an exit code."""
+
+from __future__ import annotations
+
+import inspect
+from argparse import Namespace
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import problems
+import transcription
+from macs.front import Front
+from macs.fronts.files import check_target
+from macs.fronts.front_plot import label, save_picture
+from macs.fronts.tables import text_table
+from macs.fronts.verification import Check, missed, objective_scales
+from macs.fronts.verification import verify as verify_front
+from macs.point import Point
+from macs.solvers.catalogue import solver_class
+from macs.solvers.solver import Solver
+from macs.solvers.start import STARTS, unknown
+from problems import Problem
+from transcription.inner import NAMED
+
+from ..batch import file as studyfile
+from . import study_commands
+from .answers import DONE, NO, WrongCall, refused
+
+MESHES = ("fixed", "adaptive")
+PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
+
+
+def list_all(arguments: Namespace) -> int:
+    """The problems and the studies there are."""
+    cases = {name: problems.describe(name) for name in problems.names()}
+    batches = {name: f"study: {studyfile.describe(name)}" for name in studyfile.names()}
+    width = max(map(len, (*cases, *batches)))
+    for name, text in (cases | batches).items():
+        print(f"{name:{width}}  {text}")
+    return DONE
+
+
+def solve(arguments: Namespace) -> int:
+    """Search, fly every point, print, save, draw."""
+    problem = load_problem(arguments.problem)
+    method = problem.default_transcription if arguments.transcription is None else arguments.transcription
+    with refused():
+        scheme = transcription.parse(method) if isinstance(method, str) else method
+    mesh = choose(arguments.mesh, MESHES, "kind of mesh")
+    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, problem.verify_tolerance)
+    inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
+    start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
+    out = Path(arguments.out) if arguments.out else free_name(problem.name)
+    check_target(out)
+    check_picture(arguments.plot)
+    if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
+        raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
+    with refused():
+        front = solver.solve(
+            problem,
+            scheme,
+            evaluations=arguments.evaluations or problem.default_evaluations,
+            seed=arguments.seed,
+            inner=inner,
+            start=start,
+            checkpoint=arguments.checkpoint,
+            progress=True,
+        )
+    try:
+        front.save(out)
+    except OSError:
+        # The disk filled up while the search went on: what it found is shown at least.
+        print(front.table())
+        raise
+    scales = objective_scales(front)
+    flown = [as_flown(point, scales) for point in front]
+    defects = [defect for defect, _ in flown]
+    print(front.table(defects=defects, columns={"objectives off": [off for _, off in flown]}))
+    missing = sum(not max(pair) <= problem.verify_tolerance for pair in flown)
+    if missing:
+        print(f"{missing} of {len(front)} points, flown, miss by more than {problem.verify_tolerance:g}: see `macs verify {out}`.")
+    print(f"\nfront saved in {out}")
+    if arguments.plot:
+        draw(front, arguments.plot)
+    return DONE if len(front) else NO
+
+
+def show(arguments: Namespace) -> int:
+    """A saved front, or one of its points."""
+    check_picture(arguments.plot)
+    if arguments.csv:
+        check_target(arguments.csv)
+        if Path(arguments.csv).resolve() == Path(arguments.front).resolve():
+            raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
+    with refused():
+        front = Front.load(arguments.front)
+    point = None if arguments.point is None else find_point(front, arguments.point)
+    if arguments.plot and point is not None and point.trajectory is None:
+        raise WrongCall(f"point {arguments.point} has no trajectory to draw")
+    print(front.table() if point is None else describe(front, point))
+    if arguments.plot:
+        draw(front if point is None else point, arguments.plot)
+    if arguments.csv:
+        (front if point is None else point.alone()).to_csv(arguments.csv)
+        print(f"values in {arguments.csv}")
+    return DONE
+
+
+def verify(arguments: Namespace) -> int:
+    """Check every point of a saved front."""
+    with refused():
+        front = Front.load(arguments.front)
+    if front.source is None:
+        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to fly")
+    if not arguments.problem and not front.source.address:
+        raise WrongCall(f"problem '{front.source.name}' was stated in a script; say where: --problem file.py:function")
+    problem = load_problem(arguments.problem) if arguments.problem else load_problem(front.source.address, **front.source.data)
+    tolerance = arguments.tolerance or problem.verify_tolerance
+    with refused():
+        front = Front.load(arguments.front, problem=problem)
+        checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
+    print(verification_table(front, checks))
+    failed = [check for check in checks if not check.ok]
+    if not checks:
+        print(f"There is no point to verify. {front.message}".rstrip())
+    elif failed:
+        print(f"\n{len(failed)} of {len(checks)} points fail.")
+    else:
+        print(f"\nAll {len(checks)} points verify: flown anew, they stay within {tolerance:g}.")
+    return DONE if checks and not failed else NO
+
+
+def bench(arguments: Namespace) -> int:
+    """Ratios against the alternatives."""
+    from .. import bench as benchmarks
+
+    kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
+    if arguments.csv:
+        check_target(arguments.csv)
+    benchmarks.bench(kinds, arguments.quick, arguments.csv)
+    return DONE
+
+
+# What the arguments mean
+
+
+def load_problem(address: str, **data: Any) -> Problem:
+    """A problem by name or address; whatever goes wrong in the user's own file is told in one line."""
+    try:
+        problem = problems.load(address, **data)
+        problem.compile()
+    except ValueError as error:
+        raise WrongCall(str(error)) from error
+    except (Exception, SystemExit) as error:
+        raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}") from error
+    return problem
+
+
+def make_solver(name: str, plain: bool = False, mesh: str = "fixed", polish_on: str | None = None, verify: float | None = None) -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive", or polished on another
+    transcription to hold within `verify`."""
+    with refused():
+        solver = solver_class(name)
+        known = inspect.signature(solver).parameters
+        if plain and "refine" not in known:
+            raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
+        if mesh != "fixed" and "mesh" not in known:
+            raise WrongCall(f"--mesh {mesh} makes no sense for solver '{name}', which leaves meshes as they are")
+        if polish_on and "polish_on" not in known:
+            raise WrongCall(f"--polish-on {polish_on} makes no sense for solver '{name}', which does not polish")
+        settings: dict[str, Any] = {"refine": False} if plain else {}
+        settings |= {"mesh": mesh} if mesh != "fixed" else {}
+        settings |= {"polish_on": polish_on, "verify": verify} if polish_on else {}
+        return solver(**settings)
+
+
+def choose(word: str, known: Iterable[str], what: str) -> str:
+    """`word`, if it is known; else WrongCall with the ones that are."""
+    if word not in known:
+        raise WrongCall(unknown(what, word, known))
+    return word
+
+
+def find_point(front: Front, index: int) -> Point:
+    """A point by its number."""
+    try:
+        return front[index]
+    except IndexError:
+        last = f"points 0 to {len(front) - 1}" if len(front) else "no points"
+        raise WrongCall(f"there is no point {index}: the front has {last}") from None
+
+
+def free_name(problem: str) -> Path:
+    """A file of the problem's name, here, that does not exist yet."""
+    stem = "".join(c if c.isalnum() or c in "-_." else "_" for c in problem).strip(".") or "front"
+    names = (Path(f"{stem}{f'-{i}' if i > 1 else ''}.nc") for i in range(1, 10**6))
+    return next(name for name in names if not name.exists())
+
+
+def check_picture(path: str | None) -> None:
+    """Refuse a picture that could not be written, before any work."""
+    if path:
+        check_target(path)
+        suffix = Path(path).suffix.lower().lstrip(".")
+        if suffix not in PICTURES:
+            raise WrongCall(f"cannot draw '{path}': a picture is one of .{', .'.join(PICTURES[:5])}")
+
+
+# What is printed
+
+
+def as_flown(point: Point, scales: np.ndarray) -> tuple[float, float]:
+    """Largest defect of a point's flight, and by how much its objectives differ from those flown, in `scales` (m,)."""
+    if point.trajectory is None:
+        return np.inf, np.inf
+    flight = point.simulate()
+    return flight.max_defect, missed(flight, point.objectives, scales)
+
+
+def draw(what: Front | Point, path: str) -> None:
+    """Draw a front, or a point's flight."""
+    save_picture(what, path)
+    print(f"picture in {path}")
+
+
+def describe(front: Front, point: Point) -> str:
+    """One point, in full."""
+    objectives = {label(goal.name, goal.unit): f"{point.objectives[goal.name]:.10g}" for goal in front.goals}
+    excursions = {name: f"{value:.2g}" for name, value in (point.excursions or {}).items()}
+    groups = {
+        f"point {point.index} of {len(front)}, {point.status}": objectives,
+        "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
+        f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
+        "leaves bounds between nodes, by this much of the scale": excursions,
+    }
+    lines = [front.table().splitlines()[0], ""]
+    for title, values in groups.items():
+        width = max(map(len, values), default=0)
+        lines += [title, *(f"  {name:{width}}  {value}" for name, value in values.items()), ""] if values else []
+    for name, phase in (point.trajectory or {}).items():
+        lines += [f"phase {name}: {phase.t0:.6g} to {phase.tf:.6g} {phase.time_unit}", _ends(phase), ""]
+    return "\n".join(lines).rstrip()
+
+
+def _ends(phase: Any) -> str:
+    """What states and controls begin and end with, and between which values they are at the ends of elements and the nodes between."""
+    ends = [phase.at(time) for time in (phase.t0, phase.tf)]
+
+    def row(v: Any, first: float, last: float) -> list[str]:
+        values = phase[v.name]
+        return [f"  {label(v.name, v.unit)}", *(f"{value:.6g}" for value in (first, last, values.min(), values.max()))]
+
+    rows = [row(*three) for three in zip(phase.state_variables, phase.edge_states[0], phase.edge_states[-1], strict=True)]
+    rows += [["  control"] + 4 * [""]] if phase.control_variables else []
+    rows += [row(v, ends[0][v.name], ends[1][v.name]) for v in phase.control_variables]
+    return text_table([["  state", "initial", "final", "least", "greatest"]], rows, [True, False, False, False, False])
+
+
+def verification_table(front: Front, checks: Sequence[Check]) -> str:
+    """A row for each point, and the reasons of those that fail."""
+    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.flown, c.missed) for c in checks]
+    rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
+    headers = [
+        ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],
+        ["", "stored - decision", "stored - anew", "anew", "flown", "flown", "stored - flown", ""],
+    ]
+    table = text_table(headers, rows, [False] * 7 + [True])
+    reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]
+    return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
+
+
+COMMANDS = {"list": list_all, "solve": solve, "show": show, "verify": verify, "study": study_commands.study, "bench": bench}

@@ -1,0 +1,245 @@
+"""The command line: what can be called, and how a call ends.
+
+Exit codes: 0 done; 1 the answer is no (nothing feasible, a point that does not verify); 2 the call was wrong: one line on stderr says how,
+and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+from .answers import DONE, INTERRUPTED, WRONG, WrongCall
+
+EPILOG = """\
+examples:
+  macs list
+  macs solve goddard
+  macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
+  macs show front.nc --point 3 --plot flight.png
+  macs verify front.nc
+  macs study run goddard-table3 --jobs 2
+  macs study status out/goddard-table3
+  macs bench inner --quick
+
+exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
+
+
+BENCH = """\
+Ratios against the alternatives, measured side by side in one run, with their spread: absolute times would tell of the machine.
+
+inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+population  120 re-entries flown and scored in one call, as a population search sends them, against one after the other
+search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+study       a study with two processes against one, and how much longer it takes than its runs do
+
+A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
+machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
+compiled; where there is a C compiler, the whole inner benchmark and that of populations show both."""
+
+
+STUDY = """\
+Batches of independent runs: every problem of a study by every solver. A run is a file in the study's folder, written once, whole.
+
+macs study run STUDY     makes the runs that are missing. Stopped, killed, or with more --runs, the same command goes on; what is finished
+                         is neither made again nor touched. A run that crashes, hangs beyond the study's time_limit or is killed is
+                         recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
+macs study status DIR    tells how it stands.
+
+The exit code is 1 while any run is missing or failed."""
+
+
+TRANSCRIPTION = (
+    "such as dfet:4x6 (4 elements of order 6), shooting:200:linear (200 nodes; controls constant, linear or spline) or "
+    "multiple-shooting:40x5:rk8 (40 intervals of 5 steps; Runge-Kutta scheme) (default: the problem's own)"
+)
+
+
+class Parser(argparse.ArgumentParser):
+    """One line for a wrong call, not a page of usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise SystemExit(complain(message, self.prog))
+
+
+class Version(argparse.Action):
+    """Prints the version that is installed; looked up only if asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"macs {version('macs-trajectories')}")
+        except PackageNotFoundError:
+            print("macs, not installed")
+        raise SystemExit(DONE)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; returns its exit code."""
+    parser = build_parser()
+    arguments, unknown = parser.parse_known_args(argv)
+    if unknown:
+        arguments.parser.error(_unknown_option(unknown[0], arguments.parser))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A unit that the terminal cannot show is no reason to fail.
+        sys.stdout.reconfigure(errors="replace")
+    from . import commands
+
+    try:
+        code = commands.COMMANDS[arguments.command](arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except WrongCall as error:
+        return complain(str(error), arguments.parser.prog)
+    except OSError as error:
+        return complain(error.strerror or str(error), arguments.parser.prog)
+    except KeyboardInterrupt:
+        complain("interrupted", arguments.parser.prog)
+        return INTERRUPTED
+    return int(code)
+
+
+def complain(message: str, program: str) -> int:
+    """One line on stderr."""
+    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    return WRONG
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Everything that can be called."""
+    parser = Parser(
+        prog="macs",
+        description="Multi-objective optimal control: search for fronts of verified trajectories.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action=Version, nargs=0, help="show the version and exit")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    _add(commands, "list", "the problems and studies there are, one line each")
+    _add_solve(commands)
+    _add_show(commands)
+    _add_verify(commands)
+    _add_study(commands)
+    _add_bench(commands)
+    return parser
+
+
+def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> Parser:
+    command = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".", allow_abbrev=False)
+    command.set_defaults(parser=command)
+    return command
+
+
+def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
+    solve = _add(commands, "solve", "search a problem for its front, fly every point, save the front")
+    solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
+    solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
+    solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
+    solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
+    solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
+    solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, march, ipopt, ... (default: the problem's own)")
+    solve.add_argument(
+        "--start", metavar="KIND", help="first candidates: smooth about the guess, or uniform, without it (default: the problem's own)"
+    )
+    solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
+    solve.add_argument(
+        "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"
+    )
+    solve.add_argument(
+        "--polish-on",
+        metavar="T",
+        help="polish the front on this transcription by gradients in the end, so that its points hold when flown",
+    )
+    solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
+    solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
+    solve.add_argument("--plot", metavar="FRONT.png", help="draw the front too")
+
+
+def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
+    show = _add(commands, "show", "a saved front: its table, a picture, an export")
+    show.add_argument("front", metavar="FRONT.nc")
+    show.add_argument("--point", metavar="I", type=int, help="only this point, in detail; --plot draws its flight")
+    show.add_argument("--plot", metavar="FILE.png", help="draw it")
+    show.add_argument("--csv", metavar="FILE", help="export objectives and decisions")
+
+
+def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
+    verify = _add(commands, "verify", "check every point of a saved front and fly it anew; exit 1 if any fails")
+    verify.add_argument("front", metavar="FRONT.nc")
+    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not say where to find it")
+    verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
+    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+
+
+def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
+    study = _add(commands, "study", "batches of runs: make what is missing of them, see how they stand")
+    study.formatter_class = argparse.RawDescriptionHelpFormatter
+    study.description = STUDY
+    actions = study.add_subparsers(dest="action", metavar="ACTION", required=True, parser_class=Parser)
+    run = _add(actions, "run", "make the runs that are missing; the same again resumes where it stopped")
+    run.add_argument("study", metavar="STUDY", help="a name of `macs list`, or a TOML file")
+    run.add_argument("--out", metavar="DIR", help="the study's folder (default: out/NAME)")
+    run.add_argument("--runs", metavar="N", type=_positive, help="so many of each cell (default: the study's own)")
+    run.add_argument("--jobs", metavar="N", type=_positive, help="processes of this machine that work at a time (default: 1)")
+    run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
+    run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
+    run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
+    status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
+    status.add_argument("folder", metavar="DIR")
+    report = _add(actions, "report", "tables, statistics and figures of what there is, in DIR/report")
+    report.add_argument("folder", metavar="DIR")
+    report.add_argument("--no-figures", action="store_true", help="tables only, which is quicker")
+    report.add_argument(
+        "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
+    )
+
+
+def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
+    bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
+    bench.formatter_class = argparse.RawDescriptionHelpFormatter
+    bench.description = BENCH
+    bench.add_argument("what", metavar="inner|population|search|study", nargs="?", help="which one (default: all)")
+    bench.add_argument(
+        "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
+    )
+    bench.add_argument("--csv", metavar="FILE", help="write what was measured to a file too, one number a line")
+
+
+def _unknown_option(word: str, parser: Parser) -> str:
+    options = [option for option in parser._option_string_actions if option.startswith("--")]
+    near = difflib.get_close_matches(word.split("=")[0], options, n=1)
+    if near:
+        return f"unknown option {word}; did you mean {near[0]}?"
+    return f"unknown argument '{word}'; there are {', '.join(options)}"
+
+
+def _positive(text: str) -> int:
+    return _number(text, int, "a whole number above 0", lambda value: value > 0)
+
+
+def _natural(text: str) -> int:
+    return _number(text, int, "a whole number, 0 or above", lambda value: value >= 0)
+
+
+def _tolerance(text: str) -> float:
+    return _number(text, float, "a number above 0", lambda value: 0 < value < float("inf"))
+
+
+def _number(text: str, kind: Callable[[str], Any], what: str, fits: Callable[[Any], bool]) -> Any:
+    try:
+        value = kind(text)
+    except ValueError:
+        value = None
+    if value is None or not fits(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not {what}")
+    return value

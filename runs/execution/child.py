@@ -1,0 +1,170 @@
+"""A process of one's own for runs that may crash, hang, or eat all the memory: it is watched, ended and started anew."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .task import KILLED, TIMEOUT, Outcome, Report, Task
+
+GRACE = 0.5
+"""Seconds beyond its limit in which a run that hangs says where."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS")
+"""All 1 in the process: more would round differently from machine to machine, and take the cores of other runs."""
+SAID = 4000
+"""Characters kept of the last words of a process that died."""
+
+
+class Child:
+    """One process and what it is at; for one thread, but `close` may be called from any."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._closed = False
+        self._lock = threading.Lock()
+
+    def perform(self, task: Task, report: Report | None = None) -> Outcome:
+        """Make a run. One whose process is killed from outside is begun once more; after that, it is an outcome."""
+        outcome = self._attempt(task, report)
+        if outcome.status == KILLED and not self._closed:
+            outcome = self._attempt(task, report)
+        return outcome
+
+    def close(self) -> None:
+        """End the process, now, whatever it is at; nothing more can be asked of it."""
+        with self._lock:
+            self._closed = True
+        self._end()
+
+    def _attempt(self, task: Task, report: Report | None) -> Outcome:
+        if not self._begin(task):
+            return self._killed(0.0)
+        began = time.perf_counter()
+        while True:
+            left = None if task.time_limit is None else max(0.0, began + task.time_limit + GRACE - time.perf_counter())
+            try:
+                message = self._inbox.get(timeout=left)
+            except queue.Empty:
+                self._end()
+                seconds = time.perf_counter() - began
+                return Outcome(TIMEOUT, f"it took more than {task.time_limit:g} s", self._text(), wall_time=seconds)
+            if message is None:
+                return self._killed(time.perf_counter() - began)
+            if message[0] == "outcome":
+                return message[1]
+            if message[0] == "report" and report is not None:
+                report(*message[1:])
+
+    def _begin(self, task: Task) -> bool:
+        """Have the process begin a task; one that is gone by now, as after a long time without any, is replaced."""
+        for _ in range(2):
+            with self._lock:
+                if self._closed:
+                    return False
+                if self._process is None:
+                    self._start()
+                process = self._process
+            assert process is not None and process.stdin is not None
+            self._words.truncate(0)
+            try:
+                pickle.dump(task, process.stdin)
+                process.stdin.flush()
+                if self._inbox.get() is not None:
+                    return True
+            except OSError:
+                pass
+            self._reap()
+        return False
+
+    def _start(self) -> None:
+        self._words = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - as long as the process
+        self._inbox = queue.SimpleQueue()
+        places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "runs.execution.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._words,
+            env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": places},
+            start_new_session=True,
+        )
+        threading.Thread(target=_listen, args=(self._process.stdout, self._inbox), daemon=True).start()
+
+    def _killed(self, seconds: float) -> Outcome:
+        """What to say of a process that died."""
+        if self._closed:
+            return Outcome(KILLED, "the study was stopped", wall_time=seconds)
+        code = self._reap()
+        reason = f"its process ended with exit code {code}"
+        if code < 0:
+            reason = f"its process was killed by {_signal(-code)}{', perhaps for want of memory' if code == -signal.SIGKILL else ''}"
+        return Outcome(KILLED, reason, self._text(), wall_time=seconds)
+
+    def _reap(self) -> int:
+        """The exit code of a process that has ended, or is about to."""
+        process = self._process
+        if process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=5.0)
+            self._end()
+        return 0 if process is None or process.returncode is None else process.returncode
+
+    def _end(self) -> None:
+        """Kill the process and all that it started."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is None:
+            return
+        if hasattr(os, "killpg"):
+            # It leads a group of its own: also a compiler that it may just be calling ends.
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with suppress(OSError, ValueError):
+                    pipe.close()
+
+    def _text(self) -> str:
+        """What the process said last."""
+        self._words.seek(0)
+        return self._words.read().decode(errors="replace")[-SAID:].strip()
+
+
+def _listen(channel: Any, inbox: queue.SimpleQueue[Any]) -> None:
+    """Pass on what a process says; None when it says no more."""
+    try:
+        while True:
+            inbox.put(pickle.load(channel))
+    except Exception:  # whatever a process's last, half word provokes: it is gone
+        inbox.put(None)
+
+
+def _signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
+_own = threading.local()
+
+
+def perform_apart(task: Task) -> Outcome:
+    """Make a run in a process of its own, which the thread that asks keeps for its next one: what an executor's workers are given."""
+    if not hasattr(_own, "child"):
+        _own.child = Child()
+    return _own.child.perform(task)

@@ -1,0 +1,92 @@
+"""How a run went: its archive at some counts, noted as it goes, and kept beside its checkpoint so that a run that goes on has all of it."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from macs.fronts.files import write_whole
+
+COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
+NUMBER = 30
+"""At how many evaluation counts, at most and evenly spaced, the archive is noted, besides the end."""
+EVERY = 0.25
+"""Seconds between reports."""
+
+log = logging.getLogger(__name__)
+
+Report = Callable[[int, float], Any]
+"""Called now and then with evaluations and seconds spent so far."""
+
+
+class Samples:
+    """Notes the archive at some counts, and reports now and then; costs next to nothing.
+
+    Parameters
+    ----------
+    budget : int
+        Evaluations of the run.
+    report : callable, optional
+    path : Path, optional
+        A file in which they are kept. Those in it that a run which goes on comes by once more are made anew.
+
+    Attributes
+    ----------
+    columns : dict
+        "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample; see `work.Outcome`.
+    """
+
+    def __init__(self, budget: int, report: Report | None = None, path: Path | None = None) -> None:
+        self._step, self._next, self._report, self._told, self._path = max(1, budget // NUMBER), 0, report, 0.0, path
+        self.columns: dict[str, list[Any]] = {key: [] for key in (*COUNTS, "elapsed", "F")}
+        self._before, self._behind = _read(path), False
+
+    def note(self, progress: Any) -> None:
+        """To be called after every iteration."""
+        self._take_up(progress.evaluations)
+        if progress.evaluations >= self._next:
+            self._next = (progress.evaluations // self._step + 1) * self._step
+            self.add(vars(progress), progress.elapsed, progress.F)
+            self._behind = self._path is not None
+        if self._behind:
+            self._write()
+        if self._report is not None and progress.elapsed - self._told >= EVERY:
+            self._told = progress.elapsed
+            self._report(progress.evaluations, progress.elapsed)
+
+    def add(self, counts: Any, elapsed: float, F: Any) -> None:
+        """One more."""
+        self._take_up(counts["evaluations"] + 1)
+        for key in COUNTS:
+            self.columns[key].append(int(counts[key]))
+        self.columns["elapsed"].append(float(elapsed))
+        self.columns["F"].append(F.tolist())
+
+    def _take_up(self, evaluations: int) -> None:
+        """At first: what was noted before this count."""
+        if self._before is None:
+            return
+        count = sum(before < evaluations for before in self._before["evaluations"])
+        self.columns, self._before = {key: self._before[key][:count] for key in self.columns}, None
+        if count:
+            self._next = (self.columns["evaluations"][-1] // self._step + 1) * self._step
+
+    def _write(self) -> None:
+        assert self._path is not None
+        try:
+            write_whole(self._path, json.dumps(self.columns).encode())
+            self._behind = False
+        except OSError as error:  # as for a checkpoint: no reason to stop, and the next time it may be possible
+            log.warning("%s", error)
+
+
+def _read(path: Path | None) -> dict[str, list[Any]] | None:
+    """What a file holds; None if there is none, or it is damaged: then the history begins where the run goes on."""
+    try:
+        columns = None if path is None else json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return columns if isinstance(columns, dict) and columns.keys() == {*COUNTS, "elapsed", "F"} else None

@@ -1,0 +1,152 @@
+"""One run, in whatever process: a task goes in, an outcome comes out, both plain data."""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import time
+import traceback
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from macs.solvers.checkpoint import Unreadable, keeps
+
+from ..measures.simulation_record import record
+from .samples import Report, Samples
+
+if TYPE_CHECKING:
+    from macs.front import Front
+    from macs.solvers.solver import Solver
+    from transcription import Smooth
+
+log = logging.getLogger(__name__)
+
+FINISHED, CRASHED, TIMEOUT, MEMORY, KILLED = "finished", "crashed", "timeout", "out of memory", "killed"
+
+Payload = tuple[bytes, bytes]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled.
+
+    `checkpoint` is the file that it is kept in while it lasts, where whoever makes it can write to that folder, as on this machine or on
+    a cluster with one file system.
+    """
+
+    payload: Payload = field(repr=False)
+    evaluations: int
+    seed: int
+    inner: str
+    tolerance: float
+    time_limit: float | None
+    start: Smooth | str | None = None
+    verify: float | None = None
+    checkpoint: Path | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run.
+
+    Attributes
+    ----------
+    status : str
+        "finished", "crashed" (by an exception), "timeout", "out of memory" or "killed".
+    message, traceback : str
+        Why it is not finished, in a line and in full.
+    front : bytes
+        The content of its front's file, if it is finished.
+    wall_time : float
+        Seconds, as far as it came.
+    history : dict
+        "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
+        minimised. The last sample is the front itself.
+    flown : dict
+        If the points of the front were to be flown: see `flown.record`.
+    """
+
+    status: str
+    message: str = ""
+    traceback: str = field(default="", repr=False)
+    front: bytes = field(default=b"", repr=False)
+    wall_time: float = 0.0
+    history: dict[str, list[Any]] = field(default_factory=dict, repr=False)
+    flown: dict[str, Any] = field(default_factory=dict, repr=False)
+
+
+def perform(task: Task, report: Report | None = None) -> Outcome:
+    """Make a run here and now, or what is left of it. An exception is an outcome."""
+    began = time.perf_counter()
+    try:
+        problem, scheme = _unpacked(task.payload[0])
+        solver = pickle.loads(task.payload[1])
+        front, samples = _solved(task, solver, problem, scheme, report)
+        from macs.fronts.files import to_bytes
+        from macs.solvers.run import ENDED
+
+        if front.stats["stopped"] not in ENDED:
+            return Outcome(KILLED, f"it was stopped: {front.stats['stopped']}", wall_time=time.perf_counter() - began)
+        content = to_bytes(front)
+        samples.add(front.stats, front.stats["wall_time"], front.F)
+        # What was spent before it was taken up again is known to the front alone.
+        seconds = max(time.perf_counter() - began, front.stats["wall_time"])
+        flights = _flown(task, front)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=flights)
+    except Exception as error:
+        status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
+        return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
+
+
+def samples_path(checkpoint: Path) -> Path:
+    """Where a run's samples are kept, beside its checkpoint."""
+    return checkpoint.with_suffix(".samples")
+
+
+def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, Samples]:
+    """The front, and how it came about. A checkpoint that is of no use any more is begun anew."""
+    kept = task.checkpoint if task.checkpoint and os.access(task.checkpoint.parent, os.W_OK | os.X_OK) and keeps(solver) else None
+    while True:
+        samples = Samples(task.evaluations, report, samples_path(kept) if kept else None)
+        try:
+            front = solver.solve(
+                problem,
+                scheme,
+                evaluations=task.evaluations,
+                seed=task.seed,
+                inner=task.inner,
+                tolerance=task.tolerance,
+                start=task.start,
+                callback=samples.note,
+                checkpoint=kept,
+            )
+        except Unreadable as error:
+            assert kept is not None
+            log.warning("%s: it is begun anew", error)
+            kept.unlink()
+        else:
+            return front, samples
+
+
+def _flown(task: Task, front: Front) -> dict[str, Any]:
+    """What the points turn out to be in the air, if that is wanted. If it cannot be found out, the run is none the worse for it."""
+    if task.verify is None:
+        return {}
+    try:
+        return record(front, task.verify)
+    except Exception:
+        log.warning("the points of a front could not be flown; the report will try again", exc_info=True)
+        return {}
+
+
+@lru_cache(maxsize=8)
+def _unpacked(payload: bytes) -> tuple[Any, Any]:
+    """Problem and transcription; the runs that one process makes of them share an NLP, and all that is compiled of it."""
+    problem, scheme = pickle.loads(payload)
+    nlp = scheme.transcribe(problem)
+    # It hides the method in this one value, which nobody else has.
+    object.__setattr__(scheme, "transcribe", lambda _: nlp)
+    return problem, scheme

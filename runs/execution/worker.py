@@ -1,0 +1,73 @@
+"""A process that makes one run after the other, `python -m runs.execution.worker`: tasks come in on stdin, reports and outcomes go out on
+stdout.
+
+Whatever a user's problem prints goes to stderr, so does the traceback of a crash or of a run that is taking too long. It ends when nobody
+can want anything more of it: as soon as stdin is closed, also in the middle of a run, and after a while without a task.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import pickle
+import queue
+import sys
+import threading
+from typing import Any
+
+# All that a run needs is there before the first one begins: its time is its own.
+import h5netcdf  # noqa: F401
+
+import macs.fronts.files  # noqa: F401
+
+from .task import perform
+
+PATIENCE = 60.0
+"""Seconds without a task after which it ends."""
+
+
+def main() -> None:
+    """Serve until there is no more to do."""
+    channel = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    faulthandler.enable()
+    tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), tasks), daemon=True).start()
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+
+    def say(*words: Any) -> None:
+        pickle.dump(words, channel)
+        channel.flush()
+
+    while True:
+        try:
+            task = tasks.get(timeout=PATIENCE)
+        except queue.Empty:
+            return
+        if task.time_limit is not None:
+            faulthandler.dump_traceback_later(task.time_limit)
+        say("began")
+        outcome = perform(task, lambda evaluations, elapsed: say("report", evaluations, elapsed))
+        faulthandler.cancel_dump_traceback_later()
+        say("outcome", outcome)
+
+
+def _listen(channel: Any, tasks: queue.SimpleQueue[Any]) -> None:
+    """Pass tasks on; whoever sends them is gone when there are no more."""
+    try:
+        while True:
+            tasks.put(pickle.load(channel))
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    # Ctrl-C is for whoever started this.
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        main()
+    except BrokenPipeError:
+        os._exit(0)
+    sys.exit(0)

@@ -1,0 +1,215 @@
+"""Flights side by side: the states and controls of a few points of a front, beside laws that are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from textwrap import wrap
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from macs.evaluation.evaluator import CONVERGED
+from macs.front import Front
+from macs.fronts.flight_plot import along, quantities
+from macs.fronts.front_plot import COLORS, label
+from macs.pareto.archive import spread
+from macs.point import Point
+
+from ..measures.indicators import normalised
+from .style import COLUMN, PAGE, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Law = Mapping[str, np.ndarray]
+"""A flight that is known: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
+
+Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
+
+Laws = Mapping[str, Sequence[Law | None]]
+"""What such flights are called -> one for each point, None where there is none."""
+
+DASHES: Sequence[Any] = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+"""Of the first laws, the second, ..."""
+
+
+def representatives(front: Front, count: int = 4) -> list[int]:
+    """Numbers of `count` converged points that stand for a front: the best of each objective, and others spread evenly between them."""
+    good = np.flatnonzero(front.status == CONVERGED)
+    F = front.F[good]
+    if len(F) <= count:
+        return good.tolist()
+    return sorted(good[spread(normalised(F, F)[0], count)].tolist())
+
+
+def flights_figure(
+    points: Sequence[Point],
+    *,
+    laws: Laws = MappingProxyType({}),
+    names: Sequence[str] = (),
+    solver: str = "",
+) -> Figure:
+    """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
+
+    Parameters
+    ----------
+    points : Points of one problem, of one to six
+        With trajectories.
+    laws : {name: as many flights, or None}
+        What to draw beside each point, dashed; quantities that a flight does not hold are left out.
+    names : sequence of str, optional
+        Which states, controls and path constraints to draw, in that order; all states and controls by default.
+    solver : str
+        For the legend.
+
+    Raises
+    ------
+    ValueError
+        If there is no point, or one has no trajectory, or has not what is asked for.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    _check(points, laws)
+    # What `_check` let pass has trajectories.
+    flights = [point.trajectory for point in points if point.trajectory is not None]
+    known = dict(quantities(flights[0]))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"there is no '{unknown[0]}' to draw; there are {', '.join(known)}")
+    rows = list(names) or [name for name, kind in known.items() if kind != "path"]
+    units = _units(points[0])
+    with style():
+        figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
+        grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
+        for column, (point, flight) in enumerate(zip(points, flights, strict=True)):
+            for ax, name in zip(grid[:, column], rows, strict=True):
+                for k, phase in enumerate(flight.phases):
+                    if name in phase.names:
+                        ax.plot(*along(phase, name), color=COLORS[k % len(COLORS)], lw=1.3)
+                for dashes, beside in zip(DASHES, laws.values(), strict=False):
+                    if (law := beside[column]) is not None and name in law:
+                        ax.plot(law["time"], law[name], color="black", lw=0.9, ls=dashes, zorder=3)
+                ax.margins(x=0.0)
+            grid[0, column].set_title(_title(column + 1, point, round(75 / len(points)) + 10), loc="left", fontsize=6.5)
+        for ax, name in zip(grid[:, 0], rows, strict=True):
+            ax.set_ylabel(label(name, units.get(name, "")))
+            ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        for ax in grid[-1]:
+            ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        figure.align_ylabels(grid[:, 0])
+        unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
+        figure.supxlabel(label("time", unit), fontsize=8)
+        _legend(figure, flights[0], [name for name, beside in laws.items() if any(law is not None for law in beside)], solver)
+    return figure
+
+
+def paths_figure(
+    points: Sequence[Point],
+    across: Quantity,
+    up: Quantity,
+    *,
+    xlabel: str = "",
+    ylabel: str = "",
+    laws: Laws = MappingProxyType({}),
+    equal: bool = False,
+) -> Figure:
+    """The paths of a few points in one picture: a quantity of the flight over another, a colour each.
+
+    Parameters
+    ----------
+    points, laws
+        As of `flights_figure`.
+    across, up : name of a state or control, or a function of all of them
+        The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. Where a law holds not all that it
+        takes, it is not drawn.
+    xlabel, ylabel : str
+        Needed for functions; of a state or control, its name and unit by default.
+    equal : bool
+        Whether both axes have the same scale.
+    """
+    _check(points, laws)
+    with style():
+        figure = new_figure(COLUMN, 2.7)
+        ax = figure.subplots()
+        for i, point in enumerate(points):
+            phases = point.trajectory.phases if point.trajectory is not None else ()
+            for k, phase in enumerate(phases):
+                values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
+                x, y = _of(values, across), _of(values, up)
+                name = f"point {i + 1}" if k == 0 else None
+                # Where paths coincide the first are on top, and a dot says where each ends.
+                look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
+                ax.plot(x, y, lw=1.3, label=name, **look)
+                if k == len(phases) - 1:
+                    end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
+                    ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
+        units = _units(points[0])
+        ax.set_xlabel(xlabel or label(str(across), units.get(str(across), "")))
+        ax.set_ylabel(ylabel or label(str(up), units.get(str(up), "")))
+        if equal:
+            ax.set_aspect("equal", adjustable="datalim")
+        for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
+            drawn = [law for law in beside if law is not None and _holds(law, across) and _holds(law, up)]
+            for i, law in enumerate(drawn):
+                line = _of(law, across), _of(law, up)
+                ax.plot(*line, color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
+        ax.legend(frameon=False, loc="best")
+    return figure
+
+
+def _of(values: Mapping[str, np.ndarray], quantity: Quantity) -> np.ndarray:
+    if callable(quantity):
+        return quantity(values)
+    if quantity not in values:
+        raise ValueError(f"there is no '{quantity}' to draw; there are {', '.join(values)}")
+    return values[quantity]
+
+
+def _holds(values: Mapping[str, np.ndarray], quantity: Quantity) -> bool:
+    """Whether a law says all that a quantity takes."""
+    if not callable(quantity):
+        return quantity in values
+    try:
+        quantity(values)
+    except KeyError:
+        return False
+    return True
+
+
+def _units(point: Point) -> dict[str, str]:
+    """Units of the states and controls, by name."""
+    phases = point.trajectory.phases if point.trajectory is not None else ()
+    return {v.name: v.unit for phase in phases for v in (*phase.state_variables, *phase.control_variables)}
+
+
+def _check(points: Sequence[Point], laws: Laws) -> None:
+    if not 1 <= len(points) <= 6:
+        raise ValueError(f"flights are drawn side by side of one to six points, not of {len(points)}")
+    for number, point in enumerate(points, 1):
+        if point.trajectory is None:
+            raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
+    if len(laws) > len(DASHES):
+        raise ValueError(f"at most {len(DASHES)} laws are drawn beside points, not {len(laws)}")
+    for name, beside in laws.items():
+        if len(beside) != len(points):
+            raise ValueError(f"{name}: {len(beside)} laws do not stand beside {len(points)} points; give None where there is none")
+
+
+def _title(number: int, point: Point, width: int) -> str:
+    """The point's number and objectives, in lines of at most so many characters."""
+    goals = point._front.goals
+    values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
+    lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
+    return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
+
+
+def _legend(figure: Any, flight: Any, laws: Sequence[str], solver: str) -> None:
+    """Phases if there are several; else the solver, if it is named; and the laws."""
+    from matplotlib.lines import Line2D
+
+    named = list(flight) if len(flight) > 1 else [solver] if solver or laws else []
+    handles = [Line2D([], [], color=COLORS[k % len(COLORS)], lw=1.3, label=name or "found") for k, name in enumerate(named)]
+    handles += [Line2D([], [], color="black", lw=0.9, ls=dashes, label=law) for dashes, law in zip(DASHES, laws, strict=False)]
+    if handles:
+        figure.legend(handles=handles, loc="outside upper right", ncols=len(handles), frameon=False)

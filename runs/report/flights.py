@@ -1,0 +1,214 @@
+"""The flights that stand for a front, beside what is known of the best: analytic laws, and each objective optimised alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from macs.evaluation.evaluator import CONVERGED
+from macs.front import Front
+from macs.fronts.flight_plot import along
+from macs.fronts.front_plot import label
+from macs.gradient_tools import payoff
+from macs.point import Point
+from problems import load
+from transcription import SingleShooting, from_dict, parse, word
+
+from ..measures.given import Reference
+from ..measures.indicators import pieces, truth
+from ..measures.references import room
+from .comparison import Ground
+from .flight_plots import Law, flights_figure, paths_figure, representatives
+from .plots import front_figure
+from .style import style
+from .tables import Cell, Column, Table, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MANY = 100
+LAW, ALONE = "known law", "single objective"
+"""What dashed and dotted lines are; a case may have a `LAW` of its own."""
+OBLONG = 4.0
+"""Tracks whose sides have one unit are drawn to one scale, unless one is longer than this many times the other."""
+BETTER = 1e-6
+"""Shares of a range by which a point may be better than the truth before that wants a word."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flights:
+    """Attributes
+    ----------
+    ground : Ground
+    reference : Reference
+    solver : str
+        Whose front they are of: that of the first solver that found any, all its runs together.
+    points : tuple of Point
+    many : sequence of Point
+        Up to a hundred of that front, for pictures of a population.
+    room : module or None
+        Where the problem comes from, see `references.room`.
+    laws : name -> as many flights, None where there is none
+    ends : Front
+        The best of each objective alone, by gradients, on the same transcription where that is made for them; empty where there is none.
+    note : str
+        Why there are no ends; mostly nothing.
+    """
+
+    ground: Ground
+    reference: Reference
+    solver: str
+    points: tuple[Point, ...]
+    many: Sequence[Point]
+    room: ModuleType | None
+    laws: Mapping[str, Sequence[Law | None]]
+    ends: Front
+    note: str
+
+    @classmethod
+    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
+        """Those of a ground; None where nobody found any."""
+        for solver in ground.runs:
+            fronts = [front for front in ground.fronts[solver] if len(front)]
+            if fronts and fronts[0][0].trajectory is not None:
+                front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
+                points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
+                source = front.source
+                named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
+                place = room(source.address) if source is not None and named else None
+                ends, note = _ends(front)
+                laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
+                return cls(ground, reference, solver, points, many, place, laws, ends, note)
+        return None
+
+    def table(self) -> Table:
+        """Their objectives; with two of them, the best of the second that is known for the first; and each objective alone."""
+        goals = self.ground.known.goals
+        curve = self._curve()
+        heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
+        heads += (
+            [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
+            if curve is not None
+            else []
+        )
+        rows: list[list[Cell]] = []
+        for number, point in enumerate(self.points, 1):
+            rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
+        for goal, end in zip(goals, self.ends, strict=False):
+            rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
+        told = [f"Of {self.solver}, all runs together."]
+        if len(self.ends):
+            told[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
+        if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
+            told.append(
+                f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."
+            )
+        return table(heads, rows, f"{self.ground.name}: solutions that stand for the front.", [*told, *([self.note] if self.note else [])])
+
+    def figures(self) -> dict[str, Figure]:
+        """Name of a file -> figure."""
+        found = {
+            "representatives": front_figure(
+                {self.solver: self.ground.fronts[self.solver]},
+                reference=self.reference.front,
+                marked=np.array([list(point.objectives.values()) for point in self.points]),
+                truth_name=self._truth,
+            ),
+            "flights": flights_figure(self.points, laws=self.laws, solver=self.solver),
+        }
+        plot = getattr(self.room, "plot", None)
+        if plot is not None and self.many:
+            with style():
+                found |= plot(self.many)
+        track = getattr(self.room, "track", None)
+        if track is not None:
+            tracks = [track(flown(point)) for point in self.points]
+            across, up = tracks[0]
+            found["paths"] = paths_figure(
+                self.points,
+                lambda v: track(v)[across],
+                lambda v: track(v)[up],
+                xlabel=across,
+                ylabel=up,
+                laws={name: flights for name, flights in self.laws.items() if name != ALONE},
+                equal=_alike(tracks),
+            )
+        return found
+
+    @property
+    def _truth(self) -> str:
+        return "truth" if self.reference.true else "reference"
+
+    def _curve(self) -> np.ndarray | None:
+        """The reference, minimised, where it is one curve of two objectives."""
+        R = truth(self.reference.front, self.ground.known)
+        return R if len(pieces(R)) == 1 else None
+
+    def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:
+        """The second objective of the reference at the first of a point, and how much worse the point is, in ranges."""
+        if curve is None:
+            return []
+        signs = [goal.sign for goal in self.ground.known.goals]
+        first, second = (sign * value for sign, value in zip(signs, point.objectives.values(), strict=True))
+        known = float(np.interp(first, *curve.T))
+        return [signs[1] * known, (second - known) / float(np.ptp(curve[:, 1]))]
+
+
+def _alike(tracks: Sequence[Mapping[str, np.ndarray]]) -> bool:
+    """Whether tracks are to be drawn to one scale."""
+    across, up = tracks[0]
+    lengths = [float(np.ptp(np.concatenate([one[side][np.isfinite(one[side])] for one in tracks]))) for side in (across, up)]
+    units = {side.rpartition("[")[2] for side in (across, up)}
+    return len(units) == 1 and max(lengths) <= OBLONG * min(lengths)
+
+
+def flown(point: Point) -> dict[str, np.ndarray]:
+    """States and controls of a point by name, and "time", from end to end; NaN between elements, and in phases that do not have them."""
+    phases = point.trajectory.phases if point.trajectory is not None else ()
+    names = list(dict.fromkeys(v.name for phase in phases for v in (*phase.state_variables, *phase.control_variables)))
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in ("time", *names)}
+    for phase in phases:
+        own = [v.name for v in (*phase.state_variables, *phase.control_variables)]
+        times = along(phase, own[0])[0]
+        parts["time"].append(times)
+        for name in names:
+            parts[name].append(along(phase, name)[1] if name in own else np.full(len(times), np.nan))
+    return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def _ends(front: Front) -> tuple[Front, str]:
+    """Each objective optimised alone, on the transcription of a front or, if that is single shooting, on the case's own; or why not."""
+    try:
+        problem, method = front.compiled(), from_dict(front[0].transcription or {})
+        if isinstance(method, SingleShooting):
+            # Its derivatives are dense: with hundreds of nodes they take minutes, and lead nowhere where flights are unstable.
+            source = front.source
+            if source is None or not source.address:
+                return front[:0], "Objectives were not optimised alone: single shooting is not made for gradients."
+            method = parse(load(source.address, **source.data).default_transcription)
+    except ValueError as error:
+        return front[:0], f"Objectives were not optimised alone: {error}."
+    found = payoff(problem, method)
+    failed = [goal.name for goal, status in zip(front.goals, found.status, strict=True) if status != CONVERGED]
+    return found, f"Alone, {', '.join(failed)} did not converge." if failed else ""
+
+
+def _laws(place: ModuleType | None, points: Sequence[Point]) -> list[Law | None]:
+    """The best flights of the same durations, where the case knows them."""
+    law: Callable[[float], Law] | None = getattr(place, "optimal_flight", None)
+    if law is None:
+        return [None] * len(points)
+    return [law(float(point.trajectory.phases[-1].time[-1])) if point.trajectory is not None else None for point in points]
+
+
+def _alone(points: Sequence[Point], ends: Front) -> list[Law | None]:
+    """Beside the best point of each objective, that objective optimised alone."""
+    found: list[Law | None] = [None] * len(points)
+    for k, end in enumerate(ends):
+        if end.status == CONVERGED:
+            found[int(np.argmin([point.F[k] for point in points]))] = flown(end)
+    return found

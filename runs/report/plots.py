@@ -1,0 +1,270 @@
+"""Figures of studies: collective fronts, attainment surfaces, convergence. At the width of a column, without a display.
+
+Every function returns a matplotlib `Figure` of no window; `figure.savefig` writes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from macs.front import Front
+from macs.fronts.front_plot import COLORS, GREY, better
+from problems.compiled import Objective
+
+from ..measures.attainment import Attainment, staircase
+from ..measures.convergence import History, band
+from ..measures.indicators import Points, minimised, pieces, truth
+from .style import COLUMN, PAGE, legend, new_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MARKERS = "o^sDvPX*"
+"""One more than there are colours, so that of nine solvers no two look alike."""
+
+
+def front_figure(
+    fronts: Mapping[str, Sequence[Points]],
+    *,
+    reference: Points | None = None,
+    goals: Sequence[Objective] = (),
+    marked: Points | None = None,
+    truth_name: str = "truth",
+) -> Figure:
+    """All points of all runs: one colour and marker a solver, the truth as a line where it is dense.
+
+    Parameters
+    ----------
+    fronts : solver -> a front for each run
+        Fronts, or arrays (n, m) in the user's units and senses, m >= 2. Of more than two objectives, there is a panel for each two of them.
+    reference : Front or array, optional
+    goals : m Objectives, optional
+        Names, units and senses; needed if no front is a `Front`, else all columns are minimised and have no names.
+    marked : Front or array, optional
+        Points to mark by crosses and numbers from 1: those that another figure shows the flights of.
+    truth_name : str
+        What the legend calls the reference.
+    """
+    known = _known([*(front for runs in fronts.values() for front in runs), reference], goals)
+    m = len(known.goals)
+    pairs = list(combinations(range(m), 2))
+    columns = min(3, len(pairs))
+    rows = -(-len(pairs) // columns)
+    with style():
+        figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.3 * rows + 0.3)
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for ax, (i, j) in zip(grid, pairs, strict=True):
+            if reference is not None:
+                _draw_truth(ax, truth(reference, known) * _signs(known), _signs(known), (i, j), truth_name)
+            for k, (solver, runs) in enumerate(fronts.items()):
+                if not runs:  # none is finished; whoever comes after has the colour that is its own in all figures
+                    continue
+                points = [minimised(front, known) * _signs(known) for front in runs]
+                name = _runs(solver, len(runs), sum(not len(part) for part in points))
+                every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])
+                points_style = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
+                ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
+            if marked is not None:
+                _mark(ax, minimised(marked, known) * _signs(known), _signs(known), (i, j))
+            _label(ax, known, i, j)
+        legend(figure, grid[0], "best" if len(pairs) == 1 else None)
+    return figure
+
+
+def attainment_figure(
+    surfaces: Mapping[str, Attainment],
+    *,
+    goals: Sequence[Objective] = (),
+    reference: Points | None = None,
+    truth_name: str = "truth",
+) -> Figure:
+    """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
+
+    What lies between best and worst is shaded. A surface that is empty, because runs are, is not there, and the legend says so.
+
+    Parameters
+    ----------
+    surfaces : solver -> Attainment
+    goals : 2 Objectives, optional
+        Names, units and senses.
+    reference : Front or array, optional
+        In the user's units and senses.
+    """
+    signs = next(iter(surfaces.values())).signs
+    if len(signs) != 2:
+        raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(signs)}")
+    known = _known([], goals or [Objective(f"objective {i + 1}", sense="minimize" if s > 0 else "maximize") for i, s in enumerate(signs)])
+    corners = [surface.of(k) for surface in surfaces.values() for k in range(1, surface.runs + 1)]
+    if reference is not None:
+        corners.append(truth(reference, known) * signs)
+    every = np.vstack([*corners, np.zeros((0, 2))])
+    low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
+    margin = 0.04 * np.where(high > low, high - low, 1.0)
+    ends = np.where(signs > 0, high + margin, low - margin)
+    columns = min(3, len(surfaces))
+    rows = -(-len(surfaces) // columns)
+    with style():
+        figure = new_figure(COLUMN if columns == 1 else PAGE, 2.6 * rows)
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+        for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
+            if reference is not None:
+                _draw_truth(ax, truth(reference, known) * signs, signs, (0, 1), truth_name)
+            _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
+            ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
+            ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
+            _label(ax, known, 0, 1)
+            ax.label_outer()
+            ax.set_title(_runs(solver, surface.runs, 0), loc="left")
+            ax.legend(frameon=False, loc=_inside(signs))
+        for ax in grid[len(surfaces) :]:
+            ax.remove()
+    return figure
+
+
+def convergence_figure(
+    histories: Mapping[str, Sequence[History]],
+    *,
+    xlabel: str,
+    ylabel: str,
+    larger: bool = False,
+    log: bool = True,
+    inside: bool = True,
+) -> Figure:
+    """An indicator over what a run spends: the median of each solver's runs as a line, their quartiles as a band.
+
+    Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
+
+    Parameters
+    ----------
+    histories : solver -> (moments, values) for each run
+        As of `convergence.band`.
+    xlabel, ylabel : str
+        "evaluations", "inner iterations", "time [s]"; what the indicator is.
+    larger : bool
+        Whether larger values are better.
+    log : bool
+        Whether the indicator's axis is logarithmic; values that are not positive are then not drawn.
+    inside : bool
+        Whether the legend of a few solvers is within the axes, in the corner that an indicator leaves free as it converges.
+    """
+    with style():
+        figure = new_figure(COLUMN, 2.5)
+        ax = figure.subplots()
+        bands = {solver: band(runs, larger=larger) for solver, runs in histories.items()}
+        values = np.concatenate([part for b in bands.values() for part in (b.lower, b.median, b.upper)])
+        values = values[np.isfinite(values) & ((values > 0) | (not log))]
+        low, high = (values.min(), values.max()) if len(values) else (0.1, 1.0)
+        last = max(b.x[-1] for b in bands.values())
+        for k, (solver, b) in enumerate(bands.items()):
+            color = COLORS[k % len(COLORS)]
+            # A run that has ended keeps its front: its line goes on as far as the longest.
+            x = np.append(b.x, last)
+            lower, median, upper = (np.append(part, part[-1]) for part in (b.lower, b.median, b.upper))
+            outside = (low / 10, high * 10) if log else (2 * low - high - 1, 2 * high - low + 1)
+            ax.fill_between(
+                x,
+                np.nan_to_num(lower, neginf=outside[0], posinf=outside[1]),
+                np.nan_to_num(upper, neginf=outside[0], posinf=outside[1]),
+                step="post",
+                color=color,
+                alpha=0.2,
+                lw=0,
+            )
+            drawn = np.where(np.isfinite(median), median, np.nan)
+            ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
+        if log:
+            ax.set_yscale("log")
+            _log_ticks(ax, high / low)
+            ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
+        else:
+            ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
+        ax.set_xlim(0, last)
+        ax.set_xlabel(xlabel)
+        ax.set_ylabel(ylabel)
+        corner = "lower right" if larger else "upper right"
+        legend(figure, ax, corner if inside else None, "median, quartiles")
+    return figure
+
+
+def _log_ticks(ax: Any, ratio: float) -> None:
+    """Of less than two decades, plain numbers at 1, 2 and 5 of each; powers of ten otherwise."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if ratio < 100:
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio > 5 else tuple(range(1, 10))))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _known(points: Sequence[Points | None], goals: Sequence[Objective]) -> Front:
+    """A front, at need of no points, that says which objectives are drawn."""
+    found = next((one for one in points if isinstance(one, Front)), None)
+    if found is not None:
+        return found
+    if not goals:
+        m = next((one.shape[1] for one in points if isinstance(one, np.ndarray) and one.ndim == 2), 0)
+        goals = [Objective(f"objective {i + 1}") for i in range(m)]
+    if len(goals) < 2:
+        raise ValueError("there are no fronts of two or more objectives to draw")
+    return Front(F=[], decision=[], violation=[], status=[], goals=goals)
+
+
+def _signs(known: Front) -> np.ndarray:
+    return np.array([goal.sign for goal in known.goals])
+
+
+def _runs(solver: str, runs: int, empty: int) -> str:
+    """MACS, 30 runs (2 empty)."""
+    return f"{solver}, {runs} run{'' if runs == 1 else 's'}{f' ({empty} empty)' if empty else ''}"
+
+
+def _label(ax: Any, known: Front, i: int, j: int) -> None:
+    ax.set_xlabel(better(known.goals[i]))
+    ax.set_ylabel(better(known.goals[j]))
+
+
+def _draw_truth(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
+    """A line for each piece of a dense reference of two objectives, else small points; beneath all else."""
+    i, j = pair
+    curves = pieces(values * signs)
+    for k, curve in enumerate(curves):
+        line = curve * signs
+        ax.plot(line[:, 0], line[:, 1], color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
+    if not curves:
+        ax.plot(values[:, i], values[:, j], ".", color=GREY, ms=2.0, zorder=1, label=name)
+
+
+def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int]) -> None:
+    """Crosses, and numbers on their better side, where no point can be in the way."""
+    i, j = pair
+    ax.plot(values[:, i], values[:, j], "+", color="black", ms=7, mew=1.0, zorder=5)
+    sides = {"ha": "right" if signs[i] > 0 else "left", "va": "top" if signs[j] > 0 else "bottom"}
+    for number, place in enumerate(values[:, [i, j]], 1):
+        ax.annotate(str(number), place, xytext=(-3 * signs[i], -3 * signs[j]), textcoords="offset points", fontsize=7, zorder=6, **sides)
+    ax.margins(0.07)
+
+
+def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -> None:
+    drawn = {}
+    for name, corners, look in (
+        ("best", surface.best, {"lw": 0.8, "ls": "--"}),
+        ("median", surface.median, {"lw": 1.4, "ls": "-"}),
+        ("worst", surface.worst, {"lw": 0.8, "ls": ":"}),
+    ):
+        if len(corners):
+            drawn[name] = staircase(corners, surface.signs, ends)
+            ax.plot(*drawn[name].T, color=color, label=name, zorder=4, **look)
+        else:
+            ax.plot([], [], color=color, label=f"{name}: not attained", **look)
+    if "best" in drawn and "worst" in drawn:
+        border = np.vstack([drawn["best"], drawn["worst"][::-1]])
+        ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)
+
+
+def _inside(signs: np.ndarray) -> str:
+    """The corner that a front leaves free: where everything is worst."""
+    return f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"

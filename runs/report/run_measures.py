@@ -1,0 +1,79 @@
+"""Every run of a ground in numbers: its indicators in the end and along the way, and what it spent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from macs.front import Front
+
+from ..batch.store import Run
+from ..measures.convergence import History
+from ..measures.given import Reference
+from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+from .comparison import Ground
+
+INDICATORS: Mapping[str, Callable[..., float]] = {
+    "GD": gd,
+    "IGD": igd,
+    "IGD+": igd_plus,
+    "hypervolume": hypervolume,
+    "additive epsilon": additive_epsilon,
+}
+CURVED = ("GD", "IGD", "IGD+")
+"""Those that take a dense reference for a curve, unless told not to."""
+AXES: Mapping[str, tuple[str, str]] = {
+    "evaluations": ("evaluations", "evaluations"),
+    "inner iterations": ("inner_iterations", "inner iterations"),
+    "time": ("elapsed", "time [s]"),
+}
+"""What a run spends: where its history has it, and the label of an axis."""
+
+
+def indicator(name: str, points: Front | np.ndarray, reference: Reference, *, curve: bool = True) -> float:
+    """An indicator of a front, or of objectives (n, m) in the user's units and senses."""
+    options = {"curve": curve} if name in CURVED else {}
+    return INDICATORS[name](points, reference.front, **options)
+
+
+def samples(ground: Ground, reference: Reference, *, curve: bool = True) -> dict[str, dict[str, list[float]]]:
+    """Indicator -> solver -> a value for each run, NaN for one that failed."""
+    return {
+        name: {
+            solver: [indicator(name, front, reference, curve=curve) for front in fronts] + [np.nan] * ground.failures.get(solver, 0)
+            for solver, fronts in ground.fronts.items()
+            if len(fronts) + ground.failures.get(solver, 0)
+        }
+        for name in INDICATORS
+    }
+
+
+def spent(ground: Ground) -> dict[str, dict[str, list[float]]]:
+    """Cost -> solver -> a value for each finished run."""
+    keys = {
+        "evaluations": "evaluations",
+        "inner iterations": "inner_iterations",
+        "gradient solves": "gradient_solves",
+        "time [s]": "wall_time",
+    }
+    return {
+        name: {solver: [float(run.front.stats[key]) for run in runs] for solver, runs in ground.runs.items() if runs}
+        for name, key in keys.items()
+    }
+
+
+def histories(ground: Ground, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:
+    """Solver -> of each run whose history is known, what it had spent and the indicator then."""
+    key, _ = AXES[axis]
+    return {
+        solver: told
+        for solver, runs in ground.runs.items()
+        if (told := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
+    }
+
+
+def _history(run: Run, reference: Reference, name: str, key: str) -> History:
+    signs = np.array([goal.sign for goal in reference.front.goals])
+    values = [indicator(name, np.reshape(F, (-1, len(signs))) * signs, reference) for F in run.history["F"]]
+    return np.array(run.history[key], dtype=float), np.array(values)

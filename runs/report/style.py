@@ -1,0 +1,53 @@
+"""How figures for papers look: widths, letters and legends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from macs.fronts.front_plot import STYLE, blank_figure
+
+COLUMN, PAGE = 3.5, 7.2
+"""Inches: the width of a column, and of a page of two."""
+PAPER: dict[str, Any] = {
+    **STYLE,
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.handlelength": 1.6,
+}
+
+
+def style() -> Any:
+    """A context in which figures are drawn as papers want them."""
+    import matplotlib
+
+    return matplotlib.rc_context(PAPER)  # type: ignore[arg-type]
+
+
+def new_figure(width: float, height: float) -> Any:
+    """A figure of no window."""
+    figure = blank_figure()
+    figure.set_size_inches(width, height)
+    return figure
+
+
+def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
+    """What is drawn in the axes: within them where there is a place for it and there are few, else above them."""
+    handles, names = ax.get_legend_handles_labels()
+    look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
+    if place and len(names) <= 4:
+        ax.legend(handles, names, loc=place, **look)
+    else:
+        for columns in range(min(len(names), 6), 0, -1):
+            above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
+            if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
+                break
+            above.remove()
+        rows = -(-len(names) // columns) + bool(title)
+        figure.set_figheight(figure.get_figheight() + 0.16 * rows)

@@ -1,0 +1,200 @@
+"""One table, three ways to write it: as text for terminals, as CSV for programs, as LaTeX (booktabs) for papers."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from macs.fronts.files import write_whole
+from macs.fronts.front_plot import label
+from macs.fronts.tables import text_table
+
+COUNTED = 1e9
+"""Whole numbers below are written in full."""
+Cell = str | float | int | None
+"""What stands in a table: words, a number, or None where there is nothing to say."""
+
+ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "²": r"\textsuperscript{2}",
+    "³": r"\textsuperscript{3}",
+    "±": r"\ensuremath{\pm}",
+    "×": r"\ensuremath{\times}",
+    "°": r"\ensuremath{^\circ}",
+    "−": r"\ensuremath{-}",
+    "≤": r"\ensuremath{\le}",
+    "≥": r"\ensuremath{\ge}",
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """The head of a column.
+
+    Attributes
+    ----------
+    title, unit : str
+    digits : int
+        Significant digits of its numbers; whole numbers (`int`) are written in full.
+    grouped : bool
+        Whether a cell that repeats the one above is left blank, in text and LaTeX.
+    """
+
+    title: str
+    unit: str = ""
+    digits: int = 3
+    grouped: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows of cells, with a caption above and notes below.
+
+    Raises
+    ------
+    ValueError
+        If a row has not as many cells as there are columns.
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for i, row in enumerate(self.rows):
+            if len(row) != len(self.columns):
+                raise ValueError(f"row {i} has {len(row)} cells, the table {len(self.columns)} columns")
+
+    def text(self) -> str:
+        """Columns of equal width under a rule."""
+        headers = [[column.title for column in self.columns]]
+        if any(column.unit for column in self.columns):
+            headers.append([f"[{column.unit}]" if column.unit else "" for column in self.columns])
+        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *self._below()])
+
+    def csv(self) -> str:
+        """One header line and the numbers in full; nothing is left blank but what is not there. Caption and notes are not in it."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow([label(column.title, column.unit) for column in self.columns])
+        writer.writerows([[_full(cell) for cell in row] for row in self.rows])
+        return out.getvalue()
+
+    def latex(self, name: str = "") -> str:
+        """A `table` environment for the package booktabs; `name` is its label."""
+        heads = [escaped(label(column.title, column.unit)) for column in self.columns]
+        cells = [[_latex(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        lines = [r"\begin{table}", r"  \centering"]
+        lines += [rf"  \caption{{{escaped(self.caption)}}}"] if self.caption else []
+        lines += [rf"  \label{{{name}}}"] if name else []
+        lines += [rf"  \begin{{tabular}}{{{''.join('l' if left else 'r' for left in self._left())}}}", r"    \toprule"]
+        lines += [f"    {' & '.join(heads)} \\\\", r"    \midrule"]
+        lines += [f"    {' & '.join(row)} \\\\" for row in cells]
+        lines += [r"    \bottomrule", r"  \end{tabular}"]
+        lines += [rf"  \par\smallskip\footnotesize {escaped(note)}" for note in self.notes]
+        return "\n".join([*lines, r"\end{table}", ""])
+
+    def save(self, stem: str | PathLike[str]) -> list[Path]:
+        """Write `stem`.txt, .csv and .tex, each whole or not at all; the label of the last is `tab:` and the file's name."""
+        base = Path(stem)
+        written = {".txt": self.text() + "\n", ".csv": self.csv(), ".tex": self.latex(f"tab:{base.name}")}
+        paths = [base.with_name(base.name + suffix) for suffix in written]
+        for path, content in zip(paths, written.values(), strict=True):
+            write_whole(path, content.encode())
+        return paths
+
+    def _left(self) -> list[bool]:
+        """Columns that hold words are flush left."""
+        return [any(isinstance(row[i], str) for row in self.rows) for i in range(len(self.columns))]
+
+    def _shown(self) -> list[list[Cell]]:
+        """The rows with the blanks of grouped columns. A column is only blank where those grouped before it are."""
+        shown: list[list[Cell]] = []
+        for i, row in enumerate(self.rows):
+            cells, same = list(row), i > 0
+            for k, column in enumerate(self.columns):
+                if column.grouped:
+                    same = same and row[k] == self.rows[i - 1][k]
+                    cells[k] = "" if same else row[k]
+            shown.append(cells)
+        return shown
+
+    def _below(self) -> list[str]:
+        return ["", *self.notes] if self.notes else []
+
+
+def short(value: float, digits: int = 3) -> str:
+    """Significant digits, as a person would write them: large whole numbers, mostly counts, in full; NaN is a dash."""
+    if np.isnan(value):
+        return "-"
+    if np.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    if value == 0.0:
+        return "0"
+    if 1e5 <= abs(value) < COUNTED and value == np.rint(value):
+        return f"{value:.0f}"
+    rounded = float(f"{value:.{digits - 1}e}")
+    if not 1e-3 <= abs(rounded) < 1e5:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(0, digits - 1 - int(np.floor(np.log10(abs(rounded)))))}f}"
+
+
+def escaped(text: str) -> str:
+    """Words for LaTeX, with its special characters as characters."""
+    return "".join(ESCAPES.get(character, character) for character in text)
+
+
+def latex_number(value: float, digits: int = 3) -> str:
+    r"""As `short`, in mathematics: $1.23 \times 10^{-4}$, $\infty$; NaN is a dash."""
+    written = short(value, digits)
+    if written == "-":
+        return "--"
+    if written.endswith("inf"):
+        return r"$-\infty$" if written.startswith("-") else r"$\infty$"
+    mantissa, _, exponent = written.partition("e")
+    return rf"${mantissa} \times 10^{{{int(exponent)}}}$" if exponent else f"${mantissa}$"
+
+
+def _full(cell: Cell) -> str:
+    if cell is None or isinstance(cell, str):
+        return cell or ""
+    return repr(int(cell) if isinstance(cell, int | np.integer) else float(cell))
+
+
+def _text(cell: Cell, digits: int) -> str:
+    if cell is None or isinstance(cell, str):
+        return "-" if cell is None else cell
+    return str(cell) if isinstance(cell, int | np.integer) else short(cell, digits)
+
+
+def _latex(cell: Cell, digits: int) -> str:
+    if cell is None or isinstance(cell, str):
+        return "--" if cell is None else escaped(cell)
+    return f"${cell}$" if isinstance(cell, int | np.integer) else latex_number(cell, digits)
+
+
+def table(columns: Sequence[Column | str], rows: Sequence[Sequence[Cell]], caption: str = "", notes: Sequence[str] = ()) -> Table:
+    """A `Table` of lists; a column may be its title alone."""
+    heads = tuple(Column(column) if isinstance(column, str) else column for column in columns)
+    return Table(heads, tuple(tuple(row) for row in rows), caption, tuple(notes))

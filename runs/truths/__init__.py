@@ -1,0 +1,1 @@
+"""Reference fronts, made by long computations."""

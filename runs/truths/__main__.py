@@ -1,0 +1,5 @@
+"""`python -m runs.truths CASE`: the reference front of a case, made anew."""
+
+from .reentry import main
+
+main()

@@ -1,0 +1,276 @@
+"""The true fronts of the re-entry cases, as far as gradients find them: how the tables beside the cases were made.
+
+    python -m runs.truths reentry_case1 [--points 120] [--out FILE.csv]
+
+Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
+commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
+are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
+1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. The first solves begin at the guess; in
+a harder case, at those flights of the first one that are feasible there too. These are optimal there as well, and are taken over, and they
+pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere. The first case takes over in turn what its own
+flights do not dominate of the other tables, all of which is feasible in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import moocore
+import numpy as np
+
+from macs.evaluation.evaluator import CONVERGED
+from macs.fronts.files import write_whole
+from macs.gradients.multistart import Descents
+from macs.pareto.directions import across, simplex_lattice
+from macs.pareto.dominance import nondominated
+from problems import load
+from problems.cases.reentry import case1, case2, statement
+from problems.cases.reentry.case3 import ZONES
+from problems.cases.reentry.statement import FOOT, Limits
+from transcription import DFET
+from transcription.nlp.scalarized import Solved
+from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.trajectory import Trajectory
+
+from ..steps import Steps
+
+CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
+EASIEST = "reentry_case1"
+METHOD = DFET(60, 2, control_order=1, basis="bernstein")
+CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
+"""Where the paper measures hypervolume from, minimised."""
+NARROWER, NEARER = 0.98, 0.7
+"""Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, times the case's own: what the mesh leaves open
+between its nodes."""
+ALIKE = 1e-2
+"""Flights whose objectives differ by less than this part of their ranges are one."""
+ALLOWED = 0.01
+"""What a flight may exceed of a limit, or of a tolerance at the end."""
+DIGITS = 2
+"""Of the commands, in degrees."""
+DIVISIONS, BEYOND = 12, 1.3
+"""Of the lattice of places, and how far it reaches: fronts bulge beyond the simplex between their ends."""
+RTOL = 1e-8
+
+
+class Unsolved(RuntimeError):  # noqa: N818 - nobody's error
+    """Gradients did not find an end of the front, without which nobody knows where it lies."""
+
+
+class Truth:
+    """The front of a case as it becomes known."""
+
+    def __init__(self, case: str) -> None:
+        limits, zones = CASES[case]
+        self.limits = limits
+        tolerances = {"altitude_tolerance": 3000 * FOOT, "speed_tolerance": 350 * FOOT, "angle_tolerance": np.radians(1.0)}
+        strict = statement.reentry(
+            case,
+            Limits(NARROWER * limits.heating_rate, NARROWER * limits.dynamic_pressure, NARROWER**2 * limits.load_factor),
+            [replace(zone, radius=zone.radius / NARROWER**0.5) for zone in zones],
+            **{name: NEARER * value for name, value in tolerances.items()},
+        )
+        self.case = load(case).compile()
+        self.nlp = METHOD.transcribe(strict)
+        self.template = self.nlp.unpack(self.nlp.first_guess(self.nlp.guess[None])[0])
+        self.descents = Descents(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
+        self.found: list[Solved] = []
+
+    def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
+        """One solve, remembered if it converges."""
+        solved = self.descents.from_vector(start, reference, weights, ceiling)
+        if solved.status == CONVERGED:
+            self.found.append(solved)
+        return solved
+
+    def begin(self, steps: Steps) -> None:
+        """The best of each objective, from the guess."""
+        start = self.nlp.first_guess(self.nlp.guess[None])[0]
+        for i in range(4):
+            steps.begin(f"objective {i + 1}")
+            self.solve(start, np.where(np.arange(4) == i, 0.0, np.inf), np.eye(4)[i], np.full(4, np.inf))
+
+    def inherit(self, steps: Steps, rows: np.ndarray) -> None:
+        """Take over the flights of an easier case (k, 4 + n) that are feasible in this one, and so optimal, and good to start from."""
+        for row in rows:
+            steps.begin(f"cross-range {row[0]:.2f}")
+            if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
+                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
+                if self.feasible(flown):
+                    z = self.nlp.interpolate(flown.trajectory)
+                    self.found.append(Solved(z, row[:4] * SIGNS, float(self.nlp.evaluate(z[None])[1][0]), CONVERGED, 0))
+        print(f"{len(self.found)} of {len(rows)} flights of {EASIEST} are feasible")
+
+    def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
+        """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4).
+
+        Raises `Unsolved` if there is nothing to begin with, or the best of an objective is not found.
+        """
+        if not self.found:
+            raise Unsolved("no solve converged, and no flight was taken over: there is nothing to begin with")
+        rows = []
+        for i in range(4):
+            steps.begin(f"end {i + 1}")
+            F = np.array([solved.F for solved in self.found])
+            nearest = int(np.lexsort((F[:, i], np.maximum(F - ceiling, 0.0).sum(axis=1)))[0])
+            alone = np.where(np.arange(4) == i, 0.0, np.inf)
+            first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
+            if first.status != CONVERGED:
+                within = f" within {ceiling.tolist()}, minimised," if np.isfinite(ceiling).any() else ""
+                raise Unsolved(
+                    f"the best '{self.case.goals[i].name}'{within} was not found: its solve from the nearest of the {len(self.found)} "
+                    f"flights known ended as '{first.status}', with a violation of {first.violation:.1e}"
+                )
+            limit = np.where(np.arange(4) == i, first.F[i] + 1e-6 * abs(first.F[i]), ceiling)
+            others = np.where(np.arange(4) == i, np.inf, first.F)
+            second = self.solve(first.z, others, np.maximum(np.ptp(F, axis=0), 1e-3), limit)
+            rows.append(second.F if second.status == CONVERGED else first.F)
+        return np.array(rows)
+
+    def fill(self, steps: Steps, count: int, ceiling: np.ndarray) -> None:
+        """Go down from places that are far from all that is known."""
+        ends = self.ends(steps, ceiling)
+        ideal, ranges = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-6)
+        lattice = simplex_lattice(4, DIVISIONS)
+        middle = np.full((1, 4), 0.25)
+        places = across(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
+        tried = np.empty((0, 4))
+        for _ in range(count):
+            F = np.array([solved.F for solved in self.found])
+            F = F[(F - ceiling <= 1e-9).all(axis=1)]
+            known = np.vstack([across((F - ideal) / ranges), tried])
+            place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+            tried = np.vstack([tried, place])
+            reference = ideal + ranges * place
+            steps.begin(f"place {np.round(reference, 2).tolist()}")
+            self.solve(self.nearest(reference, ranges, ceiling), reference, ranges, ceiling)
+
+    def nearest(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> np.ndarray:
+        """The best that is known for a place, a vector (n,)."""
+        F = np.array([solved.F for solved in self.found])
+        merit = np.max((F - reference) / ranges, axis=1) + (np.maximum(F - ceiling, 0.0) / ranges).sum(axis=1)
+        return self.found[int(np.argmin(merit))].z
+
+    def rows(self, steps: Steps) -> list[np.ndarray]:
+        """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
+        F = np.array([solved.F for solved in self.found])
+        kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
+        kept = kept[apart(F[kept])]
+        told, broken = [], 0
+        for k in kept:
+            steps.begin(f"flight {k}")
+            trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
+            flown = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
+            if self.feasible(flown):
+                told.append(np.array([*flown.objectives.values(), *commands]))
+            else:
+                broken += 1
+        print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
+        return told
+
+    def feasible(self, flown: Simulation) -> bool:
+        """Whether a flight exceeds no limit by more than is allowed."""
+        return flown.violation <= ALLOWED
+
+
+SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
+
+
+def apart(F: np.ndarray) -> np.ndarray:
+    """Rows (k, 4), minimised, without those that are like another one; the best of each objective come before others. Their indices."""
+    y = F / np.maximum(np.ptp(F, axis=0), 1e-9)
+    kept = list(dict.fromkeys(np.argmin(F, axis=0).tolist()))
+    for k in range(len(y)):
+        if np.linalg.norm(y[kept] - y[k], axis=1).min() > ALIKE:
+            kept.append(k)
+    return np.sort(kept)
+
+
+def rounded(flight: Trajectory) -> tuple[Trajectory, np.ndarray]:
+    """A flight with commands of as many digits as the table has, and these: (elements, both ends, both angles) in a row."""
+    commands = np.round(np.degrees(flight["entry"].control.coefficients), DIGITS).ravel()
+    return with_commands(flight, commands), commands
+
+
+def with_commands(flight: Trajectory, commands: np.ndarray) -> Trajectory:
+    """A flight with other commands, in degrees."""
+    phase = flight["entry"]
+    control = replace(phase.control, coefficients=np.radians(commands).reshape(phase.control.coefficients.shape))
+    return replace(flight, phases=(replace(phase, control=control),))
+
+
+def volume(front: np.ndarray) -> float:
+    """Hypervolume in the paper's units, from the paper's corner, of objectives (k, 4) as the user sees them."""
+    return float(moocore.hypervolume(np.ascontiguousarray(front[:, :4] * SIGNS), ref=CORNER))
+
+
+def made(case: str, points: int) -> np.ndarray:
+    """The table of a case; see the module."""
+    truth = Truth(case)
+    if case == EASIEST:
+        with Steps(f"{case}, to begin with", 4) as steps:
+            truth.begin(steps)
+    else:
+        easier = table(EASIEST)
+        with Steps(f"{case}, flights of {EASIEST}", len(easier)) as steps:
+            truth.inherit(steps, easier)
+    windows = [np.full(4, np.inf), CORNER]
+    with Steps(case, 4 * len(windows) + points) as steps:
+        for window in windows:
+            truth.fill(steps, points // len(windows), window)
+    with Steps(f"{case}, flown", len(truth.found)) as steps:
+        rows = truth.rows(steps)
+    if case == EASIEST:
+        for harder in CASES:
+            rows += list(table(harder)) if harder != EASIEST else []
+    return united(rows)
+
+
+def table(case: str) -> np.ndarray:
+    """What is known of a case (k, 4 + n)."""
+    with files("problems.cases.reentry").joinpath(f"{case.removeprefix('reentry_')}.csv").open() as file:
+        return np.loadtxt(file, delimiter=",", ndmin=2)
+
+
+def united(rows: list[np.ndarray]) -> np.ndarray:
+    """The rows that none dominates, by their cross-range."""
+    front = np.unique(np.array(rows), axis=0)
+    front = front[nondominated(front[:, :4] * SIGNS)]
+    return front[np.argsort(-front[:, 0])]
+
+
+def text(case: str, rows: np.ndarray) -> str:
+    """The table with a header that says what it is."""
+    head = [
+        f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
+        f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
+        "flown again by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
+        "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
+        f"angle of attack and bank angle at both ends of each of {METHOD.elements} equal parts of the time, linear between.",
+    ]
+
+    def shown(row: np.ndarray) -> str:
+        commands = (f"{value + 0.0:.{DIGITS}f}".rstrip("0").rstrip(".") for value in row[4:])
+        return ",".join([*(f"{value:.7g}" for value in row[:4]), *commands])
+
+    return "\n".join([*(f"# {line}" for line in head), *map(shown, rows)]) + "\n"
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="Make the table of a re-entry case's true front again.")
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("--points", type=int, default=120)
+    parser.add_argument("--out", default=None)
+    given = parser.parse_args()
+    try:
+        rows = made(given.case, given.points)
+    except Unsolved as error:
+        raise SystemExit(f"{given.case}: {error}; no table was written") from error
+    write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
+    print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
+    for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
+        print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")

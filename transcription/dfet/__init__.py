@@ -1,0 +1,1 @@
+"""Direct Finite Elements in Time."""

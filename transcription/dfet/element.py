@@ -1,0 +1,64 @@
+"""One finite element in time: its equations."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from ..dfet_tables import Tables
+
+
+def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, peaks, controls at both ends, sizes)."""
+    nx, nu = len(phase.states), len(phase.controls)
+    X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
+    left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
+    start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", phase.dynamics.size1_in(3))
+    law = unwrapped_law(U, phase)
+
+    def over(function: ca.Function, tau: np.ndarray, states: ca.MX) -> ca.MX:
+        times = start + 0.5 * h * ca.DM(1.0 + tau).T
+        controls = wrapped_controls(law @ ca.DM(tables.control(tau)).T, phase)
+        return function.map(len(tau))(states, controls, times, ca.repmat(s, 1, len(tau)))
+
+    inside = X @ ca.DM(tables.state(tables.tau)).T
+    closed = ca.horzcat(left, X @ ca.DM(tables.state(tables.stages)).T, right)
+    rates = over(phase.dynamics, tables.tau, inside)
+    first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
+    weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
+    integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
+    paths = over(phase.path, tables.points, closed @ ca.DM(tables.flown(tables.points)).T)
+    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown(tables.dense)).T)
+    sizes = over(phase.sizes, tables.tau, inside)
+    ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
+    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends", "sizes"]
+    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends, sizes], *names)
+
+
+def unwrapped_law(U: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
+    period, divisor, _ = _periods(phase)
+    if not period.any():
+        return U
+    law = ca.horzsplit(U)
+    for k in range(1, len(law)):
+        step = law[k] - law[k - 1]
+        law[k] = law[k - 1] + step - period * ca.floor(step / divisor + 0.5)
+    return ca.horzcat(*law)
+
+
+def wrapped_controls(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Controls (nu, k) of which the periodic ones are brought back into their bounds: see `trajectory.wrapped`."""
+    period, divisor, lower = _periods(phase)
+    if not period.any():
+        return controls
+    turns = [ca.floor((column - lower) / divisor) for column in ca.horzsplit(controls)]
+    return controls - ca.repmat(ca.DM(period), 1, controls.shape[1]) * ca.horzcat(*turns)
+
+
+def _periods(phase: CompiledPhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Periods of the controls (nu,), 0 where there is none; the same to divide by; lower bounds."""
+    period = np.array([v.period or 0.0 for v in phase.controls])
+    return period, np.where(period > 0, period, 1.0), np.array([v.lower for v in phase.controls])

@@ -1,0 +1,152 @@
+"""The initial value problem of a phase, element after element, and its derivatives.
+
+On each element the first l + 1 tests give the states at the quadrature nodes, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that
+system is small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element;
+elsewhere, and for whatever these five leave unsolved, a rootfinder iterates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from ..base import expanded
+from ..dfet_tables import Tables
+from ..numerics.elimination import eliminate
+from .element import unwrapped_law, wrapped_controls
+
+ITERATIONS = 30
+TOLERANCE = 1e-14
+WRITTEN_OUT = 5
+"""Newton steps that are written out, after an explicit guess."""
+SMALL, SHORT = 48, 30_000
+"""Most unknowns, and most instructions, of an element whose Newton steps are written out."""
+
+
+class Propagation:
+    """The elements of a phase as Functions; see the module.
+
+    Parameters
+    ----------
+    elements : int
+    tables : Tables
+    phase : CompiledPhase
+
+    Attributes
+    ----------
+    quick : bool
+        Whether Newton steps are written out.
+    inputs : int
+        nx + (q + 1) nu + 2 + len(s): how many numbers an element is a function of.
+    """
+
+    def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:
+        self.n, self.tables, self.phase = elements, tables, phase
+        self._equations = _equations(tables, phase, ca.MX)
+        self._step: ca.Function | None = None
+        if len(phase.states) * len(tables.tau) <= SMALL and expanded(phase.dynamics).is_a("SXFunction"):
+            written = _equations(tables, phase, ca.SX)
+            step = _written_out(written, tables, phase)
+            if step.n_instructions() <= SHORT:
+                self._equations, self._step = written, step
+        self.quick = self._step is not None
+        self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
+
+    def fly(self, robust: bool) -> ca.Function:
+        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N (l + 1)), residuals (1, N));
+        inputs of elements stand side by side."""
+        step = self._step
+        if robust or step is None:
+            step = _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
+        return step.mapaccum("flight", self.n)
+
+    def derivatives(self, interior: bool) -> ca.Function:
+        """(X, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls' coefficients
+        (nu fastest), the start, the length, and s; with `interior` also, below, of the coefficients of the states (l + 1, nx fastest)."""
+        return _gradient(self._equations, self.tables, self.phase, interior).map(self.n)
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """One element, symbolically: inputs (Y as a column, left, U, start, h, s), the residual of Y, the rates at Y and the results."""
+
+    symbols: tuple[Any, ...]
+    residual: Any
+    rates: Any
+    right: Any
+    X: Any
+
+
+def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
+    """The element's equations in symbols of one of CasADi's kinds."""
+    nx, nu, nq, parameters = len(phase.states), len(phase.controls), len(tables.tau), phase.dynamics.size1_in(3)
+    y, left, U = symbol.sym("y", nx * nq), symbol.sym("left", nx), symbol.sym("U", nu, tables.control_order + 1)
+    start, h, s = symbol.sym("start"), symbol.sym("h"), symbol.sym("s", parameters)
+    controls = wrapped_controls(unwrapped_law(U, phase) @ ca.DM(tables.control(tables.tau)).T, phase)
+    Y, scales = ca.reshape(y, nx, nq), ca.DM([v.scale for v in phase.states])
+    rates = ca.horzcat(
+        *(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)),
+    )
+    residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ ca.DM(tables.implicit))) / ca.repmat(scales, nq, 1)
+    X = ca.repmat(left, 1, tables.order + 1) + h * (rates @ ca.DM(tables.recover))
+    right = left + 0.5 * h * (rates @ ca.DM(tables.weights))
+    return _Equations((y, left, U, start, h, s), residual, rates, right, X)
+
+
+def _written_out(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(left, U, start, h, s) -> (right, X, largest residual) by Newton steps from the states that the rates at the left end give."""
+    y, left, *others = element.symbols
+    whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X])
+    jacobian = ca.Function("jacobian", list(element.symbols), [ca.jacobian(element.residual, y)])
+    nq, h = len(tables.tau), others[2]
+    Y = ca.repmat(left, nq, 1)
+    Y = Y + h * ca.vec(whole(Y, left, *others)[1] @ ca.DM(tables.implicit))
+    for _ in range(WRITTEN_OUT):
+        Y = Y - eliminate(ca.sparsify(jacobian(Y, left, *others)), whole(Y, left, *others)[0])
+    residual, _, right, X = whole(Y, left, *others)
+    return ca.Function("step", [left, *others], [ca.densify(right), ca.densify(X), ca.mmax(ca.fabs(residual))], {"cse": True})
+
+
+def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
+    """(left, U, start, h, s) -> (right, X, 0) by CasADi's Newton method, which does not give up early."""
+    _, left, U, *others = element.symbols
+    nx, nq = len(phase.states), len(tables.tau)
+    scales = ca.repmat(ca.DM([v.scale for v in phase.states]), nq, 1)
+    p = ca.MX.sym("p", nx + U.numel() + sum(symbol.numel() for symbol in others))
+    parts = ca.vertsplit(p, np.cumsum([0, nx, U.numel(), *(symbol.numel() for symbol in others)]).tolist())
+    parts[1] = ca.reshape(parts[1], *U.shape)
+    whole = ca.Function("whole", list(element.symbols), [element.residual, element.right, element.X])
+    x = ca.MX.sym("x", nx * nq)
+    equations = expanded(ca.Function("equations", [x, p], [whole(x * scales, *parts)[0]], ["x", "p"], ["g"]))
+    options = {"error_on_fail": False, "max_iter": ITERATIONS, "abstol": TOLERANCE, "abstolStep": TOLERANCE}
+    newton = ca.rootfinder("newton", "fast_newton", equations, options)
+    root = newton(ca.repmat(left, nq, 1) / scales, ca.vertcat(left, ca.vec(U), *others)) * scales
+    right, X = whole(root, left, U, *others)[1:]
+    return ca.Function("step", [left, U, *others], [ca.densify(right), ca.densify(X), ca.MX(0)])
+
+
+def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> ca.Function:
+    """(X, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the equations."""
+    y, *inputs = element.symbols
+    along = ca.veccat(*inputs)
+    results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
+    by_states, by_inputs = ca.jacobian(element.residual, y), ca.jacobian(element.residual, along)
+    direct, through = ca.jacobian(results, along), ca.jacobian(results, y)
+    symbolic = isinstance(y, ca.SX)
+
+    def solve(matrix: Any, right: Any) -> Any:
+        return eliminate(matrix, right) if symbolic else ca.solve(matrix, right, "qr")
+
+    if results.numel() < along.numel():
+        total = direct - solve(by_states.T, through.T).T @ by_inputs
+    else:
+        total = direct - through @ solve(by_states, by_inputs)
+    gradient = ca.Function("by_states", [y, *inputs], [ca.densify(total)])
+    X = type(y).sym("X", len(phase.states), tables.order + 1)
+    Y = X @ ca.DM(tables.state(tables.tau)).T
+    return ca.Function("gradient", [X, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})

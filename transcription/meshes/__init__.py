@@ -1,0 +1,1 @@
+"""How wrong a mesh is, and what to do about it."""

@@ -1,0 +1,131 @@
+"""One trajectory and its mesh: is it good enough, and if not, on which mesh to try next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+
+from ..dfet.method import DFET
+from ..mesh import refine
+from ..phases.mesh import PhaseMesh
+from ..trajectories.simulate import Simulation, simulate
+from ..trajectories.trajectory import Trajectory
+from .errors import PhaseErrors, phase_errors
+
+MOST_ELEMENTS = 40
+"""Of each phase; or twice as many as the method began with, if that is more."""
+SAFETY = 0.5
+"""Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
+COST = 10.0
+"""How many times the tolerance objectives may be off, in ranges of the front: what they lose to controls that their polynomials describe
+badly is of second order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What an independent look at a trajectory gives.
+
+    Attributes
+    ----------
+    flight : Simulation
+        The whole of it flown.
+    errors : list of PhaseErrors
+        Element by element.
+    tolerance, feasible : float
+        Of defects; of constraints, flown and between nodes, in their scales.
+    """
+
+    flight: Simulation
+    errors: list[PhaseErrors]
+    tolerance: float
+    feasible: float
+
+    @property
+    def excess(self) -> float:
+        """How far states and path constraints leave their limits between nodes, in their scales."""
+        return max((float(phase.excess.max()) for phase in self.errors), default=0.0)
+
+    @property
+    def leaving(self) -> float:
+        """The same for controls."""
+        return max((float(phase.leaving.max()) for phase in self.errors), default=0.0)
+
+    @property
+    def error(self) -> float:
+        """The largest of defect, excess and flown violation, in units of what they may be."""
+        return max(self.flight.max_defect / self.tolerance, max(self.excess, self.flight.violation) / self.feasible)
+
+    def complaints(self) -> list[str]:
+        """What is not good enough, in words; controls may not leave their bounds at all. Empty if nothing is."""
+        found = []
+        if not self.flight.max_defect <= self.tolerance:
+            found.append(f"flown, it ends {self.flight.max_defect:.1e} away")
+        if self.leaving > 0.0:
+            found.append(f"a control leaves its bounds by {self.leaving:.1e} between nodes")
+        if not self.excess <= self.feasible:
+            found.append(f"a state or path constraint leaves its limits by {self.excess:.1e} between nodes")
+        if not found and not self.flight.violation <= self.feasible:
+            worst = max(self.flight.violations, key=lambda key: self.flight.violations[key])
+            found.append(f"flown, it violates '{worst}' by {self.flight.violation:.1e}")
+        return found
+
+    def scores(self, method: DFET, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
+        """For each phase the error of each element (N,), in units of what it may be; that of integrals too, if wanted."""
+        total = sum(float(phase.defect.sum()) for phase in self.errors)
+        # What an error at one element becomes at the end of the flight, at least.
+        growth = max(1.0, self.flight.max_defect / total) if 0.0 < total < np.inf and np.isfinite(self.flight.max_defect) else 1.0
+        count = sum(len(phase.defect) for phase in self.errors)
+        found = []
+        for name, phase in zip(trajectory, self.errors, strict=True):
+            lengths = np.diff(method.mesh_of(name).edges)
+            parts = [
+                growth * phase.defect * count / (SAFETY * self.tolerance),
+                phase.excess / self.feasible,
+                lengths * phase.tail**2 * count / (COST * self.tolerance),
+            ]
+            if integrals:
+                parts.append(phase.integral * count / self.tolerance)
+            found.append(np.max(parts, axis=0))
+        return found
+
+    def worst_place(self, method: DFET, trajectory: Trajectory) -> str:
+        """Where the largest error is, in words."""
+        scores = self.scores(method, trajectory)
+        names = list(trajectory)
+        i = int(np.argmax([score.max() for score in scores]))
+        j = int(np.argmax(scores[i]))
+        phase, steep = trajectory[names[i]], self.errors[i].steep[j]
+        left, right = phase.state.edges[j : j + 2]
+        time = left + 0.5 * (1.0 + (0.0 if np.isnan(steep) else steep)) * (right - left)
+        why = "" if np.isnan(steep) else ", where a control switches or is steep"
+        return f"the mesh is coarsest for phase '{names[i]}' near {time:.6g} {phase.time_unit}{why}"
+
+
+def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float, feasible: float) -> Verdict:
+    """Look at a trajectory with an integrator a thousand times more exact than `tolerance`; see `Verdict`."""
+    rtol = float(np.clip(1e-3 * tolerance, 1e-13, 1e-9))
+    return Verdict(
+        flight=simulate(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
+        errors=phase_errors(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
+        tolerance=tolerance,
+        feasible=feasible,
+    )
+
+
+def next_method(method: DFET, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = False) -> DFET:
+    """The method on finer meshes, with controls that their coefficients bound where one leaves its bounds between nodes.
+
+    `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
+    """
+    meshes, most = {}, max(MOST_ELEMENTS, 2 * method.elements)
+    scores = verdict.scores(method, trajectory, integrals=integrals)
+    for name, phase, score in zip(trajectory, verdict.errors, scores, strict=True):
+        old = method.mesh_of(name)
+        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=most)
+        meshes[name] = PhaseMesh(tuple(edges.tolist()), order)
+    if all(mesh == method.mesh_of(name) for name, mesh in meshes.items()) and not (verdict.leaving and method.basis != "bernstein"):
+        return method
+    return method.remeshed(meshes, basis="bernstein" if verdict.leaving else None)

@@ -1,0 +1,1 @@
+"""Gradient solves of one Pareto point, and the certificate of its optimality."""

@@ -1,0 +1,137 @@
+"""How far a feasible vector is from satisfying the first-order conditions of Pareto optimality, whoever found it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.linalg import SuperLU, splu
+
+from ..base import NLP
+from ..derivatives import gradients, objective_scales
+
+NEAR = 1e-2
+"""Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
+DEPENDENT = 1e-12
+"""Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
+REGULAR = 1e-12
+"""Regularisation of equality rows that say the same twice; refinement takes it away again."""
+REFINEMENTS, EXACT = 3, 1e-12
+"""As many at most, until what is left of the right-hand sides is this part of them."""
+
+
+def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> float:
+    """The scaled residual of the conditions of Pareto optimality at z.
+
+    With objectives in units of `F_scales`, variables in spans of their bounds (peaks in their scales) and rows in their scales, it is the
+    smallest Euclidean norm over all multipliers of
+
+    - the derivatives, with respect to the *free* variables, of sum_i mu_i F_i + sum_j lambda_j g_j - sum_k nu_k c_k, and
+    - the products nu_k c_k,
+
+    where mu >= 0 sums to 1, lambda belongs to equalities, nu >= 0 to inequalities and bounds with slacks c >= 0, and where the derivatives
+    with respect to the other variables, the states, vanish: lambda is the adjoint that the dynamics give, and what is left is the gradient
+    in the controls, times and parameters (Fritz John's conditions in the objectives; Karush, Kuhn and Tucker's in the constraints). At a
+    local Pareto optimum that is regular it is 0. Elsewhere it says how fast all objectives can fall together, in their scales per span of
+    the free variables. It says nothing of violations; and a point that is optimal in the weak sense only, one objective being at its
+    least value while another could still fall, has 0 as well.
+
+    Parameters
+    ----------
+    nlp : NLP
+    z : array (n,)
+        Feasible.
+    F_scales : array (m,), optional
+        What counts as one in each objective, the front's range for instance; by default, and for entries
+        that are not positive, `objective_scales`.
+
+    Returns
+    -------
+    float
+        Not negative; infinite where a derivative is no number, where the equations do not determine the states, and where no multipliers
+        are found.
+    """
+    z = np.asarray(z, dtype=float)
+    found = gradients(nlp)(z)
+    dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
+    if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
+        return float("inf")
+    natural = objective_scales(nlp)
+    scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
+    unit = _units(nlp)
+    dF = dF * unit / scales[:, None]
+    dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
+    sides, slack = _inequalities(nlp, z, g, dg)
+    try:
+        return _least(_reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides])), slack)
+    except (RuntimeError, np.linalg.LinAlgError):
+        return float("inf")
+
+
+def _units(nlp: NLP) -> np.ndarray:
+    """What counts as one in each variable: the span of its bounds; the scale of a peak, which has none."""
+    return np.where(np.isfinite(nlp.span), nlp.span, nlp.scale)
+
+
+def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled gradients (k, n) and slacks (k,) of the inequalities c >= 0 that may have a multiplier, bounds first."""
+    bounded, one_way, every = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper, np.eye(len(z))
+    slacks = (
+        (z - nlp.lower) / _units(nlp),
+        (nlp.upper - z) / _units(nlp),
+        (g - nlp.g_lower) / nlp.g_scale,
+        (nlp.g_upper - g) / nlp.g_scale,
+    )
+    near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
+    rows = [every[near[0]], -every[near[1]], dg[near[2]].toarray(), -dg[near[3]].toarray()]
+    return np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
+
+
+def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarray:
+    """Reduced gradients (d, k) of k functions with gradients (k, n): what is left of each after the best multipliers of the equations.
+
+    Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
+    for the others. Where there are as many equations as others, these follow from the free ones, and it is the total derivative by these.
+    """
+    r, n = equations.shape
+    measured = np.isinf(nlp.span)
+    measured[nlp.free] = True
+    if r + np.count_nonzero(measured) == n:
+        by_states = csc_matrix(equations[:, ~measured].T)
+        adjoints = _solved(splu(by_states), by_states, gradients[:, ~measured].T)
+        return gradients[:, measured].T - equations[:, measured].T @ adjoints
+    weights = np.where(measured, 1.0, DEPENDENT)
+    e, every = equations.tocoo(), np.arange(n + r)
+    i, j = np.r_[e.col, e.row + n, every], np.r_[e.row + n, e.col, every]
+    exact, regular = (csc_matrix((np.r_[e.data, e.data, weights, np.full(r, -last)], (i, j))) for last in (0.0, REGULAR))
+    return _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))[:n][measured]
+
+
+def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
+    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it."""
+    solution = factors.solve(right)
+    for _ in range(REFINEMENTS):
+        left = right - matrix @ solution
+        if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
+            break
+        solution += factors.solve(left)
+    return solution
+
+
+def _least(A: np.ndarray, slack: np.ndarray) -> float:
+    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1.
+
+    Without that last condition, but with (sum mu - 1) among the residuals, the answer is the same up to a factor: the residual of the
+    direction of x only shrinks with its length, and the length that is best is a growing function of how small it is.
+    """
+    k, m = len(slack), A.shape[1] - len(slack)
+    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(slack)])])
+    full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
+    right = np.r_[np.zeros(len(M)), 1.0]
+    x = nnls(full, right, maxiter=10 * full.shape[1])[0]
+    # nnls solves normal equations, which lose half of the digits.
+    passive = x > 0
+    polished = np.zeros_like(x)
+    polished[passive] = np.linalg.lstsq(full[:, passive], right, rcond=None)[0]
+    candidates = [x, np.maximum(polished, 0.0)]
+    return float(min(np.linalg.norm(M @ c) / c[:m].sum() for c in candidates if c[:m].sum() > 0))

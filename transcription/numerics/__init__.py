@@ -1,0 +1,1 @@
+"""Numerical kernels: arrays and CasADi Functions in, the same out."""

@@ -1,0 +1,1 @@
+"""What every method shares about one phase."""

@@ -1,0 +1,182 @@
+"""A problem in its free variables alone: the states follow by propagation, and what constraints are left are functions of the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import Variable
+
+from ..numerics.batched import Batched
+from .layout import Layout
+from .writer import PhaseWriter
+
+SOLVED = 1e-12
+"""Largest scaled residual of the equations of states at which fast propagation is good enough."""
+MOST = 20_000_000
+"""Most derivatives that are held at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """Propagated vectors `Z` (k, n), the values (k, rows) of what is left to satisfy, and F (k, m) and g (k, r) if they show on the way."""
+
+    Z: np.ndarray
+    values: np.ndarray
+    scores: tuple[np.ndarray, np.ndarray] | None = None
+
+
+class Reduced:
+    """What propagation leaves to satisfy: lower <= values <= upper.
+
+    The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
+    propagation does not satisfy.
+
+    Parameters
+    ----------
+    layout : Layout
+    writers : sequence of PhaseWriter
+        In the order of time.
+    peaks : pair of array (p,) and Function
+        Slots of the peaks, and z -> (p,), what they have to be; here and below, z are the variables and the hidden quantities.
+    rest : tuple of Function and arrays (r,)
+        z -> (r,), those constraints; their lower and upper limits and scales.
+    scores : Function and array (r,) of int, optional
+        z -> (F, g), to be known of whatever is propagated, and which of the rows of g are those constraints.
+
+    Attributes
+    ----------
+    lower, upper, scale : arrays (rows,)
+    equation : array (rows,) of bool
+    inside : array (rows,) of bool
+        Whether a row needs the states inside the elements, whose derivatives cost most.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        writers: Sequence[PhaseWriter],
+        peaks: tuple[np.ndarray, ca.Function],
+        rest: tuple[ca.Function, np.ndarray, np.ndarray, np.ndarray],
+        scores: tuple[ca.Function, np.ndarray] | None = None,
+    ) -> None:
+        self._layout, self._writers = layout, writers
+        self._peaks, self._largest = peaks
+        self._rest, g_lower, g_upper, g_scale = rest
+        self._scores = scores
+        self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
+        finals: list[tuple[Variable, tuple[float, float]]] = [
+            pair for writer in writers for pair in zip(writer.phase.states, writer.phase.final, strict=True)
+        ]
+        self._imposed = np.flatnonzero(np.concatenate([writer.ends.final for writer in writers]) < 0)
+        imposed = [finals[i] for i in self._imposed]
+        dependent = [layout.variables[i] for i in self._dependent]
+        self.lower = np.concatenate([[low for _, (low, _) in imposed], [v.lower for v in dependent], g_lower])
+        self.upper = np.concatenate([[high for _, (_, high) in imposed], [v.upper for v in dependent], g_upper])
+        self.scale = np.concatenate([[v.scale for v, _ in imposed], [v.scale for v in dependent], g_scale])
+        self.equation = self.lower == self.upper
+        self.inside = self._rows_inside()
+        self._among_ends = np.cumsum(~self.inside) - 1
+
+    def fly(self, Z: np.ndarray) -> Flown:
+        """Propagate vectors (k, n), of which only the free entries matter."""
+        flown, values, residual, *scores = self._quick(Z)
+        if not residual.max(initial=0.0) <= SOLVED:
+            unsolved = ~(residual.max(axis=1) <= SOLVED)
+            flown[unsolved], values[unsolved], _, *again = self._robust(Z[unsolved])
+            for found, better in zip(scores, again, strict=True):
+                found[unsolved] = better
+        return Flown(flown, values, (scores[0], scores[1]) if scores else None)
+
+    def derivatives(self, flown: Flown, rows: np.ndarray) -> np.ndarray:
+        """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
+        interior = bool(self.inside[rows].any())
+        function, chosen = (self._everywhere, rows) if interior else (self._at_ends, self._among_ends[rows])
+        count, d = len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
+        found = np.empty((len(flown.Z), len(rows), d))
+        some = max(1, MOST // max(1, count * d))
+        for first in range(0, len(found), some):
+            part = flown.Z[first : first + some]
+            found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
+        return found
+
+    @cached_property
+    def _quick(self) -> Batched:
+        wide = (lambda k: self._flight(robust=False, k=k)) if all(writer.wide for writer in self._writers) else None
+        return Batched(self._flight(robust=False), compiled=self._compilable, wide=wide)
+
+    @cached_property
+    def _robust(self) -> Batched:
+        return Batched(self._flight(robust=True), compiled=False)
+
+    @cached_property
+    def _at_ends(self) -> Batched:
+        return Batched(self._total(interior=False), compiled=self._compilable)
+
+    @cached_property
+    def _everywhere(self) -> Batched:
+        return Batched(self._total(interior=True), compiled=self._compilable)
+
+    @property
+    def _compilable(self) -> bool:
+        return all(writer.compilable for writer in self._writers)
+
+    def _flight(self, *, robust: bool, k: int = 1) -> ca.Function:
+        """z -> (propagated z, values, residuals of the equations of states [, F, g]); for k vectors side by side, if writers are `wide`."""
+        start = ca.MX.sym("z", len(self._layout.variables), k)
+        extended, finals, residuals = self._layout.extended_symbol(start), [], []
+        for writer in self._writers:
+            extended, final, residual = writer.march(extended, robust=robust)
+            finals.append(final)
+            residuals.append(residual)
+        z, *found = self._judged().map(k).call([extended, ca.vertcat(*finals)])
+        return ca.Function("flight", [start], [ca.densify(value) for value in (z, found[0], ca.vertcat(*residuals), *found[1:])])
+
+    def _judged(self) -> ca.Function:
+        """(propagated extended vector, final states of all phases) -> (z with its peaks, values [, F, g])."""
+        n, count = len(self._layout.variables), sum(len(writer.phase.states) for writer in self._writers)
+        extended, finals = ca.MX.sym("extended", self._layout.total), ca.MX.sym("finals", count)
+        z = extended[: n + self._layout.hidden]
+        z = self._layout.replaced(z, self._peaks, self._largest(z))
+        scores = self._scores[0].call([z]) if self._scores else []
+        rest = scores[1][self._scores[1].tolist(), :] if self._scores else self._rest(z)
+        values = ca.vertcat(finals[self._imposed.tolist(), :], z[self._dependent.tolist(), :], rest)
+        return ca.Function("judged", [extended, finals], [ca.densify(value) for value in (z[:n], values, *scores)])
+
+    def _total(self, *, interior: bool) -> ca.Function:
+        """Propagated z -> total derivatives of the values by the free variables, (d, rows); without `interior`, of the rows that need none
+        of it."""
+        z = ca.MX.sym("z", len(self._layout.variables))
+        extended, S, finals = self._layout.extended_symbol(z), ca.MX(self._layout.seeds()), []
+        for writer in self._writers:
+            extended = writer.fill(extended)
+        known = extended[: z.numel() + self._layout.hidden]
+        for writer in self._writers:
+            S, final = writer.sensitivity(extended, S, interior=interior)
+            finals.append(final)
+        S = S[: known.numel(), :]
+        if interior:
+            S = self._layout.replaced(S, self._peaks, _jacobian(self._largest, known) @ S)
+        rest = np.flatnonzero(interior | ~self.inside[len(self.inside) - self._rest.numel_out(0) :])
+        by_z = _jacobian(self._rest, known)[rest.tolist(), :]
+        dependent = self._dependent[interior | ~self.inside[len(self._imposed) :][: len(self._dependent)]]
+        A = ca.vertcat(ca.vertcat(*finals)[self._imposed.tolist(), :], S[dependent.tolist(), :], by_z @ S)
+        return ca.Function("total", [z], [ca.densify(A.T)])
+
+    def _rows_inside(self) -> np.ndarray:
+        """Rows that need the states inside the elements."""
+        inside = self._layout.index(np.concatenate([*(writer.interior for writer in self._writers), self._peaks]))
+        rest = np.zeros(self._rest.numel_out(0), dtype=bool)
+        rows, columns = self._rest.jac_sparsity(0, 0).get_triplet()
+        rest[np.array(rows, dtype=int)[np.isin(columns, inside)]] = True
+        return np.concatenate([np.zeros(len(self._imposed), dtype=bool), np.isin(self._dependent, inside), rest])
+
+
+def _jacobian(function: ca.Function, at: ca.MX) -> ca.MX:
+    """The derivatives of a Function of one vector, there."""
+    z = ca.MX.sym("z", at.numel())
+    return ca.Function("jacobian", [z], [ca.jacobian(function(z), z)])(at)

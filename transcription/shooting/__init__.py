@@ -1,0 +1,1 @@
+"""Single and multiple shooting by explicit Runge-Kutta steps."""

@@ -1,0 +1,135 @@
+"""One explicit Runge-Kutta step of a phase: the states and integrals after it, and what constraints and peaks see on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+
+from ..base import expanded
+from ..dfet.element import wrapped_controls
+from ..numerics.polynomials import basis_matrix
+from .runge_kutta import Tableau
+
+
+class Step:
+    """A step as Functions of its inputs: the states at its beginning, the coefficients of the controls, its start and length, and s.
+
+    Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
+    length, which is as accurate as the step itself whatever the method.
+
+    Parameters
+    ----------
+    scheme : Tableau
+    degree : int
+        Of the controls on the step.
+    points : sequence of float
+        Where path constraints and peaks are looked at, in [0, 1].
+    phase : CompiledPhase
+
+    Attributes
+    ----------
+    rows : int
+        How many path constraints and peaks there are.
+    inputs : int
+        nx + (degree + 1) nu + 2 + len(s): how many numbers the states after the step are a function of.
+    symbolic : bool
+        Whether the phase can be written as scalar operations and calls, which is several times faster and can be compiled.
+    """
+
+    def __init__(self, scheme: Tableau, degree: int, points: Sequence[float], phase: CompiledPhase) -> None:
+        self.scheme, self.degree, self.points, self.phase = scheme, degree, tuple(points), phase
+        self.rows = len(phase.paths) + phase.peaks.size1_out(0)
+        functions = (phase.dynamics, phase.integrands, phase.path, phase.peaks)
+        self.symbolic = all(expanded(function).is_a("SXFunction") for function in functions)
+        nx, nu = len(phase.states), len(phase.controls)
+        self.inputs = nx + nu * (degree + 1) + 2 + phase.dynamics.size1_in(3)
+
+    @cached_property
+    def forward(self) -> ca.Function:
+        """(y, C, start, h, s) -> (y after the step, samples (rows, points) in the order of time); y are states and integrals so far."""
+        nx, nq = len(self.phase.states), self.phase.integrands.size1_out(0)
+        y, others = self._kind.sym("y", nx + nq), self._symbols()
+        after, samples = self._whole(y[:nx, :], *others)
+        return self._function("step", [y, *others], [ca.vertcat(after[:nx, :], y[nx:, :] + after[nx:, :]), samples])
+
+    @property
+    def plain(self) -> bool:
+        """Whether there are no calls among them, of tables for instance."""
+        step = self.forward
+        return self.symbolic and all(step.instruction_id(i) != ca.OP_CALL for i in range(step.n_instructions()))
+
+    @cached_property
+    def at_end(self) -> ca.Function:
+        """(x at the end, C, start, h, s) -> samples (rows, 1) there."""
+        x, (C, start, h, s) = self._kind.sym("x", len(self.phase.states)), self._symbols()
+        return self._function("at_end", [x, C, start, h, s], [self._sample(x, C, 1.0, start, h, s)])
+
+    def inside(self, places: np.ndarray) -> ca.Function:
+        """(x, C, start, h, s) -> states (nx, places) at places in [0, 1]."""
+        x, others = self._kind.sym("x", len(self.phase.states)), self._symbols()
+        return self._function("inside", [x, *others], [ca.horzcat(*(self._reached(x, float(place), *others) for place in places))])
+
+    def gradient(self, *, samples: bool) -> ca.Function:
+        """(x, C, start, h, s) -> derivatives (results, inputs) of the states and integrals after the step and, if wanted, of the samples,
+        point after point, by all inputs."""
+        x, others = self._kind.sym("x", len(self.phase.states)), self._symbols()
+        after, values = self._whole(x, *others)
+        results = ca.vertcat(after, ca.vec(values)) if samples else after
+        return self._function("gradient", [x, *others], [ca.jacobian(results, ca.veccat(x, *others))])
+
+    @cached_property
+    def end_gradient(self) -> ca.Function:
+        """(x at the end, C, start, h, s) -> derivatives (rows, inputs) of the samples there."""
+        x, (C, start, h, s) = self._kind.sym("x", len(self.phase.states)), self._symbols()
+        inputs = [x, C, start, h, s]
+        return self._function("end_gradient", inputs, [ca.jacobian(self._sample(x, C, 1.0, start, h, s), ca.veccat(*inputs))])
+
+    @property
+    def _kind(self) -> Any:
+        return ca.SX if self.symbolic else ca.MX
+
+    def _symbols(self) -> list[Any]:
+        sym, phase = self._kind.sym, self.phase
+        return [sym("C", len(phase.controls), self.degree + 1), sym("start"), sym("h"), sym("s", phase.dynamics.size1_in(3))]
+
+    def _function(self, name: str, inputs: list[Any], outputs: list[Any]) -> ca.Function:
+        return ca.Function(name, inputs, [ca.densify(output) for output in outputs], {"cse": True})
+
+    def _whole(self, x: Any, C: Any, start: Any, h: Any, s: Any) -> tuple[Any, Any]:
+        """States after the step and integrals over it; samples."""
+        nx = len(self.phase.states)
+
+        def rates(c: float, y: Any) -> Any:
+            inputs = y[:nx, :], self._controls(C, c), start + c * h, s
+            return ca.vertcat(self.phase.dynamics(*inputs), self.phase.integrands(*inputs))
+
+        after, _ = self.scheme.step(rates, ca.vertcat(x, self._kind.zeros(self.phase.integrands.size1_out(0))), h)
+        columns = [
+            self._sample(after[:nx, :] if place == 1.0 else self._reached(x, place, C, start, h, s), C, place, start, h, s)
+            for place in self.points
+        ]
+        return after, ca.horzcat(self._kind(self.rows, 0), *columns)
+
+    def _reached(self, x: Any, place: float, C: Any, start: Any, h: Any, s: Any) -> Any:
+        """States at a place in [0, 1]."""
+        if place == 0.0:
+            return x
+        return self.scheme.step(
+            lambda c, state: self.phase.dynamics(state, self._controls(C, c * place), start + c * place * h, s), x, place * h
+        )[0]
+
+    def _sample(self, x: Any, C: Any, place: float, start: Any, h: Any, s: Any) -> Any:
+        """Path constraints and peaks (rows,) at a place where the states are x."""
+        inputs = x, self._controls(C, place), start + place * h, s
+        return ca.vertcat(self.phase.path(*inputs), self.phase.peaks(*inputs))
+
+    def _controls(self, C: Any, place: float) -> Any:
+        """Controls (nu,) at a place in [0, 1], within the bounds of those that are periodic."""
+        weights = basis_matrix("lobatto", self.degree, np.array([2.0 * place - 1.0])).T
+        return wrapped_controls(C @ ca.sparsify(ca.DM(weights)), self.phase)

@@ -1,0 +1,1 @@
+"""Trajectories, and their check by independent integration."""

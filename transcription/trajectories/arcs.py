@@ -1,0 +1,145 @@
+"""Arcs of flights, flown by an integrator that knows nothing of the transcription, many at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from problems.compiled import CompiledPhase
+
+from ..base import expanded
+from ..numerics.polynomials import basis_matrix
+from .limits import DENSE
+from .trajectory import PhaseTrajectory, wrapped
+
+EXPLICIT = ("RK23", "RK45", "DOP853")
+METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
+"""Those that are implicit solve for all arcs in one dense system, so that each is flown alone."""
+MOST_CALLS = 200_000
+"""Evaluations of the dynamics on one element after which the integration counts as broken down."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """n arcs of one phase, each an element of some flight, with controls of one basis and degree.
+
+    Attributes
+    ----------
+    phase : CompiledPhase
+    begins, lengths : arrays (n,)
+        In time.
+    coefficients : array (n, degree + 1, nu)
+        Of the controls.
+    basis : str
+    s : array (n, ns)
+        t0, tf and the parameters of the flight.
+    """
+
+    phase: CompiledPhase
+    begins: np.ndarray
+    lengths: np.ndarray
+    coefficients: np.ndarray
+    basis: str
+    s: np.ndarray
+
+    @classmethod
+    def of(cls, phase: CompiledPhase, pieces: Sequence[tuple[PhaseTrajectory, int, np.ndarray]]) -> Arcs:
+        """Of (trajectory, element, parameters), with controls of one basis and degree."""
+        edges = np.array([flight.state.edges[j : j + 2] for flight, j, _ in pieces])
+        laws = np.array([flight.control.coefficients[j] for flight, j, _ in pieces])
+        s = np.array([[flight.t0, flight.tf, *parameters] for flight, _, parameters in pieces])
+        return cls(phase, edges[:, 0], edges[:, 1] - edges[:, 0], laws, pieces[0][0].control.basis, s)
+
+    def take(self, rows: np.ndarray) -> Arcs:
+        """The arcs of `rows` (indices or mask)."""
+        return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
+
+    def fly(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
+        """Fly all of them.
+
+        Parameters
+        ----------
+        y : array (n, ny)
+            States and integrals at their beginnings.
+        rtol : float
+        atol : array (ny,)
+        method : str
+            Of `METHODS`.
+
+        Returns
+        -------
+        array (n, len(DENSE), ny)
+            States and integrals at the local coordinates `DENSE`; NaN where the integration breaks down.
+        """
+        found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
+        able = np.flatnonzero(np.isfinite(y).all(axis=1))
+        if len(able):
+            rates = self.take(able)._rates()(-1.0, y[able].ravel()).reshape(len(able), -1)
+            able = able[np.isfinite(rates).all(axis=1)]
+        groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
+        while groups:
+            group = groups.pop()
+            flown = self.take(group)._flown(y[group], rtol, atol, method) if len(group) else None
+            if flown is not None:
+                found[group] = flown
+            elif len(group) > 1:
+                # One that breaks down takes the others with it: look for it.
+                groups += np.array_split(group, 2)
+        return found
+
+    def _flown(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
+        """All together; None if the integration breaks down."""
+        n, ny = y.shape
+        # The integrator bounds the mean square over all arcs, of which any one may have as much of the error as this leaves it.
+        share = np.sqrt(n)
+        options = {"rtol": max(rtol / share, 3e-14), "atol": np.tile(atol / share, n), "t_eval": DENSE}
+        try:
+            solution = solve_ivp(self._rates(), (-1.0, 1.0), y.ravel(), method=method, **options)
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+            # The implicit methods raise where rates are no numbers; so do ours where an integrator gets nowhere.
+            return None
+        return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
+
+    def _rates(self) -> Callable[[float, np.ndarray], np.ndarray]:
+        """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a flight."""
+        n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
+        function, degree = _rate_function(self.phase, n), self.coefficients.shape[1] - 1
+        laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
+        half = 0.5 * self.lengths[:, None]
+        x, u, time = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n)
+        out = np.zeros((n, function.size1_out(0)))
+        arguments = x, u, time, np.array(self.s, dtype=float)
+        buffer, trigger = function.buffer()
+        for i, argument in enumerate(arguments):
+            buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
+        buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
+        periodic, calls = any(v.period for v in self.phase.controls), 0
+
+        def rates(tau: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
+            # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
+            nonlocal calls
+            calls += 1
+            if calls > MOST_CALLS:
+                raise ArithmeticError("the integrator gets nowhere")
+            x[:] = y.reshape(n, -1)[:, :nx]
+            time[:] = self.begins + (tau + 1.0) * half[:, 0]
+            values = (basis_matrix(self.basis, degree, np.array([tau])) @ laws).reshape(n, nu) if degree else laws.reshape(n, nu)
+            u[:] = wrapped(values, self.phase.controls) if periodic else values
+            trigger()
+            return (half * out).ravel()
+
+        return rates
+
+
+@lru_cache(maxsize=64)
+def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
+    """(x, u, t, s) -> rates of the states and of the integrals, in n columns."""
+    inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
+    rates = ca.vertcat(phase.dynamics(*inputs), phase.integrands(*inputs))
+    function = expanded(ca.Function("rates", inputs, [ca.densify(rates)]))
+    return function.map(n) if n > 1 else function

@@ -1,0 +1,228 @@
+"""The independent check of trajectories: their controls, flown by an integrator that knows nothing of the transcription."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from problems.compiled import CompiledPhase, CompiledProblem, Variable
+
+from .arcs import METHODS, Arcs
+from .limits import DENSE, excess, looked_at
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What came of flying a trajectory's controls.
+
+    Attributes
+    ----------
+    defect : mapping
+        `defect[phase][state]`: largest difference from the transcription at the ends of its elements, divided by the span of the state's
+        bounds; infinite where the integration broke down.
+    violation : float
+        Largest scaled residual of state bounds, final values, path constraints, links and constraints of the flown trajectory, looked at
+        densely. Bounds of the controls between nodes are the same as in the transcription: see `Point.excursions`.
+    violations : mapping
+        The same by constraint.
+    objectives : mapping
+        Re-evaluated, by name, in the user's senses.
+    trajectory : Trajectory
+        What was flown.
+    """
+
+    defect: Mapping[str, Mapping[str, float]]
+    violations: Mapping[str, float]
+    objectives: Mapping[str, float]
+    trajectory: Trajectory
+
+    @property
+    def max_defect(self) -> float:
+        """The largest defect of any state of any phase."""
+        return max(value for states in self.defect.values() for value in states.values())
+
+    @property
+    def violation(self) -> float:
+        """See the class."""
+        return max(self.violations.values(), default=0.0)
+
+
+def simulate(
+    problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
+) -> Simulation:
+    """Fly a trajectory's controls, phase after phase, with an integrator of scipy.
+
+    Each phase starts where the phases linked to it ended in this simulation; what is not linked starts where the trajectory says.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    trajectory : Trajectory
+    rtol, atol : float
+        Of the integrator; `atol` in spans of the states' bounds.
+    method : str
+        Of `scipy.integrate.solve_ivp`; "Radau" or "LSODA" for stiff dynamics.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    ValueError
+        For an unknown method or a tolerance that is not positive.
+    """
+    return simulate_all(problem, [trajectory], rtol=rtol, atol=atol, method=method)[0]
+
+
+def simulate_all(
+    problem: CompiledProblem, trajectories: Sequence[Trajectory], *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
+) -> list[Simulation]:
+    """Fly several trajectories; see `simulate`.
+
+    Those whose phases have as many elements and controls of the same degree are flown side by side, which takes far less time than one
+    after the other. Each is flown within the same tolerances, but by other steps than alone, so that its last digits differ.
+    """
+    if method not in METHODS:
+        raise ValueError(f"unknown integration method {method!r}; there are {', '.join(METHODS)}")
+    if not (rtol > 0 and atol > 0):
+        raise ValueError(f"rtol and atol must be positive, not {rtol!r} and {atol!r}")
+    groups: dict[Hashable, list[int]] = {}
+    for k, trajectory in enumerate(trajectories):
+        shape = tuple((phase.control.coefficients.shape, phase.control.basis) for phase in trajectory.phases)
+        groups.setdefault(shape, []).append(k)
+    found: dict[int, Simulation] = {}
+    for rows in groups.values():
+        found |= zip(rows, _side_by_side(problem, [trajectories[k] for k in rows], rtol, atol, method), strict=True)
+    return [found[k] for k in range(len(trajectories))]
+
+
+def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
+    """Fly trajectories of one shape."""
+    parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]
+    flights: list[dict[int, _Flight]] = [{} for _ in trajectories]
+    violations: list[dict[str, float]] = [{} for _ in trajectories]
+    for i in problem.order_in_time:
+        phase = problem.phases[i]
+        planned = [one[phase.name] for one in trajectories]
+        starts = np.array([_start(problem, i, *one) for one in zip(planned, flights, violations, strict=True)])
+        for k, flight in enumerate(_fly(phase, planned, starts, parameters, rtol, atol, method)):
+            flights[k][i] = flight
+            violations[k] |= flight.violations(phase)
+    return [_judged(problem, *one) for one in zip(flights, violations, trajectories, parameters, strict=True)]
+
+
+def _judged(
+    problem: CompiledProblem, flights: Mapping[int, _Flight], violations: dict[str, float], planned: Trajectory, parameters: np.ndarray
+) -> Simulation:
+    """What came of one trajectory, whose phases are flown."""
+    quantities = [flights[i].quantities for i in range(len(problem.phases))]
+    objectives = np.array(problem.objectives(*quantities, parameters)).ravel() * problem.signs
+    constraints = np.array(problem.constraints(*quantities, parameters)).reshape(1, -1)
+    for limit, amount in zip(problem.limits, excess(constraints, problem.limits), strict=True):
+        violations[f"constraint '{limit.name}'"] = _or_infinite(amount)
+    return Simulation(
+        defect={phase.name: flights[i].defect(phase) for i, phase in enumerate(problem.phases)},
+        violations=violations,
+        objectives={goal.name: float(value) for goal, value in zip(problem.goals, objectives, strict=True)},
+        trajectory=Trajectory(tuple(flights[i].trajectory for i in range(len(problem.phases))), planned.parameters),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Flight:
+    """One flown phase: what was planned and what was flown, the quantities q for objectives and constraints, what its paths exceed."""
+
+    planned: PhaseTrajectory
+    trajectory: PhaseTrajectory
+    quantities: np.ndarray
+    path_excess: np.ndarray
+
+    def defect(self, phase: CompiledPhase) -> dict[str, float]:
+        difference = np.abs(self.trajectory.edge_states - self.planned.edge_states) / np.array([v.span for v in phase.states])
+        return {v.name: _or_infinite(amount) for v, amount in zip(phase.states, difference.max(axis=0), strict=True)}
+
+    def violations(self, phase: CompiledPhase) -> dict[str, float]:
+        states = self.trajectory.states
+        found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(states, phase.states), strict=True)}
+        found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, self.path_excess, strict=True)}
+        ends = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.final, strict=True)]
+        for v, end, amount in zip(phase.states, ends, excess(states[-1:], ends), strict=True):
+            if (end.lower, end.upper) != (v.lower, v.upper):
+                found[f"final value of {phase.name}.{v.name}"] = amount
+        return {label: _or_infinite(amount) for label, amount in found.items()}
+
+
+def _start(
+    problem: CompiledProblem, i: int, planned: PhaseTrajectory, flights: dict[int, _Flight], violations: dict[str, float]
+) -> np.ndarray:
+    """Initial states of phase i; a state into which several phases lead follows the first link, the others are checked."""
+    start = planned.edge_states[0].copy()
+    names = [v.name for v in problem.phases[i].states]
+    taken: set[str] = set()
+    for link in problem.links:
+        if link.second != i:
+            continue
+        before = problem.phases[link.first]
+        place = f"link from '{before.name}' to '{problem.phases[i].name}'"
+        violations[f"{place}: t0"] = _or_infinite(abs(flights[link.first].planned.tf - planned.t0) / before.tf.scale)
+        end = dict(zip((v.name for v in before.states), flights[link.first].trajectory.edge_states[-1], strict=True))
+        for name in link.states:
+            j = names.index(name)
+            if name in taken:
+                violations[f"{place}: {name}"] = _or_infinite(abs(end[name] - start[j]) / problem.phases[i].states[j].scale)
+            else:
+                start[j] = end[name]
+                taken.add(name)
+    return start
+
+
+def _fly(
+    phase: CompiledPhase,
+    planned: Sequence[PhaseTrajectory],
+    starts: np.ndarray,
+    parameters: Sequence[np.ndarray],
+    rtol: float,
+    atol: float,
+    method: str,
+) -> list[_Flight]:
+    """Fly one phase of n trajectories of one shape from their `starts` (n, nx)."""
+    integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
+    y, elements = np.hstack([starts, integrals]), []
+    tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+    for j in range(len(planned[0].state.edges) - 1):
+        arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
+        elements.append(arcs.fly(y, rtol, tolerances, method))
+        y = elements[-1][:, -1]
+    return [_flight(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
+
+
+def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _Flight:
+    """What is to be known of a flown phase, of which there are states and integrals (N, len(DENSE), ny) on its elements."""
+    edges, nx = planned.state.edges, len(phase.states)
+    s = np.concatenate([[planned.t0, planned.tf], parameters])
+    times = (edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]).ravel()
+    states = elements[:, :, :nx].reshape(-1, nx)
+    controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
+    paths, peaks = looked_at(phase, states, controls, times, s)
+    # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
+    kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
+    trajectory = replace(
+        planned,
+        time=times[kept],
+        states=states[kept],
+        controls=controls[kept],
+        paths=paths[kept],
+        state=PiecewisePolynomial(edges, elements[:, :, :nx], "lobatto"),
+    )
+    initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
+    finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
+    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks.max(axis=0)])
+    return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
+
+
+def _or_infinite(value: float) -> float:
+    return float(value) if np.isfinite(value) else float("inf")

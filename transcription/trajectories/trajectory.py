@@ -1,0 +1,170 @@
+"""What a user looks at: the states and controls of one flight, interpolated by the polynomials of the method that made it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.compiled import Limit, Variable
+
+from ..numerics.polynomials import basis_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewisePolynomial:
+    """Polynomials on consecutive elements, right-continuous.
+
+    Parameters
+    ----------
+    edges : array (N + 1,)
+        Increasing ends of the elements, in time.
+    coefficients : array (N, degree + 1, k)
+        Of `k` quantities in the basis, on each element.
+    basis : str
+        One of `polynomials.BASES`: "lobatto", "legendre" (values at those nodes) or "bernstein".
+    """
+
+    edges: np.ndarray
+    coefficients: np.ndarray
+    basis: str
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """Values at `times` (any shape), with a last axis of length k. Times outside the elements use the nearest element."""
+        times = np.asarray(times, dtype=float)
+        flat = times.ravel()
+        element = np.clip(np.searchsorted(self.edges, flat, side="right") - 1, 0, len(self.edges) - 2)
+        left, right = self.edges[element], self.edges[element + 1]
+        length = np.where(right > left, right - left, 1.0)
+        values = basis_matrix(self.basis, self.coefficients.shape[1] - 1, 2.0 * (flat - left) / length - 1.0)
+        return np.einsum("ni,nik->nk", values, self.coefficients[element]).reshape(*times.shape, self.coefficients.shape[2])
+
+    def on_element(self, j: int, tau: np.ndarray) -> np.ndarray:
+        """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
+        return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]
+
+    def on_elements(self, tau: np.ndarray) -> np.ndarray:
+        """The same on every element, shape (N, len(tau), k)."""
+        return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values (N, k) at the beginning and at the end of each element, also where elements have no length."""
+        ends = self.on_elements(np.array([-1.0, 1.0]))
+        return ends[:, 0], ends[:, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseTrajectory:
+    """One phase of a flight, at nodes and between them.
+
+    `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
+    `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there; `state`, which is continuous, and `control`
+    interpolate. A periodic control is continued beyond its bounds inside an element, so that it interpolates the short way round. All in
+    the user's units.
+    """
+
+    name: str
+    time_unit: str
+    time: np.ndarray
+    states: np.ndarray
+    controls: np.ndarray
+    paths: np.ndarray
+    state: PiecewisePolynomial
+    control: PiecewisePolynomial
+    state_variables: tuple[Variable, ...]
+    control_variables: tuple[Variable, ...]
+    path_limits: tuple[Limit, ...]
+
+    @property
+    def t0(self) -> float:
+        return float(self.state.edges[0])
+
+    @property
+    def tf(self) -> float:
+        return float(self.state.edges[-1])
+
+    @property
+    def edge_states(self) -> np.ndarray:
+        """States (N + 1, nx) at the ends of the elements: the most accurate that the method knows."""
+        left, right = self.state.ends()
+        return np.vstack([left, right[-1:]])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, controls and path constraints, in that order."""
+        limits: tuple[Variable | Limit, ...] = (*self.state_variables, *self.control_variables, *self.path_limits)
+        return tuple(limit.name for limit in limits)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values at the nodes (`time`) of the state, control or path constraint called `name`."""
+        if name not in self.names:
+            raise KeyError(f"phase '{self.name}' has no '{name}'; it has {', '.join(self.names)}")
+        return np.hstack([self.states, self.controls, self.paths])[:, self.names.index(name)]
+
+    def controls_on(self, j: int, tau: np.ndarray) -> np.ndarray:
+        """Controls (len(tau), nu) on element `j` at local coordinates `tau` in [-1, 1], within the bounds of those that are periodic."""
+        return wrapped(self.control.on_element(j, tau), self.control_variables)
+
+    def controls_on_elements(self, tau: np.ndarray) -> np.ndarray:
+        """The same on every element, shape (N, len(tau), nu)."""
+        return wrapped(self.control.on_elements(tau), self.control_variables)
+
+    def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
+        """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.
+
+        Where a control jumps, at an end of an element, it has its value just after the jump.
+
+        Raises
+        ------
+        ValueError
+            If a time lies outside the phase.
+        """
+        times = np.asarray(time, dtype=float)
+        slack = 1e-12 * max(1.0, abs(self.t0), abs(self.tf))
+        if not np.all((times >= self.t0 - slack) & (times <= self.tf + slack)):
+            raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
+        values = np.concatenate([self.state(times), wrapped(self.control(times), self.control_variables)], axis=-1)
+        return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
+
+
+def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
+    result = np.array(controls, dtype=float)
+    for i, v in enumerate(variables):
+        if v.period:
+            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
+    return result
+
+
+def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Coefficients (N, degree + 1, nu) of which those of periodic controls follow each other the short way round inside an element.
+
+    A step of half a period goes down: other than `numpy.unwrap`, and exactly as the equations of a transcription have it.
+    """
+    result = np.array(coefficients, dtype=float)
+    for i, v in enumerate(variables):
+        for k in range(1, result.shape[1] if v.period else 0):
+            step = result[:, k, i] - result[:, k - 1, i]
+            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Mapping[str, PhaseTrajectory]):
+    """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
+
+    phases: tuple[PhaseTrajectory, ...]
+    parameters: Mapping[str, float]
+
+    def __getitem__(self, name: str) -> PhaseTrajectory:
+        for phase in self.phases:
+            if phase.name == name:
+                return phase
+        raise KeyError(f"no phase '{name}'; there are {', '.join(self)}")
+
+    def __iter__(self) -> Iterator[str]:
+        return (phase.name for phase in self.phases)
+
+    def __len__(self) -> int:
+        return len(self.phases)
