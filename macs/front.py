@@ -14,10 +14,9 @@ import numpy as np
 from problems.compiled import CompiledProblem, Objective, Variable
 
 from .fronts.decision_table import Decisions
-from .fronts.provenance import Source
+from .fronts.points import by_first, column, frozen, number, shared
+from .fronts.provenance import STATS, Source, versions
 from .point import Point
-from .rows import by_first, column, frozen, number, shared
-from .stats import STATS, versions
 
 if TYPE_CHECKING:
     import xarray

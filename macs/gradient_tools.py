@@ -8,6 +8,8 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
+from itertools import product
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -16,25 +18,31 @@ from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription.base import Transcription
-from transcription.derivatives import objective_scales
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
+from transcription.nlp.scaling import objective_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
 from .fronts.builders import nearest_misses, vectors_front
 from .gradients.multistart import Descents
+from .pareto.directions import simplex_lattice
 from .pareto.dominance import nondominated
 from .point import Point
 from .solvers.start import beginning, check_count, check_freedom, check_problem, check_run
-from .targets import METHODS, check_points, targets
 
 SAME = 1e-7
 """Points whose objectives all differ by less than this fraction of their ranges are one point; dominance is told to the same digits."""
+
+
 ROUNDS = 3
 """How often points of a sweep, or its ends, are solved anew because another one turned out to be better for their purpose."""
+
+
 NO_RANGE, NOTHING = 1e-8, 1e-10
 """An objective that differs between the ends by less than these fractions of its size there, or of its scale, is in no conflict."""
+
+
 BETTER = 1e-6
 """By what fraction of its range an objective is clearly better than at its end."""
 
@@ -267,3 +275,69 @@ class _Job:
         }
         status = [solved.status for solved in found]
         return vectors_front(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more)
+
+
+METHODS = ("pascoletti-serafini", "epsilon")
+
+
+Task = tuple[np.ndarray, np.ndarray]
+"""Reference and weights, as `transcription.nlp.scalarized.scalarize` takes them."""
+
+
+def check_points(points: int, m: int) -> None:
+    """Raise ValueError for a number of points with which m objectives make no front."""
+    if m == 1:
+        raise ValueError("a problem with one objective has no front to sweep; use optimize")
+    if points < m:
+        raise ValueError(f"points must be at least {m}, one for each objective, not {points}")
+
+
+def targets(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> list[Task]:
+    """Problems whose answers, with the ends, make a front of at most `points` points.
+
+    Parameters
+    ----------
+    ends : array (m, m)
+        Objectives, minimised, of the end that is best in each of them.
+    ranges : array (m,)
+        Of the objectives between the ends; 0 for one that is in conflict with no other.
+    points : int
+        Ends included.
+    method : "pascoletti-serafini" or "epsilon"
+
+    Returns
+    -------
+    list of (reference (m,), weights (m,))
+        Neighbours in the list are neighbours on the front, as far as there is such an order. Empty if the objectives are not in conflict.
+    """
+    if np.count_nonzero(ranges) < 2:
+        return []
+    return (_down if method == "pascoletti-serafini" else _limited)(ends, ranges, points)
+
+
+def _down(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """From a lattice on the simplex between the ends, all ranges at once."""
+    m = len(ends)
+    divisions = 1
+    while comb(divisions + m, m - 1) <= points:
+        divisions += 1
+    inner = [share for share in simplex_lattice(m, divisions) if share.max() < 1.0]
+    # An objective without a range has no weight, so that the least value is its limit.
+    level = np.where(ranges > 0, ends, ends.max(axis=0))
+    return [(share @ level, ranges) for share in inner]
+
+
+def _limited(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """The first objective that is in conflict, at all combinations of evenly spread limits of the others."""
+    m = len(ends)
+    first, *others = np.flatnonzero(ranges > 0)
+    levels = int((points - m) ** (1.0 / len(others)) + 1e-9)
+    # Of two objectives, the loosest limit gives an end; of more, combinations with it are new.
+    shares = np.arange(1, levels + 1) / (levels + (len(others) == 1))
+    tasks = []
+    for combination in product(shares, repeat=len(others)):
+        reference = ends.max(axis=0)
+        reference[first] = 0.0
+        reference[others] -= (1.0 - np.array(combination)) * ranges[others]
+        tasks.append((reference, np.where(np.arange(m) == first, ranges, 0.0)))
+    return tasks

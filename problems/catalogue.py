@@ -22,7 +22,7 @@ CASES: dict[str, tuple[str, str]] = {
     "reentry_case2": ("problems.cases.reentry.case2:problem", "the same within narrow limits"),
     "reentry_case3": ("problems.cases.reentry.case3:problem", "the same around three no-fly zones"),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
-    "betts_heating": ("problems.betts_heating:problem", "the same with a limit to the heating rate"),
+    "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
 }
 
 

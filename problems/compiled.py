@@ -172,3 +172,27 @@ def _essence(function: ca.Function, ranges: Sequence[Sequence[tuple[float, float
     points = [np.array([rng.uniform(*limits, FINGERPRINT_POINTS) for limits in group]).reshape(-1, FINGERPRINT_POINTS) for group in ranges]
     values = np.array(function(*points)) if function.size1_out(0) else np.empty(0)
     return function.str(True).encode() + " ".join(f"{value:.8e}" for value in values.ravel()).encode()
+
+
+def vector_function(name: str, groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX]) -> ca.Function:
+    """A Function that takes one vector a group of scalar symbols and returns the column of expressions.
+
+    Parameters
+    ----------
+    name : str
+        Of the Function and of its one output.
+    groups : mapping of str to scalar symbols
+        The inputs, in order. A group may be empty.
+    expressions : sequence of scalar MX
+        In those symbols. May be empty.
+
+    Returns
+    -------
+    Function
+    """
+    inputs = [ca.MX.sym(word, len(symbols)) for word, symbols in groups.items()]
+    scalars = [symbol for symbols in groups.values() for symbol in symbols]
+    entries = [vector[i] for vector, symbols in zip(inputs, groups.values(), strict=True) for i in range(len(symbols))]
+    column = ca.vertcat(*expressions) if expressions else ca.MX(0, 1)
+    (column,) = ca.substitute([ca.densify(column)], scalars, entries)
+    return ca.Function(name, inputs, [column], list(groups), [name])

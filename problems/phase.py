@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from . import checks
-from .compiled import CompiledPhase, Limit, Variable
-from .functions import vector_function
+from .compiled import CompiledPhase, Limit, Variable, vector_function
 
 if TYPE_CHECKING:
     from .problem import Problem

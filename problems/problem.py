@@ -10,8 +10,7 @@ from typing import Any
 import casadi as ca
 
 from . import checks
-from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
-from .functions import vector_function
+from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, vector_function
 from .peaks import with_sizes
 from .phase import Phase
 from .sanity import check_numbers

@@ -13,14 +13,14 @@ from transcription import Smooth
 
 from .batch import cells as combining
 from .batch import file as studyfile
+from .batch.cells import Cell
+from .batch.file import INNER, check_inner, sampling, written
 from .batch.store import Store, Summary
-from .cell import Cell
-from .measures.given import check_reference
+from .measures.references import check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
 from .report.published import check as check_paper
 from .report.published import check_against
-from .terms import INNER, check_inner, sampling, written
 
 if TYPE_CHECKING:
     from .report.report import Report

@@ -5,11 +5,16 @@ Only here, at the border, does a violation or a failure ever become part of an o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 HANDLINGS = ("feasible-first", "penalty", "objective")
+
+
 HUGE = 1e30
 """Larger than any objective; its square is still a number."""
+
 
 Told = tuple[np.ndarray, np.ndarray]
 """Objectives (n, m) that are numbers, and violations (n,): 0 where a point counts as feasible, infinite where the evaluation failed."""
@@ -80,3 +85,49 @@ def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
 def _numbers(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
     """F with a number, that nobody is to look at, where the evaluation failed."""
     return np.where(np.isfinite(cv)[:, None], F, HUGE)
+
+
+def total(v: np.ndarray) -> np.ndarray:
+    """Eq. (18) of eq. (16) without its upper end: the sum (k,) of violations v (k, c)."""
+    return v.sum(axis=1)
+
+
+def logarithmic(v: np.ndarray) -> np.ndarray:
+    """Eq. (18) of the logarithms: the sum (k,) of log(1 + v), for violations v (k, c)."""
+    return np.log1p(v).sum(axis=1)
+
+
+def printed(v: np.ndarray) -> np.ndarray:
+    """Eqs. (16)-(18) as printed: the sum (k,) of violations v (k, c), each of which counts as 1 from 1 on, twice the limit."""
+    return np.minimum(v, 1.0).sum(axis=1)
+
+
+SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {"sum": total, "log": logarithmic, "printed": printed}
+
+
+DEGREES = ("largest", *SUMS)
+
+
+def degree(name: str, violation: np.ndarray, violations: Callable[[], np.ndarray], tolerance: float) -> np.ndarray:
+    """The degree of points.
+
+    Parameters
+    ----------
+    name : str
+        One of `DEGREES`; "largest" is the violation itself.
+    violation : array (k,)
+        Infinite where the evaluation failed.
+    violations : callable
+        Returns that of each constraint, (k, c); called only if it is needed.
+    tolerance : float
+        A constraint that is missed by no more counts as satisfied.
+
+    Returns
+    -------
+    array (k,)
+        Infinite where the evaluation failed, positive where the violation exceeds the tolerance.
+    """
+    if name == "largest":
+        return violation
+    v = np.nan_to_num(violations(), nan=np.inf, posinf=np.inf)
+    return np.where(np.isfinite(violation), SUMS[name](np.where(v > tolerance, v, 0.0)), np.inf)

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.directions import tchebycheff
+from ..pareto.directions import check_directions, population_size, reference_directions, tchebycheff
 from ..search.social import pair_up
 from . import constraints as handlings
-from .members import Members
-from .population import State
+from .population import Members, State
 from .pymoo_adapter import Baseline
-from .reference import check_directions, population_size, reference_directions
 
 
 @dataclass

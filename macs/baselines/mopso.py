@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluator
-from ..pareto.dominance import nondominated
+from ..pareto.dominance import dominates, nondominated
 from ..search.loop import box_of
 from . import constraints as handlings
-from .grid import hypercubes, roulette, thin_out
-from .members import Members, evaluate, full_vectors
-from .particles import flown, improved, inertia, velocities
-from .population import PopulationSolver, State, distinct, no_points, thinned
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
 
 WAITING = -1
 
@@ -197,3 +195,97 @@ class MOPSO(PopulationSolver):
     def _goals(self, points: Members, tolerance: float) -> np.ndarray:
         """What is minimised (n, m): objectives that say all, also of constraints; see `handling.by_objectives`."""
         return handlings.by_objectives(*self._told(points, tolerance))
+
+
+def hypercubes(F: np.ndarray, cells: int) -> np.ndarray:
+    """The hypercube of each of the points F (n, m), (n,) of int: those that are occupied are numbered from 0.
+
+    Each objective's range is cut into `cells` equal parts; the greatest value belongs to the last. An objective that does not vary has one.
+    """
+    low, span = F.min(axis=0), np.ptp(F, axis=0)
+    share = np.divide(F - low, span, out=np.zeros_like(F), where=span > 0.0)
+    places = np.minimum((share * cells).astype(int), cells - 1)
+    return np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def roulette(cube: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Draw `count` points, with repetitions, by their hypercubes (n,): rows (count,).
+
+    A hypercube is drawn in inverse proportion to the points in it, then one of these, all alike.
+    """
+    occupancy = np.bincount(cube)
+    wheel = np.cumsum(1.0 / occupancy)
+    drawn = np.searchsorted(wheel[:-1], wheel[-1] * rng.random(count), side="right")
+    first = np.cumsum(occupancy) - occupancy
+    within = (rng.random(count) * occupancy[drawn]).astype(int)
+    return np.argsort(cube, kind="stable")[first[drawn] + within]
+
+
+def thin_out(cube: np.ndarray, limit: int, rng: np.random.Generator) -> np.ndarray:
+    """Which of the points in hypercubes (n,) to keep, (n,) of bool, `limit` of them.
+
+    One at a time is left out, any of those in the fullest hypercube, which is drawn if there are several. (A roulette by occupancy would
+    give every point the same chance, whatever its neighbours.)
+    """
+    keep, occupancy = np.ones(len(cube), dtype=bool), np.bincount(cube)
+    for _ in range(len(cube) - limit):
+        fullest = rng.choice(np.flatnonzero(occupancy == occupancy.max()))
+        keep[rng.choice(np.flatnonzero(keep & (cube == fullest)))] = False
+        occupancy[fullest] -= 1
+    return keep
+
+
+def inertia(share: float, first: float, last: float) -> float:
+    """The weight w of the old velocity when this share of the search is over: on a line from `first` to `last`."""
+    return first + (last - first) * min(max(share, 0.0), 1.0)
+
+
+def velocities(
+    box: Box,
+    X: np.ndarray,
+    V: np.ndarray,
+    best: np.ndarray,
+    leaders: np.ndarray,
+    *,
+    weights: tuple[float, float, float],
+    chance: np.ndarray,
+    largest: float,
+) -> np.ndarray:
+    """New velocities, for an interval of 1: w V + c1 r1 (best - X) + c2 r2 (leaders - X).
+
+    Eq. (22), which is printed with a slip: its differences have the opposite sign, and particles would flee what they are to follow.
+
+    Parameters
+    ----------
+    box : Box
+    X, V, best, leaders : arrays (n, d)
+        Positions and velocities of the particles, the best place of each, and the point of the archive that each follows. Across periodic
+        bounds differences go the short way round.
+    weights : (w, c1, c2)
+    chance : array (2, n, d)
+        r1 and r2, in [0, 1].
+    largest : float
+        In each coordinate; faster ones are slowed down to it.
+    """
+    w, c1, c2 = weights
+    V = w * V + c1 * chance[0] * box.difference(best, X) + c2 * chance[1] * box.difference(leaders, X)
+    return np.clip(V, -largest, largest)
+
+
+def flown(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (n, d) after an interval of 1.
+
+    A coordinate that leaves the box is set to the bound, and its velocity is multiplied by a number of `rebound` (n, d), in [-1, 0]. One
+    that is periodic comes in at the other end, and keeps its velocity.
+    """
+    there = X + V
+    out = ((there < 0.0) | (there > 1.0)) & ~box.wraps
+    return box.put_back(there), np.where(out, V * rebound, V)
+
+
+def improved(F: np.ndarray, best: np.ndarray, coin: np.ndarray) -> np.ndarray:
+    """Whether particles (n,) take F (n, m) for their best instead of `best` (n, m): if it dominates; by `coin` (n,) if neither does.
+
+    Eq. (20).
+    """
+    return dominates(F, best) | (~dominates(best, F) & coin)

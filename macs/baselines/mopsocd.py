@@ -9,8 +9,7 @@ import numpy as np
 
 from ..evaluation.evaluator import Evaluator
 from . import constraints as handlings
-from .members import Members
-from .population import State
+from .population import Members, State
 from .pymoo_adapter import Baseline, rows_of
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from .members import Members
-from .population import State
+from .population import Members, State
 from .pymoo_adapter import Baseline
 
 UNRANKED = -1

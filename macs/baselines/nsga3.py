@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from .members import Members
-from .population import State
+from ..pareto.directions import check_directions, population_size, reference_directions
+from .population import Members, State
 from .pymoo_adapter import Baseline
-from .reference import check_directions, population_size, reference_directions
 
 
 @dataclass

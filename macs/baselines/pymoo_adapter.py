@@ -15,8 +15,7 @@ import numpy as np
 
 from ..evaluation.evaluator import Evaluator
 from ..search.loop import box_of
-from .members import Members, evaluate, full_vectors
-from .population import PopulationSolver, State, distinct, no_points, thinned
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
 
 
 class Baseline(PopulationSolver):

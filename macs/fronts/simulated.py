@@ -14,7 +14,7 @@ from transcription.trajectories.simulate import simulate_all
 from ..evaluation.evaluator import CONVERGED, INFEASIBLE
 from ..front import Front
 from ..pareto.dominance import nondominated
-from ..rows import frozen
+from .points import frozen
 from .provenance import Source
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..agent import NO_DIRECTION
 from ..evaluation.box import Box
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..pareto.directions import normalised
 from . import social
+from .state import NO_DIRECTION
 
 if TYPE_CHECKING:
     from .loop import SearchState

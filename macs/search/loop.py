@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..agent import NO_DIRECTION, Agents
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..gradients import polish
+from ..gradients.polish import Polishing, Solves
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
-from ..solves import Polishing, Solves
 from . import breeding, individual, social
 from . import gradient_action as refinement
+from .state import NO_DIRECTION, Agents
 from .trials import Attempts
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..agent import NO_DIRECTION
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
+from .state import NO_DIRECTION
 
 if TYPE_CHECKING:
     from .loop import SearchState

@@ -23,7 +23,7 @@ import numpy as np
 from ..evaluation.evaluator import Counts
 from ..fronts.files import write_whole
 from ..fronts.labelled import document
-from ..stats import versions
+from ..fronts.provenance import versions
 from .packing import pack, unpack
 
 if TYPE_CHECKING:

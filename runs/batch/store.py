@@ -21,17 +21,26 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+import numpy as np
+
 from macs.front import Front
 from macs.fronts.files import write_whole
+from macs.fronts.tables import duration, text_table
 
-from ..cell import Cell
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
+from .cells import Cell
 from .file import same
 from .lock import locked
 
 MISSING, UNREADABLE = "missing", "unreadable"
+
+
 FORMAT = "macs study"
+
+
 VERSION = 1
+
+
 FREE = ("description", "runs", "time_limit", "reference", "paper", "goal", "nominal", "flights", "note", "cells")
 """What may differ between two calls, or is compared on its own; everything else decides the numbers."""
 
@@ -127,7 +136,6 @@ class Summary:
         return {runs[0].cell: tuple(runs) for runs in found.values()}
 
     def __str__(self) -> str:
-        from ..standing import summary_text
 
         return summary_text(self)
 
@@ -301,3 +309,37 @@ def _record(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, json.JSONDecodeError):
         return {}
     return data if isinstance(data, dict) else {}
+
+
+LINE = 200
+"""Longest reason, in characters."""
+
+
+WORTH = 20
+"""Most failures told one by one."""
+
+
+def summary_text(summary: Summary) -> str:
+    """A table of the cells, and why runs failed."""
+    rows, reasons = [], []
+    for cell, runs in summary.cells.items():
+        finished = [run for run in runs if run.finished]
+        times = [run.wall_time for run in finished if run.wall_time]
+        missing = sum(run.status == "missing" for run in runs)
+        failed = len(runs) - len(finished) - missing
+        rows.append([*cell.labels, str(len(finished)), str(failed), str(missing), duration(float(np.median(times))) if times else "-"])
+        for run in runs:
+            if not run.finished and run.status != "missing":
+                reasons.append(f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LINE])
+    more = [f"and {len(reasons) - WORTH} more"] if len(reasons) > WORTH else []
+    table = text_table(
+        [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]], rows, [True] * 3 + [False] * 4
+    )
+    headline = f"{summary.name}: {summary.finished} of {len(summary.runs)} runs finished"
+    failures = ["", *reasons[:WORTH], *more] if reasons else []
+    return "\n".join([headline, "", table, *failures])
+
+
+def reason(status: str, message: str) -> str:
+    """crashed: ValueError: no such thing."""
+    return f"{status}: {message}" if message else status

@@ -12,7 +12,7 @@ from typing import Any, TextIO
 from macs.io.console import EVERY, minutes
 
 from ..execution.task import FINISHED, Outcome
-from .store import Run
+from .store import Run, reason
 
 SHOWN = 20
 """Most runs in the table."""
@@ -111,8 +111,3 @@ class Watch(AbstractContextManager["Watch"]):
             count = Text(f"{evaluations:,} / {budget:,} evaluations".replace(",", " "))
             rows.add_row(Text(run.cell.name), Text(f"run {run.number}"), bar, count, Text(minutes(elapsed), style="dim"))
         return Group(Text(f"{self._title}: {self._standing()}", style="bold"), rows)
-
-
-def reason(status: str, message: str) -> str:
-    """crashed: ValueError: no such thing."""
-    return f"{status}: {message}" if message else status

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from macs.fronts.tables import text_table
+from macs.io.console import Steps
 from transcription import NLP
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, March, Newton
 from transcription.inner.base import CONVERGED
 from transcription.numerics.batched import compiler
 
-from ..steps import Steps
 from .cases import BATCH, INNER, Batch, Case
 from .measured import Column, Row, short, table
 

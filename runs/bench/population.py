@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from macs.io.console import Steps
 from problems import load
 from transcription import Smooth, Transcription, parse
 from transcription.inner import March
 from transcription.numerics.batched import compiler
 
-from ..steps import Steps
 from .inner import compiling
 from .measured import Column, Row, short, table
 

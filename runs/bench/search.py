@@ -9,6 +9,7 @@ import numpy as np
 
 import transcription
 from macs import MACS, Front, sweep
+from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.archive import spread
 from problems import Problem, load
@@ -17,7 +18,6 @@ from transcription import Transcription
 from transcription.stopping import stopped_by
 
 from ..measures.indicators import gd, hypervolume, igd
-from ..steps import Steps
 from .measured import Column, Row, short, table
 
 POINTS = 10

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..steps import Steps
+from macs.io.console import Steps
+
 from ..study import Study
 from .measured import Column, Row, short, table
 

@@ -19,7 +19,7 @@ def study(arguments: Namespace) -> int:
 def run(arguments: Namespace) -> int:
     """Make the runs that are missing."""
     from ..batch.running import Deserted
-    from ..making.cluster import cluster
+    from ..execution.crew import cluster
     from ..study import Study
 
     if arguments.dask and arguments.jobs:

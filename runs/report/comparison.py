@@ -10,8 +10,7 @@ from macs.front import Front
 
 from ..batch.store import Run, Store
 from ..execution.task import CRASHED, MEMORY, TIMEOUT
-from ..measures.given import Reference, look_up
-from ..measures.references import union
+from ..measures.references import Reference, look_up, union
 from .verified import Verified
 
 EACH = "each on its own"

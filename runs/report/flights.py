@@ -18,9 +18,8 @@ from macs.point import Point
 from problems import load
 from transcription import SingleShooting, from_dict, parse, word
 
-from ..measures.given import Reference
 from ..measures.indicators import pieces, truth
-from ..measures.references import room
+from ..measures.references import Reference, room
 from .comparison import Ground
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .plots import front_figure

@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from macs.front import Front
 from macs.fronts.files import write_whole
+from macs.io.console import Steps
 
 from ..batch import file as studyfile
-from ..batch.store import Store
+from ..batch.store import Store, summary_text
 from ..measures.attainment import attainment
-from ..measures.given import Reference
-from ..measures.references import read
+from ..measures.references import Reference, read
 from ..measures.scale import Scale
 from ..measures.statistics import summarise
-from ..standing import summary_text
-from ..steps import Steps
 from .changed_data import Changed, changes
 from .comparison import Ground, grounds
 from .flights import Flights

@@ -10,8 +10,8 @@ from macs.front import Front
 
 from ..batch.store import Run
 from ..measures.convergence import History
-from ..measures.given import Reference
 from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
+from ..measures.references import Reference
 from .comparison import Ground
 
 INDICATORS: Mapping[str, Callable[..., float]] = {

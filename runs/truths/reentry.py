@@ -24,6 +24,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.fronts.files import write_whole
 from macs.gradients.multistart import Descents
+from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
 from macs.pareto.dominance import nondominated
 from problems import load
@@ -34,8 +35,6 @@ from transcription import DFET
 from transcription.nlp.scalarized import Solved
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
-
-from ..steps import Steps
 
 CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
 EASIEST = "reentry_case1"

@@ -17,8 +17,8 @@ from macs.evaluation.evaluator.blackbox import BlackBox
 from plain import dtlz
 
 from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
-from macs.baselines.reference import reference_directions
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
+from macs.pareto.directions import reference_directions
 from macs.pareto.dominance import nondominated
 from problems import load
 from problems.cases.goddard import reference

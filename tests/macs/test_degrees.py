@@ -11,8 +11,7 @@ from macs.evaluation.evaluator.bilevel import Bilevel
 from macs.evaluation.evaluator.blackbox import BlackBox
 
 from macs import MOPSO, NSGA2, NSGA3
-from macs.baselines.constraints import excess, problem_type, told
-from macs.baselines.degrees import DEGREES, degree
+from macs.baselines.constraints import DEGREES, degree, excess, problem_type, told
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
 from transcription.inner import inner_solver

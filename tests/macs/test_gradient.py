@@ -12,7 +12,7 @@ import pytest
 from smooth_problems import compass, corners, shuttle, slide, still, two_wells, with_peak
 
 from macs import Front, optimize, payoff, sweep
-from macs.targets import targets
+from macs.gradient_tools import targets
 from problems import Problem, load
 from problems.cases.goddard import reference as goddard_reference
 from problems.cases.orbit_rise import reference as orbit_reference

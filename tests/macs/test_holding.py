@@ -15,7 +15,7 @@ import pytest
 from macs.evaluation.evaluator.bilevel import Bilevel
 
 from macs import MACS, Front
-from macs.holding import believable, hold
+from macs.gradients.front_polish import believable, hold
 from macs.io import interrupts as monitor
 from problems import Problem
 from transcription import DFET, SingleShooting

@@ -13,8 +13,7 @@ from moocore import igd
 from plain import zdt
 
 from macs import MOPSO, MOPSOCD
-from macs.baselines.grid import hypercubes, roulette, thin_out
-from macs.baselines.particles import flown, improved, inertia, velocities
+from macs.baselines.mopso import flown, hypercubes, improved, inertia, roulette, thin_out, velocities
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.dominance import nondominated
 from macs.solvers.catalogue import solver

@@ -14,8 +14,7 @@ from synthetic_fronts import black_box, flights
 from macs import MACS, Front
 from macs.fronts.builders import trajectory_columns
 from macs.fronts.verification import verify
-from macs.gradients.mesh_refinement import Refinement
-from macs.resolving import Resolver
+from macs.gradients.mesh_refinement import Refinement, Resolver
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET

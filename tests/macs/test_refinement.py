@@ -11,11 +11,10 @@ from macs.evaluation.evaluator.bilevel import Bilevel
 
 from macs import MACS
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
-from macs.gradients.polish import polish
+from macs.gradients.polish import Solves, polish
 from macs.pareto.archive import Archive
 from macs.search.gradient_action import allowed
 from macs.search.loop import SearchState, begin, conclude
-from macs.solves import Solves
 from problems import Problem, load
 from problems.cases import goddard, orbit_rise
 from transcription import DFET

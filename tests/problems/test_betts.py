@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from macs import optimize
-from problems import betts_heating, load
-from problems.cases import betts
+from problems import load
+from problems.cases import betts, betts_heating
 from transcription import DFET, MultipleShooting
 
 

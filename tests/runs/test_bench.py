@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
@@ -21,7 +22,6 @@ from runs.bench import command, inner, population, search, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
-from runs.steps import Steps
 from transcription import DFET
 
 TINY = inner.Effort(least=1, rounds=1, seconds=0.1, checked=1)

@@ -12,8 +12,8 @@ from misbehaving import Plain, glide
 from macs import Front
 from problems.compiled import Objective
 from runs import Study
+from runs.batch.cells import Cell
 from runs.batch.store import Run
-from runs.cell import Cell
 from runs.cli import main
 from runs.report.comparison import Ground
 from runs.report.goal import Attained, Goal, attained

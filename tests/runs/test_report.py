@@ -16,7 +16,7 @@ from runs import Study, gd, igd
 from runs.batch.store import Store
 from runs.cli import main
 from runs.execution.task import Outcome
-from runs.measures.given import look_up
+from runs.measures.references import look_up
 from runs.report.comparison import grounds
 from runs.report.published import check, published_tables
 from runs.report.report import _plain, _Writer, report

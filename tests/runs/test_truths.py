@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from macs.evaluation.evaluator import CONVERGED, INFEASIBLE
-from runs.steps import Steps
+from macs.io.console import Steps
 from runs.truths import reentry as truths
 from runs.truths.reentry import Truth, Unsolved
 from transcription.nlp.scalarized import Solved

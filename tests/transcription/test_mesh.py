@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from problems import Problem
 from transcription import DFET
-from transcription.mesh import HIGHEST, cuts, degrees, refine, split
-from transcription.meshes.adaptation import judge, next_method
+from transcription.meshes.adaptation import HIGHEST, cuts, degrees, judge, next_method, refine, split
 from transcription.meshes.errors import decay_rates, phase_errors
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
 from transcription.trajectories.simulate import simulate

@@ -19,7 +19,7 @@ from transcription import DFET, MultipleShooting, SingleShooting, from_dict, par
 from transcription import word as said
 from transcription.base import largest
 from transcription.inner import inner_solver
-from transcription.step_mesh import StepMesh
+from transcription.shooting.step import StepMesh
 from transcription.trajectories.simulate import simulate
 
 KINDS = ("constant", "linear", "spline")

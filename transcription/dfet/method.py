@@ -23,10 +23,10 @@ from problems.problem import Problem
 
 from ..assembly import Assembly
 from ..base import NLP, Transcription
-from ..dfet_tables import Tables
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh, as_meshes
 from ..phases.writer import Ends
+from .element import Tables
 from .phase import DFETPhase
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from problems.compiled import CompiledPhase, Variable
 
 from ..base import expanded
-from ..dfet_tables import Tables
 from ..numerics.polynomials import gauss_legendre
 from ..phases.guess import along, line
 from ..phases.layout import Layout
@@ -19,7 +18,7 @@ from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.limits import looked_at
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
-from .element import element_function
+from .element import Tables, element_function
 from .propagation import Propagation
 
 

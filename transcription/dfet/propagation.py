@@ -16,9 +16,8 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..base import expanded
-from ..dfet_tables import Tables
 from ..numerics.elimination import eliminate
-from .element import unwrapped_law, wrapped_controls
+from .element import Tables, unwrapped_law, wrapped_controls
 
 ITERATIONS = 30
 TOLERANCE = 1e-14

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base import NLP
-from .base import CONVERGED, InnerResult, InnerSolver, started
+from .base import CONVERGED, INFEASIBLE, InnerResult, InnerSolver, scored, started
 from .ipopt import Ipopt
 from .newton import Newton
 
@@ -31,3 +31,31 @@ class Auto(InnerSolver):
         parts["iterations"] = found.iterations.copy()
         parts["iterations"][rest] += repaired.iterations
         return replace(found, **parts, clocked=repaired.clocked, fallbacks=len(rest))
+
+
+@dataclass(frozen=True)
+class March(InnerSolver):
+    """Propagates the states from the free variables and changes nothing else; what constraints are left show in the violation."""
+
+    def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
+        """See `InnerSolver.solve`."""
+        start = started(nlp, candidates, warm)
+        k = len(start)
+        return scored(nlp, nlp.fly(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+
+
+NAMED: dict[str, InnerSolver] = {
+    "auto": Auto(),
+    "march": March(),
+    "ipopt": Ipopt(),
+    "ipopt-feasibility": Ipopt(objective="constant"),
+}
+
+
+def inner_solver(inner: str | InnerSolver) -> InnerSolver:
+    """An inner solver by name, or as it is given. Raises ValueError for an unknown name."""
+    if isinstance(inner, InnerSolver):
+        return inner
+    if not isinstance(inner, str) or inner not in NAMED:
+        raise ValueError(f"unknown inner level {inner!r}; there are {', '.join(NAMED)}")
+    return NAMED[inner]

@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
-from ..derivatives import gradients, objective_scales
+from .scaling import gradients, objective_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""

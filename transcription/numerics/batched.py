@@ -17,12 +17,19 @@ import numpy as np
 PAYS, TYPICAL = 30_000_000, 1500
 """Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
 proportion for longer ones."""
+
+
 LONG = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
+
+
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
+
+
 WORTH = 24
 """Calls of a block of so many from which on all of them, by a wide Function, take less time."""
+
 
 log = logging.getLogger(__name__)
 
@@ -161,3 +168,37 @@ def _length(function: ca.Function) -> int:
     """Instructions to be compiled: those of each Function that has a part in it, once."""
     parts = [function, *function.find_functions()]
     return sum(part.n_instructions() for part in parts if part.is_a("SXFunction") or part.is_a("MXFunction"))
+
+
+def widened(function: ca.Function, k: int) -> ca.Function:
+    """k calls of a Function at once, operation by operation: to the last bit what k calls give.
+
+    Parameters
+    ----------
+    function : Function
+        A list of scalar operations (an SXFunction) of dense inputs and outputs.
+    k : int
+
+    Returns
+    -------
+    Function
+        Of matrices (k, size of the input) to matrices (k, size of the output), whose rows are the calls.
+    """
+    symbols = [ca.MX.sym(f"i{i}", k, function.numel_in(i)) for i in range(function.n_in())]
+    entries = [ca.horzsplit(symbol) if symbol.numel() else [] for symbol in symbols]
+    found: list[list[ca.MX]] = [[ca.MX()] * function.numel_out(i) for i in range(function.n_out())]
+    memory: dict[int, ca.MX] = {}
+    for i in range(function.n_instructions()):
+        operation, out, of = function.instruction_id(i), function.instruction_output(i), function.instruction_input(i)
+        if operation == ca.OP_INPUT:
+            memory[out[0]] = entries[of[0]][of[1]]
+        elif operation == ca.OP_OUTPUT:
+            value = memory[of[0]]
+            found[out[0]][out[1]] = value if value.numel() == k else ca.repmat(value, k, 1)
+        elif operation == ca.OP_CONST:
+            memory[out[0]] = ca.MX(function.instruction_constant(i))
+        elif len(of) == 1:
+            memory[out[0]] = ca.MX.unary(operation, memory[of[0]])
+        else:
+            memory[out[0]] = ca.MX.binary(operation, memory[of[0]], memory[of[1]])
+    return ca.Function(function.name(), symbols, [ca.densify(ca.horzcat(ca.MX(k, 0), *columns)) for columns in found])

@@ -20,12 +20,11 @@ from ..assembly import Assembly
 from ..base import NLP, Transcription
 from ..phases.layout import Layout
 from ..phases.writer import Ends
-from ..step_mesh import StepMesh
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
 from .runge_kutta import tableau
 from .stability import check_steps
-from .step import Step
+from .step import Step, StepMesh
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -13,17 +13,15 @@ from problems.compiled import CompiledPhase
 
 from ..base import CHAIN
 from ..dfet.element import wrapped_controls
-from ..numerics.batched import Batched, work
+from ..numerics.batched import Batched, widened, work
 from ..numerics.polynomials import basis_matrix, lobatto_nodes
 from ..phases.guess import along, line
 from ..phases.layout import Layout
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
-from ..step_mesh import StepMesh
 from ..trajectories.limits import looked_at
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
-from ..widening import widened
 from .control_law import ControlLaw
-from .step import Step
+from .step import Step, StepMesh
 
 FORGOTTEN = 1e-17
 """Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""

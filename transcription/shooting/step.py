@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -133,3 +134,28 @@ class Step:
         """Controls (nu,) at a place in [0, 1], within the bounds of those that are periodic."""
         weights = basis_matrix("lobatto", self.degree, np.array([2.0 * place - 1.0])).T
         return wrapped_controls(C @ ca.sparsify(ca.DM(weights)), self.phase)
+
+
+SAME = 1e-9
+"""Places nearer to each other than this, relative to the phase, are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepMesh:
+    """Where steps begin and end: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
+
+    places: np.ndarray
+    ends: np.ndarray
+
+    @classmethod
+    def of(cls, intervals: int, steps: int, nodes: np.ndarray) -> StepMesh:
+        """`intervals` equal ones of `steps` equal steps each; a step across one of the nodes of controls becomes two."""
+        whole = np.linspace(0.0, 1.0, intervals * steps + 1)
+        apart = np.abs(nodes[:, None] - whole).min(axis=1) > SAME
+        places = np.sort(np.concatenate([whole, nodes[apart]]))
+        return cls(places, np.searchsorted(places, whole[::steps]))
+
+    @property
+    def steps(self) -> int:
+        """How many steps there are, N."""
+        return len(self.places) - 1

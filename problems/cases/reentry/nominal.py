@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from ...functions import vector_function
+from ...compiled import vector_function
 from ...phase import Phase
 
 ATTACK = np.radians([17.4, 17.4])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .cases.betts import betts
-from .problem import Problem
+from ..problem import Problem
+from .betts import betts
 
 HEATING_RATE = 70.0
 """The most, Btu/ft2/s."""
