@@ -4,9 +4,9 @@ from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
 from .gradient_tools import optimize, payoff, sweep
-from .io.interrupts import Progress
 from .point import Point
 from .search.macs import MACS
+from .solvers.progress import Progress
 from .solvers.solver import Solver
 
 __all__ = [

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
-from transcription.base import Transcription
+from transcription.base import Transcription, check_freedom, check_problem
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import objective_scales
@@ -29,7 +30,7 @@ from .gradients.multistart import Descents
 from .pareto.directions import simplex_lattice
 from .pareto.dominance import nondominated
 from .point import Point
-from .solvers.start import beginning, check_count, check_freedom, check_problem, check_run
+from .solvers.start import beginning, check_run
 
 SAME = 1e-7
 """Points whose objectives all differ by less than this fraction of their ranges are one point; dominance is told to the same digits."""

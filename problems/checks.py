@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -164,3 +165,22 @@ def _shown(value: Any) -> str:
     """A value on one line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def check_positive(name: str, value: Any) -> None:
+    """Raise ValueError that names what is no positive number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
+        raise ValueError(f"{name} must be a positive number, not {value!r}")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Raise ValueError unless `value` is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def unknown(what: str, word: Any, known: Iterable[str]) -> str:
+    """What to say of a word that is none of those known: the nearest, and all."""
+    words = [*known]
+    near = difflib.get_close_matches(str(word), words, n=1)
+    return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"

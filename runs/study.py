@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.solvers.start import check_count, check_positive
+from problems.checks import check_count, check_positive
 from transcription import Smooth
 
 from .batch import cells as combining

@@ -14,8 +14,8 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
-from .base import NLP, Profile, Transcription, expanded
-from .numerics.batched import Batched
+from .base import NLP, Profile, Transcription
+from .numerics.batched import Batched, expanded
 from .phases.guess import along
 from .phases.layout import Layout
 from .phases.reduced import Reduced

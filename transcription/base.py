@@ -37,20 +37,6 @@ class Transcription(ABC):
         return {"method": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
 
 
-CHAIN = "chain"
-"""What a Function is called that repeats so much that it, and what it is a part of, is not to be written out."""
-
-
-def expanded(function: ca.Function) -> ca.Function:
-    """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
-    if any(part.name() == CHAIN for part in function.find_functions()):
-        return function
-    try:
-        return function.expand()
-    except RuntimeError:
-        return function
-
-
 @dataclass(frozen=True, eq=False)
 class Profile:
     """The free variables that are one control of one phase.
@@ -239,3 +225,22 @@ def largest(residuals: np.ndarray) -> np.ndarray:
     """Violations (k,) of what `NLP.residuals` returned (k, n + r): the largest of each row, at least 0; infinite where it is no number."""
     violation = residuals.max(axis=1, initial=0.0)
     return np.where(np.isfinite(violation), violation, np.inf)
+
+
+def check_problem(problem: Any, transcription: Any) -> None:
+    """Raise ValueError if these are no problem and no transcription."""
+    if not isinstance(problem, Problem | CompiledProblem):
+        raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
+    if not isinstance(transcription, Transcription):
+        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
+
+
+def check_freedom(nlp: NLP) -> None:
+    """Raise ValueError if there is nothing to search."""
+    if not len(nlp.free):
+        raise ValueError(
+            f"problem '{nlp.problem.name}' leaves nothing to decide: no control, no parameter, no free time and no free initial state"
+        )
+
+
+CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"

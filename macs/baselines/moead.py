@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.directions import check_directions, population_size, reference_directions, tchebycheff
-from ..search.social import pair_up
+from ..pareto.directions import check_directions, pair_up, population_size, reference_directions, tchebycheff
 from . import constraints as handlings
 from .population import Members, State
 from .pymoo_adapter import Baseline

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.box import Box
+from ..evaluation.box import Box, box_of
 from ..evaluation.evaluator import Evaluator
 from ..pareto.dominance import dominates, nondominated
-from ..search.loop import box_of
 from . import constraints as handlings
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
 

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import check_count
+
+from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Archive, least_violated
 from ..pareto.dominance import nondominated
-from ..search.loop import box_of
 from ..solvers.solver import Solver
-from ..solvers.start import check_count
 from . import constraints as degrees
 from . import constraints as handlings
 from .constraints import DEGREES

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
-from ..search.loop import box_of
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from .evaluator import Evaluator
+
 
 @dataclass(frozen=True)
 class Box:
@@ -82,3 +84,8 @@ class Box:
         """A Latin hypercube of `count` points, (count, d) (McKay, Beckman and Conover 1979)."""
         strata = rng.permuted(np.tile(np.arange(count), (len(self.lower), 1)), axis=1).T
         return (strata + rng.random(strata.shape)) / count
+
+
+def box_of(evaluator: Evaluator) -> Box:
+    """The box of an evaluator's free variables."""
+    return Box(evaluator.lower, evaluator.upper, evaluator.period > 0.0)

@@ -15,9 +15,9 @@ from transcription.trajectories.limits import excursions
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..front import Front
+from ..io.text import counted
 from ..pareto.archive import Archive
 from ..point import Point
-from .tables import counted
 
 
 def trajectory_front(

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from .front_plot import COLORS, GREY, STYLE, label, new_figure
+from .style import COLORS, GREY, STYLE, label, new_figure
 
 if TYPE_CHECKING:
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory

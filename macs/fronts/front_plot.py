@@ -11,53 +11,14 @@ import numpy as np
 
 from problems.compiled import Objective
 
+from ..io.atomic import write_whole
 from ..point import Point
-from .files import write_whole
+from .style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..front import Front
-
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
-"""Okabe and Ito's, with a wine red for black, which references are near to: people with any colour vision tell them apart."""
-GREY = "#666666"
-STYLE = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.labelsize": 9.0,
-    "legend.fontsize": 8.0,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.5,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 6),
-}
-
-
-def new_figure(width: float, height: float) -> Any:
-    """A figure that `pyplot.show` will show where there is a display, and one that can be saved anywhere."""
-    try:
-        from matplotlib import pyplot
-
-        return pyplot.figure(figsize=(width, height), layout="constrained")
-    except ImportError:
-        # The backend that the environment names needs a display, or a toolkit, that is not here.
-        from matplotlib.figure import Figure
-
-        return Figure(figsize=(width, height), layout="constrained")
-
-
-def blank_figure() -> Any:
-    """A figure of no window, for files."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(5.5, 4.0), layout="constrained")
 
 
 def save_picture(what: Front | Point, path: str | PathLike[str]) -> None:
@@ -108,17 +69,6 @@ def draw_front(front: Front, ax: Axes | None = None) -> Axes:
             _scatter(front, ax)
         ax.set_title(_title(front), loc="left", color=GREY)
     return ax
-
-
-def label(name: str, unit: str) -> str:
-    """`name [unit]`, for an axis."""
-    return f"{name} [{unit}]" if unit else name
-
-
-def better(goal: Objective) -> str:
-    """An axis' label that says where it is better. On an upright axis, left is down."""
-    text = label(goal.name, goal.unit)
-    return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"
 
 
 def _title(front: Front) -> str:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from problems.checks import check_count, check_positive
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import NLP, Transcription
+from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import March
 from transcription.stopping import stopped_by
 from transcription.trajectories.simulate import simulate_all
@@ -24,8 +25,7 @@ from ..io.interrupts import Monitor
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
-from ..search.gradient_action import ranges
-from ..solvers.start import check_count, check_positive, check_problem
+from ..pareto.ranges import ranges
 from .polish import Solves, polish
 
 if TYPE_CHECKING:

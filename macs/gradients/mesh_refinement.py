@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from problems.checks import check_count, check_positive
 from transcription import from_dict
 from transcription.base import NLP
 from transcription.dfet.method import DFET
@@ -25,7 +26,6 @@ from ..io.console import Told
 from ..io.interrupts import Monitor
 from ..pareto.dominance import extremes
 from ..point import Point
-from ..solvers.start import check_count, check_positive
 
 if TYPE_CHECKING:
     from ..front import Front

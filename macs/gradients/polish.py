@@ -13,7 +13,7 @@ from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from ..pareto.directions import across, simplex_lattice
 from ..pareto.dominance import extremes, nondominated
-from ..search.gradient_action import CURVE, SAME, keeps_promise, nearest, ranges, slack
+from ..pareto.ranges import CURVE, SAME, keeps_promise, nearest, ranges, slack
 
 PLACES = 500
 """How many places a surface has, at most."""

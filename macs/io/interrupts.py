@@ -5,57 +5,19 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..front import Front
+    from ..solvers.progress import Progress
 
 
 class Stopped(Exception):  # noqa: N818 - an end, not an error
     """The search is to end with what it has. The text says why."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How a search stands.
-
-    Attributes
-    ----------
-    evaluations, budget : int
-    elapsed : float
-        Seconds.
-    archive : int
-        Points in the archive.
-    ideal : mapping
-        The best value of each objective in the archive, by name, in the user's senses; empty as long as nothing feasible was found.
-    failures : mapping
-        Evaluations that did not converge, by status.
-    F : array (archive, m)
-        Objectives of the points in the archive, all minimised; costs nothing, unlike `front`.
-    inner_iterations, gradient_solves : int
-    """
-
-    evaluations: int
-    budget: int
-    elapsed: float
-    archive: int
-    ideal: Mapping[str, float]
-    failures: Mapping[str, int]
-    make_front: Callable[[], Front] = field(repr=False)
-    F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
-    inner_iterations: int = 0
-    gradient_solves: int = 0
-
-    @property
-    def front(self) -> Front:
-        """The front found so far; made when it is asked for."""
-        return self.make_front()
 
 
 class Monitor(AbstractContextManager["Monitor"]):

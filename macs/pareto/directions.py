@@ -174,3 +174,16 @@ def check_directions(name: str, m: int, population: int | None, divisions: int |
     if population > 2 * count:
         fitting = divisions_below(m, population)
         raise ValueError(f"{name}: {directions}, too few for population={population}; divisions={fitting} makes {lattice_size(m, fitting)}")
+
+
+def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pair rows with columns of `costs` (r, c), the globally cheapest pair first: two arrays (min(r, c),) of int."""
+    costs = costs.astype(float, copy=True)
+    rows, columns = [], []
+    for _ in range(min(costs.shape)):
+        row, column = np.unravel_index(np.argmin(costs), costs.shape)
+        rows.append(row)
+        columns.append(column)
+        costs[row, :] = np.inf
+        costs[:, column] = np.inf
+    return np.array(rows, dtype=int), np.array(columns, dtype=int)

@@ -8,19 +8,28 @@ solves what is separable and full of local fronts, differences solve what is cou
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..evaluation.box import Box
+from .state import SearchState, remember
+from .trials import Attempts
+
+if TYPE_CHECKING:
+    from .macs import MACS
 
 NEAR, WIDE = 20, 0.3
 """Among how many of the nearest mates are chosen; the probability that they are chosen among all (Zhang and Li 2007; Li and Zhang 2009)."""
 
+
 DIFFERENCE = 0.5
 """Weight of a difference of two mates, the usual one (Li and Zhang 2009)."""
 
+
 INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 """Distribution indices: the higher, the nearer offspring are to their parents (Deb and Agrawal 1995)."""
+
 
 LEAST_SHARE, FORGET = 0.05, 0.1
 """Least share of an operator in the offspring, so that it may show its worth later; which part of the credit is forgotten each time."""
@@ -77,6 +86,7 @@ def draw_anew(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generat
 
 
 Operator = Callable[[Box, np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+
 
 OPERATORS: tuple[tuple[Operator, bool], ...] = ((crossover, True), (differential, True), (toward_mate, True), (draw_anew, False))
 """The operators, and whether their offspring also mutate."""
@@ -146,3 +156,26 @@ def shares(credit: np.ndarray) -> np.ndarray:
 def _part(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Which coordinates take part, (k, d) of bool: all of them, or every second time half of them."""
     return rng.random(X.shape) < np.where(rng.random((len(X), 1)) < 0.5, 1.0, 0.5)
+
+
+def breed_archive(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
+    """Offspring of points of the archive, of as many as possible; the operators whose offspring it keeps will make more."""
+    archive, evaluator, rng = state.archive, attempts.evaluator, state.rng
+    count = settings.offspring(len(archive))
+    if not count:
+        return
+    rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
+    rows = np.concatenate(rounds)[:count]
+    points = box.to_unit(archive.Z[:, evaluator.free])
+    pool = points if len(points) > FEW else np.vstack([points, attempts.positions()])
+    trial, operator = breed(box, points[rows], pool, state.credit, rng)
+    bred, result = attempts.look(archive.Z[rows], points[rows], trial)
+    if result is None:
+        return
+    remember(state, attempts.seen, settings, evaluator)
+    kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
+    state.credit = learn(state.credit, operator[bred], kept)
+
+
+FEW = 4
+"""An archive of so many points is too small to find mates in: the agents are mates too."""

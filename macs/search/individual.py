@@ -6,9 +6,16 @@ sends the proposals of all agents together, and goes on with those that had no s
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..evaluation.box import Box
+from .state import SearchState
+from .trials import Attempts
+
+if TYPE_CHECKING:
+    from .macs import MACS
 
 
 def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:
@@ -69,3 +76,35 @@ def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.ran
     scores = rng.random((len(agents), population))
     scores[np.arange(len(agents)), agents] = np.inf
     return np.argsort(scores, axis=1)[:, np.arange(count) % max(population - 1, 1)].T
+
+
+def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
+    """Inertia, pattern search, differential evolution: the agents go through them in step, and each leaves at its first success."""
+    agents, rng = state.agents, state.rng
+    waiting = np.arange(len(agents))
+    count, d = len(agents), len(box.lower)
+
+    def attempt(propose, velocity=True) -> None:
+        nonlocal waiting
+        if waiting.size:
+            X = attempts.positions(waiting)
+            waiting = waiting[~attempts.try_out(waiting, X, propose(waiting, X), velocity)]
+
+    def along_velocity(who: np.ndarray, X: np.ndarray) -> np.ndarray:
+        return inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng)
+
+    attempt(along_velocity, settings.keep_velocity)
+    order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
+    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], attempts.budget)
+    for coordinate in order.T[:scanned]:
+        length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
+        side = rng.choice([-1.0, 1.0], count)
+        attempt(lambda who, X, c=coordinate, s=side * length[0]: coordinate_step(box, X, c[who], s[who]))
+        attempt(lambda who, X, c=coordinate, s=-side * length[1]: coordinate_step(box, X, c[who], s[who]))
+
+    def by_differences(who: np.ndarray, X: np.ndarray) -> np.ndarray:
+        donors = attempts.positions()[distinct_others(who, count, 3, rng)]
+        return differential(box, X, donors, settings.F, settings.CR, rng)
+
+    attempt(by_differences, settings.keep_velocity)
+    agents.adapt_radius(attempts.credited, settings.rho, settings.contraction, settings.max_contractions)

@@ -17,7 +17,7 @@ from ..evaluation.evaluator import Evaluator
 from ..front import Front
 from ..solvers.solver import Solver
 from . import loop as search
-from .loop import SearchState
+from .state import SearchState
 
 SHARE = 8
 """Of the budget, this part is the most that an iteration's scan of the coordinates may take."""

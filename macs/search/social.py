@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..evaluation.box import Box
+from ..evaluation.evaluator import Evaluator
+from ..pareto import archive as archives
+from ..pareto import directions
+from .state import NO_DIRECTION, SearchState
+from .trials import Attempts
+
+if TYPE_CHECKING:
+    from .macs import MACS
 
 
 def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
@@ -73,14 +83,53 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
     return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
 
 
-def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pair rows with columns of `costs` (r, c), the globally cheapest pair first: two arrays (min(r, c),) of int."""
-    costs = costs.astype(float, copy=True)
-    rows, columns = [], []
-    for _ in range(min(costs.shape)):
-        row, column = np.unravel_index(np.argmin(costs), costs.shape)
-        rows.append(row)
-        columns.append(column)
-        costs[row, :] = np.inf
-        costs[:, column] = np.inf
-    return np.array(rows, dtype=int), np.array(columns, dtype=int)
+def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts, evaluator: Evaluator) -> None:
+    """One proposal for each social agent: from the points near it, of the archive or of the population, or from what has helped others."""
+    agents, rng = state.agents, state.rng
+    rows = np.flatnonzero(agents.direction != NO_DIRECTION)
+    if not rows.size:
+        return
+    X = attempts.positions(rows)
+    everyone = attempts.positions()
+    archive = box.to_unit(state.archive.Z[:, evaluator.free])
+    trial = current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
+    if len(archive) > 3:
+        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len({row.tobytes() for row in everyone}))
+        trial = np.where(pick[:, None], current_to_rand(box, X, archive, max(len(rows), 4), settings.F, rng), trial)
+    if len(state.experience) > 3:
+        pick = rng.random(len(rows)) < settings.experience
+        trial = np.where(pick[:, None], follow_experience(box, X, state.experience, rng), trial)
+    if settings.social_moves:
+        attempts.try_out(rows, X, trial, settings.keep_velocity)
+    else:
+        attempts.look(agents.Z[rows], X, trial)
+
+
+def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -> None:
+    """Give the social agents their directions, and send them to the points of the archive that are best for these.
+
+    While the archive has fewer points than there are objectives nobody is sent, or, as in the authors' code, the nearest of the agents
+    that own the orthogonal directions.
+    """
+    agents, archive, m = state.agents, state.archive, state.directions.shape[1]
+    social_count = min(settings.social_agents(m), len(agents))
+    if not social_count:
+        return
+    if settings.redraw or not (agents.direction != NO_DIRECTION).any():
+        agents.direction[:] = NO_DIRECTION
+        agents.direction[:social_count] = directions.draw(state.directions, social_count, state.rng)
+    owners = np.flatnonzero(agents.direction != NO_DIRECTION)
+    if len(archive) >= m:
+        if settings.reseed == "spread" and len(archive) > len(owners) >= m:
+            archive = archive.take(archives.spread(archive.F, len(owners), exponent=settings.exponent))
+        weights = state.directions[agents.direction[owners]]
+        costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
+    elif settings.reseed == "spread":
+        owners = owners[agents.direction[owners] < m]
+        apart = directions.normalised(archive.F[:, None] - agents.F[owners], np.zeros(m), state.nadir - state.ideal)
+        costs = np.nan_to_num(np.linalg.norm(apart, axis=-1), nan=np.finfo(float).max)
+    else:
+        return
+    points, columns = directions.pair_up(costs)
+    rows = owners[columns]
+    agents.place(rows, archive.Z[points], archive.F[points], archive.violation[points])

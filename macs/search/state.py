@@ -1,10 +1,19 @@
-"""Agents: the population, one array per property, one row per agent."""
+"""The state of a search: agents, archive, and what else has to be known between two iterations."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ..evaluation.evaluator import Evaluation, Evaluator
+from ..gradients.polish import Polishing
+from ..pareto import archive as archives
+from ..pareto.archive import Archive
+
+if TYPE_CHECKING:
+    from .macs import MACS
 
 NO_DIRECTION = -1
 
@@ -64,3 +73,74 @@ class Agents:
         anew = (self.contractions < 0) | (self.contractions > limit)
         self.contractions[anew] = 0
         self.rho[anew] = rho
+
+
+@dataclass
+class SearchState:
+    """Everything a search knows between two iterations: with it, and the same evaluator and settings, it goes on as if never stopped.
+
+    Attributes
+    ----------
+    agents : Agents
+    archive : Archive
+    closest : Archive
+        The least violated point seen, one row, as long as none was feasible; no row before and after.
+    ideal, nadir : arrays (m,)
+        The best feasible values ever seen; the worst ones in the archive. NaN before there are any.
+    directions : array (k, m)
+        The pool that the agents' directions are drawn from.
+    experience : array (k, d)
+        The displacements of the last improvements of any agent, in units of span, oldest first.
+    credit : array (o, 2)
+        Of the operators that breed from the archive: how many of their offspring it kept, and how many there were, the older the less.
+    iteration, evaluations, refinements : int
+        Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
+    rng : numpy.random.Generator
+        Its `bit_generator.state` is data, and all there is to keep of it.
+    polishing : Polishing, optional
+        Of a polish that has begun and is not finished: where to go on.
+    """
+
+    agents: Agents
+    archive: Archive
+    closest: Archive
+    ideal: np.ndarray
+    nadir: np.ndarray
+    directions: np.ndarray
+    experience: np.ndarray
+    credit: np.ndarray
+    iteration: int
+    evaluations: int
+    rng: np.random.Generator
+    refinements: int = 0
+    polishing: Polishing | None = None
+
+
+def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluator: Evaluator) -> None:
+    """Offer what was seen to the archive, and keep the ideal and nadir points, or else the least violated point."""
+    if not seen:
+        return
+    Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
+    violation = np.concatenate([e.violation for e in seen])
+    limit, tolerance = settings.archive, evaluator.tolerance
+    state.archive = archives.insert(state.archive, Z, F, violation, limit=limit, tolerance=tolerance, exponent=settings.exponent)
+    if len(state.archive):
+        state.ideal = np.fmin(state.ideal, state.archive.F.min(axis=0))
+        state.nadir = state.archive.F.max(axis=0)
+        state.closest = state.closest.take(np.arange(0))
+        return
+    state.closest = archives.least_violated(state.closest, Z, F, violation)
+
+
+def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: MACS) -> Agents:
+    """Agents at rest on the evaluated points `rows`."""
+    count = len(rows)
+    return Agents(
+        Z=seen.Z[rows],
+        F=seen.F[rows],
+        violation=seen.violation[rows],
+        velocity=np.zeros((count, d)),
+        rho=np.full(count, settings.rho),
+        contractions=np.zeros(count, dtype=int),
+        direction=np.full(count, NO_DIRECTION),
+    )

@@ -13,8 +13,8 @@ from ..pareto.dominance import constrained_dominates
 from .state import NO_DIRECTION
 
 if TYPE_CHECKING:
-    from .loop import SearchState
     from .macs import MACS
+    from .state import SearchState
 
 CREDIT = 0.5
 """Least part of a proposed step that must have been achieved for the radius to take it as its own success."""

@@ -6,8 +6,9 @@ import importlib
 import inspect
 from typing import Any
 
+from problems.checks import unknown
+
 from .solver import Solver
-from .start import unknown
 
 SOLVERS: dict[str, str] = {
     "macs": "macs.search.macs:MACS",

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, cast, get_type_hints
 import numpy as np
 
 from ..evaluation.evaluator import Counts
-from ..fronts.files import write_whole
 from ..fronts.labelled import document
 from ..fronts.provenance import versions
+from ..io.atomic import write_whole
 from .packing import pack, unpack
 
 if TYPE_CHECKING:

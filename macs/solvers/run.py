@@ -17,8 +17,9 @@ from transcription.stopping import stopped_by
 
 from ..evaluation.evaluator import Counts, Evaluator
 from ..front import Front
-from ..io.interrupts import Monitor, Progress, Stopped
+from ..io.interrupts import Monitor, Stopped
 from .checkpoint import Checkpoint, Kept
+from .progress import Progress
 
 if TYPE_CHECKING:
     from .solver import Solver
@@ -197,6 +198,6 @@ class Run:
 def _display(progress: bool) -> AbstractContextManager[Callable[[Progress], None] | None]:
     if not progress:
         return nullcontext()
-    from ..io.console import Display
+    from .progress import Display
 
     return Display()

@@ -13,7 +13,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
 from problems.problem import Problem
-from transcription.base import Transcription
+from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
 
@@ -22,9 +22,9 @@ from ..evaluation.blackbox import BlackBox
 from ..evaluation.evaluator import Evaluator
 from ..front import Front
 from ..fronts.builders import black_box_front, trajectory_front
-from ..io.interrupts import Progress
+from .progress import Progress
 from .run import ENDED, Run
-from .start import beginning, check_freedom, check_problem, check_run, decisions, drawing
+from .start import beginning, check_run, decisions, drawing
 
 Callback = Callable[[Progress], Any]
 NO_TIME = 1e-6

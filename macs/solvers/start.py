@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Variable
-from problems.problem import Problem
-from transcription.base import NLP, Transcription
+from problems.checks import check_count, check_positive, unknown
+from problems.compiled import Variable
+from transcription.base import NLP
 from transcription.smooth import Smooth
 
 from ..front import Front
-from ..fronts.files import check_target
+from ..io.atomic import check_target
 from ..point import Point
 
 STARTS = ("uniform", "smooth")
 """How first candidates are drawn."""
+
+
 OTHER = "start: the points are of other variables; a start belongs to one problem"
 
 
@@ -38,41 +38,6 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
         if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
             raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
         check_target(checkpoint)
-
-
-def check_positive(name: str, value: Any) -> None:
-    """Raise ValueError that names what is no positive number."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value) or value <= 0:
-        raise ValueError(f"{name} must be a positive number, not {value!r}")
-
-
-def check_count(name: str, value: Any, least: int) -> None:
-    """Raise ValueError unless `value` is a whole number of at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
-
-
-def unknown(what: str, word: Any, known: Iterable[str]) -> str:
-    """What to say of a word that is none of those known: the nearest, and all."""
-    words = [*known]
-    near = difflib.get_close_matches(str(word), words, n=1)
-    return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
-
-
-def check_problem(problem: Any, transcription: Any) -> None:
-    """Raise ValueError if these are no problem and no transcription."""
-    if not isinstance(problem, Problem | CompiledProblem):
-        raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
-    if not isinstance(transcription, Transcription):
-        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
-
-
-def check_freedom(nlp: NLP) -> None:
-    """Raise ValueError if there is nothing to search."""
-    if not len(nlp.free):
-        raise ValueError(
-            f"problem '{nlp.problem.name}' leaves nothing to decide: no control, no parameter, no free time and no free initial state"
-        )
 
 
 def drawing(start: Any) -> Smooth | str | None:

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from macs.fronts.tables import call
+from macs.io.text import call
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver
-from macs.solvers.start import check_count
 from problems import Problem, load
+from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from transcription import Transcription, parse, word
 

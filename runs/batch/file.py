@@ -12,8 +12,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from macs.solvers.start import drawing, unknown
+from macs.solvers.start import drawing
 from problems import Problem
+from problems.checks import unknown
 from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED

@@ -9,7 +9,7 @@ from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from macs.solvers.start import check_count
+from problems.checks import check_count
 
 from ..execution.crew import Crew, Hired, Local
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, Task

@@ -24,8 +24,8 @@ from zlib import crc32
 import numpy as np
 
 from macs.front import Front
-from macs.fronts.files import write_whole
-from macs.fronts.tables import duration, text_table
+from macs.io.atomic import write_whole
+from macs.io.text import duration, text_table
 
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 from .cells import Cell

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.fronts.tables import text_table
 from macs.io.console import Steps
+from macs.io.text import text_table
 from transcription import NLP
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, March, Newton
 from transcription.inner.base import CONVERGED

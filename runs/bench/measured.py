@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.fronts.tables import text_table
+from macs.io.text import text_table
 
 from ..report.tables import short
 

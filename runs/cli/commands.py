@@ -13,16 +13,18 @@ import numpy as np
 import problems
 import transcription
 from macs.front import Front
-from macs.fronts.files import check_target
-from macs.fronts.front_plot import label, save_picture
-from macs.fronts.tables import text_table
+from macs.fronts.front_plot import save_picture
+from macs.fronts.style import label
 from macs.fronts.verification import Check, missed, objective_scales
 from macs.fronts.verification import verify as verify_front
+from macs.io.atomic import check_target
+from macs.io.text import text_table
 from macs.point import Point
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
-from macs.solvers.start import STARTS, unknown
+from macs.solvers.start import STARTS
 from problems import Problem
+from problems.checks import unknown
 from transcription.inner import NAMED
 
 from ..batch import file as studyfile

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from macs.fronts.files import write_whole
+from macs.io.atomic import write_whole
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30

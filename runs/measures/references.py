@@ -15,10 +15,10 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.front_plot import label
+from macs.fronts.style import label
 from macs.pareto.dominance import nondominated
-from macs.solvers.start import unknown
 from problems.catalogue import CASES
+from problems.checks import unknown
 from problems.compiled import Objective
 
 from .indicators import Points, minimised

@@ -14,9 +14,9 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.front_plot import COLORS, better
 from macs.fronts.simulated import check_alike
-from macs.solvers.start import unknown
+from macs.fronts.style import COLORS, better
+from problems.checks import unknown
 
 from ..batch.file import told
 from .comparison import Ground

@@ -12,7 +12,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.flight_plot import along, quantities
-from macs.fronts.front_plot import COLORS, label
+from macs.fronts.style import COLORS, label
 from macs.pareto.archive import spread
 from macs.point import Point
 

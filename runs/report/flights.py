@@ -12,7 +12,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.flight_plot import along
-from macs.fronts.front_plot import label
+from macs.fronts.style import label
 from macs.gradient_tools import payoff
 from macs.point import Point
 from problems import load

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from macs.front import Front
-from macs.solvers.start import unknown
+from problems.checks import unknown
 
 from ..batch.file import is_number
 from ..batch.store import Run

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from macs.front import Front
-from macs.fronts.front_plot import COLORS, GREY, better
+from macs.fronts.style import COLORS, GREY, better
 from problems.compiled import Objective
 
 from ..measures.attainment import Attainment, staircase

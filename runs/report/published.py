@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from macs.baselines.population import PopulationSolver
-from macs.solvers.start import unknown
+from problems.checks import unknown
 
 from ..batch.file import is_number, told
 from .comparison import Ground

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.front import Front
-from macs.fronts.files import write_whole
+from macs.io.atomic import write_whole
 from macs.io.console import Steps
 
 from ..batch import file as studyfile

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.fronts.files import write_whole
-from macs.fronts.front_plot import label
-from macs.fronts.tables import text_table
+from macs.fronts.style import label
+from macs.io.atomic import write_whole
+from macs.io.text import text_table
 
 COUNTED = 1e9
 """Whole numbers below are written in full."""

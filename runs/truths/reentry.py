@@ -22,8 +22,8 @@ import moocore
 import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
-from macs.fronts.files import write_whole
 from macs.gradients.multistart import Descents
+from macs.io.atomic import write_whole
 from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
 from macs.pareto.dominance import nondominated

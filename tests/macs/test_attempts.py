@@ -4,8 +4,8 @@ import copy
 
 import numpy as np
 
+from macs.evaluation.box import box_of
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
-from macs.search.loop import box_of
 from macs.search.macs import MACS
 from macs.search.trials import Attempts
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from ascent import Ascent
 from fronts import distance_to_curve
-from macs.evaluation.evaluator.blackbox import BlackBox
 from plain import dtlz
 
 from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
+from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.directions import reference_directions
 from macs.pareto.dominance import nondominated

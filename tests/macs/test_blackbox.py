@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from macs.evaluation.evaluator.blackbox import BlackBox, read_bounds
 from pymoo.core.problem import ElementwiseProblem
 from pymoo.problems import get_problem
+
+from macs.evaluation.blackbox import BlackBox, read_bounds
 
 
 def two(X):

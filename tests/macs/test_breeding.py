@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from macs.evaluation.evaluator.blackbox import BlackBox
-from macs.evaluation.evaluator.box import Box
 
+from macs.evaluation.blackbox import BlackBox
+from macs.evaluation.box import Box
 from macs.search import breeding
 from macs.search.macs import MACS
 

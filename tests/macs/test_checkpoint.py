@@ -333,7 +333,8 @@ def test_a_start_goes_on_too(file) -> None:
 SCRIPT = """
 import sys, time
 import numpy as np
-from macs import MACS, MOPSO, checkpoint
+from macs import MACS, MOPSO
+from macs.solvers import checkpoint
 
 checkpoint.SECONDS = checkpoint.SHARE = 0.0
 
@@ -377,7 +378,9 @@ def test_kill_9(tmp_path, solver) -> None:
 
 POLISH = """
 import sys, time
-from macs import MACS, bilevel, checkpoint
+from macs import MACS
+from macs.evaluation import bilevel
+from macs.solvers import checkpoint
 from problems import load
 from transcription import DFET
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from macs.evaluation.evaluator.bilevel import Bilevel
-from macs.evaluation.evaluator.blackbox import BlackBox
 
 from macs import MOPSO, NSGA2, NSGA3
 from macs.baselines.constraints import DEGREES, degree, excess, problem_type, told
+from macs.evaluation.bilevel import Bilevel
+from macs.evaluation.blackbox import BlackBox
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
 from transcription.inner import inner_solver

@@ -11,7 +11,7 @@ from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
 from macs.front import Front
 from macs.fronts.provenance import Source
-from macs.fronts.tables import duration, numbers
+from macs.io.text import duration, numbers
 from macs.pareto.dominance import nondominated
 from macs.point import Point
 from problems.compiled import Variable

@@ -12,9 +12,9 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from macs.evaluation.evaluator.bilevel import Bilevel
 
 from macs import MACS, Front
+from macs.evaluation.bilevel import Bilevel
 from macs.gradients.front_polish import believable, hold
 from macs.io import interrupts as monitor
 from problems import Problem

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from macs.evaluation.evaluator.box import Box
 
+from macs.evaluation.box import Box
+from macs.pareto.directions import pair_up
 from macs.search.individual import coordinate_step, differential, distinct_others, inertia
-from macs.search.social import current_to_rand, nearest, pair_up
+from macs.search.social import current_to_rand, nearest
 
 SEEDS = st.integers(0, 2**32 - 1)
 

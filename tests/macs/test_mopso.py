@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from macs.evaluation.evaluator.blackbox import BlackBox
-from macs.evaluation.evaluator.box import Box
 from moocore import igd
 from plain import zdt
 
 from macs import MOPSO, MOPSOCD
 from macs.baselines.mopso import flown, hypercubes, improved, inertia, roulette, thin_out, velocities
+from macs.evaluation.blackbox import BlackBox
+from macs.evaluation.box import Box
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.dominance import nondominated
 from macs.solvers.catalogue import solver

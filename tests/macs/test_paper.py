@@ -4,11 +4,13 @@ import copy
 
 import numpy as np
 import pytest
-from macs.evaluation.evaluator.blackbox import BlackBox
 
+from macs.evaluation.blackbox import BlackBox
+from macs.evaluation.box import box_of
 from macs.pareto.archive import Archive
-from macs.search.loop import assign, box_of, individual_actions, social_actions
+from macs.search.individual import individual_actions
 from macs.search.macs import MACS
+from macs.search.social import assign, social_actions
 from macs.search.trials import Attempts
 
 

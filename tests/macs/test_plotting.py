@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights
 
 from macs.fronts.flight_plot import _dense
-from macs.fronts.front_plot import blank_figure
+from macs.fronts.style import blank_figure
 
 
 @pytest.fixture(autouse=True)

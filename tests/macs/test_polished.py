@@ -7,10 +7,10 @@ import signal
 import numpy as np
 import pytest
 from fronts import distance_to_curve
-from macs.evaluation.evaluator.bilevel import Bilevel
 from synthetic_fronts import black_box
 
 from macs import NSGA2, Front
+from macs.evaluation.bilevel import Bilevel
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, SingleShooting

@@ -3,8 +3,8 @@ from __future__ import annotations
 import io
 import time
 
-from macs.io.console import Display, clock, count, minutes
-from macs.io.interrupts import Progress
+from macs.io.console import minutes
+from macs.solvers.progress import Display, Progress, clock, count
 
 
 def standing(evaluations: int = 1200, elapsed: float = 12.0, archive: int = 4, **failures: int) -> Progress:

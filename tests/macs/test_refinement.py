@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 from fronts import distance_to_curve, inverted_distance
-from macs.evaluation.evaluator.bilevel import Bilevel
 
 from macs import MACS
+from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
 from macs.gradients.polish import Solves, polish
 from macs.pareto.archive import Archive
 from macs.search.gradient_action import allowed
-from macs.search.loop import SearchState, begin, conclude
+from macs.search.loop import begin, conclude
+from macs.search.state import SearchState
 from problems import Problem, load
 from problems.cases import goddard, orbit_rise
 from transcription import DFET

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ascent import Ascent
 from fronts import distance_to_curve, inverted_distance, mean_distance
-from macs.evaluation.evaluator.blackbox import BlackBox
 from plain import dtlz, uf, zdt
 
+from macs.evaluation.blackbox import BlackBox
 from macs.pareto.dominance import dominates
 from macs.search.macs import MACS
 from problems.cases.goddard import reference

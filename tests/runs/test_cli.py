@@ -144,7 +144,7 @@ def test_a_search_on_shooting_is_polished_on_dfet(capsys):
 
 
 def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
-    from runs.cli.parser.commands import make_solver
+    from runs.cli.commands import make_solver
 
     assert make_solver("macs") == macs.MACS()
     assert make_solver("MACS", plain=True, mesh="adaptive") == macs.MACS(refine=False, mesh="adaptive")

@@ -13,11 +13,11 @@ import pytest
 
 pytest.importorskip("distributed")
 
-from runs.execution.cluster import cluster
 from test_study import Inline, numbers, slow, stamps, wait_for
 
 from runs.batch.running import Deserted
 from runs.cli import main
+from runs.execution.crew import cluster
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from transcription.shooting.method.runge_kutta import TABLEAUX, tableau
+
+from transcription.shooting.runge_kutta import TABLEAUX, tableau
 
 Tree = tuple  # of its branches
 STAGES = {"euler": 1, "midpoint": 2, "heun": 2, "kutta3": 3, "rk4": 4, "rk38": 4, "rk8": 11}

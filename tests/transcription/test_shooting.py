@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
-from transcription.shooting.method.runge_kutta import TABLEAUX
 
 from macs import MACS, Front, optimize
 from problems import Problem, load
@@ -19,6 +18,7 @@ from transcription import DFET, MultipleShooting, SingleShooting, from_dict, par
 from transcription import word as said
 from transcription.base import largest
 from transcription.inner import inner_solver
+from transcription.shooting.runge_kutta import TABLEAUX
 from transcription.shooting.step import StepMesh
 from transcription.trajectories.simulate import simulate
 

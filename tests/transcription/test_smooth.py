@@ -109,7 +109,7 @@ SOLVERS = [MACS(agents=4, archive=6), NSGA2(population=8), MOPSO(particles=8)]
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
 def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
-    from macs.evaluation.evaluator.bilevel import Bilevel
+    from macs.evaluation.bilevel import Bilevel
 
     batches, mesh = [], DFET(10, 2)
     inside = Bilevel._evaluate
@@ -130,7 +130,7 @@ def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
 @pytest.mark.parametrize("start", ["uniform", Smooth(guess=False)], ids=str)
 def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
-    from macs.evaluation.evaluator.bilevel import Bilevel
+    from macs.evaluation.bilevel import Bilevel
 
     nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
     inside = Bilevel._evaluate

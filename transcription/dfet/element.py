@@ -8,6 +8,7 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics import polynomials
+from ..numerics.periodic import unwrapped_law, wrapped_controls
 
 
 def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
@@ -35,33 +36,6 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends", "sizes"]
     return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends, sizes], *names)
-
-
-def unwrapped_law(U: ca.MX, phase: CompiledPhase) -> ca.MX:
-    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
-    period, divisor, _ = _periods(phase)
-    if not period.any():
-        return U
-    law = ca.horzsplit(U)
-    for k in range(1, len(law)):
-        step = law[k] - law[k - 1]
-        law[k] = law[k - 1] + step - period * ca.floor(step / divisor + 0.5)
-    return ca.horzcat(*law)
-
-
-def wrapped_controls(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
-    """Controls (nu, k) of which the periodic ones are brought back into their bounds: see `trajectory.wrapped`."""
-    period, divisor, lower = _periods(phase)
-    if not period.any():
-        return controls
-    turns = [ca.floor((column - lower) / divisor) for column in ca.horzsplit(controls)]
-    return controls - ca.repmat(ca.DM(period), 1, controls.shape[1]) * ca.horzcat(*turns)
-
-
-def _periods(phase: CompiledPhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Periods of the controls (nu,), 0 where there is none; the same to divide by; lower bounds."""
-    period = np.array([v.period or 0.0 for v in phase.controls])
-    return period, np.where(period > 0, period, 1.0), np.array([v.lower for v in phase.controls])
 
 
 class Tables:

@@ -10,14 +10,15 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, Variable
 
-from ..base import expanded
+from ..numerics.batched import expanded
+from ..numerics.periodic import unwrapped, wrapped
 from ..numerics.polynomials import gauss_legendre
 from ..phases.guess import along, line
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.limits import looked_at
-from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .element import Tables, element_function
 from .propagation import Propagation
 

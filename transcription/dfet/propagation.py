@@ -15,9 +15,10 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..base import expanded
+from ..numerics.batched import expanded
 from ..numerics.elimination import eliminate
-from .element import Tables, unwrapped_law, wrapped_controls
+from ..numerics.periodic import unwrapped_law, wrapped_controls
+from .element import Tables
 
 ITERATIONS = 30
 TOLERANCE = 1e-14

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import NLP, largest
-from ..nlp.scaling import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT, largest
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
 

@@ -9,8 +9,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..base import NLP, expanded
+from ..base import NLP
 from ..nlp.scaling import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from ..numerics.batched import expanded
 from ..stopping import stopping
 from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
 

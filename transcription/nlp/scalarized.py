@@ -19,9 +19,9 @@ import numpy as np
 
 from problems.peaks import refuse_peaks
 
-from ..base import NLP
+from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import stopping
-from .scaling import CONVERGED, FAILED, INFEASIBLE, SAID, TIMEOUT, back_in_bounds, objective_scales, origin, quiet, scaled_bounds, symbol
+from .scaling import SAID, back_in_bounds, objective_scales, origin, quiet, scaled_bounds, symbol
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""

@@ -8,10 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..base import NLP
-
-CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
-
+from ..base import INFEASIBLE, NLP, TIMEOUT
 
 SAID = {
     "Infeasible_Problem_Detected": INFEASIBLE,

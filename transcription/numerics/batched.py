@@ -202,3 +202,17 @@ def widened(function: ca.Function, k: int) -> ca.Function:
         else:
             memory[out[0]] = ca.MX.binary(operation, memory[of[0]], memory[of[1]])
     return ca.Function(function.name(), symbols, [ca.densify(ca.horzcat(ca.MX(k, 0), *columns)) for columns in found])
+
+
+CHAIN = "chain"
+"""What a Function is called that repeats so much that it, and what it is a part of, is not to be written out."""
+
+
+def expanded(function: ca.Function) -> ca.Function:
+    """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
+    if any(part.name() == CHAIN for part in function.find_functions()):
+        return function
+    try:
+        return function.expand()
+    except RuntimeError:
+        return function

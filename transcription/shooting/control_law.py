@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix
 
 from problems.compiled import CompiledPhase
 
-from ..dfet.element import unwrapped_law
+from ..numerics.periodic import unwrapped_law
 from ..numerics.polynomials import lobatto_nodes
 
 DEGREES = {"constant": 0, "linear": 1, "spline": 3}

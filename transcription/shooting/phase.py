@@ -11,15 +11,14 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..base import CHAIN
-from ..dfet.element import wrapped_controls
-from ..numerics.batched import Batched, widened, work
+from ..numerics.batched import CHAIN, Batched, widened, work
+from ..numerics.periodic import wrapped, wrapped_controls
 from ..numerics.polynomials import basis_matrix, lobatto_nodes
 from ..phases.guess import along, line
 from ..phases.layout import Layout
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.limits import looked_at
-from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .control_law import ControlLaw
 from .step import Step, StepMesh
 

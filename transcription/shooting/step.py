@@ -12,8 +12,8 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..base import expanded
-from ..dfet.element import wrapped_controls
+from ..numerics.batched import expanded
+from ..numerics.periodic import wrapped_controls
 from ..numerics.polynomials import basis_matrix
 from .runge_kutta import Tableau
 

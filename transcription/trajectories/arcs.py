@@ -12,10 +12,11 @@ from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase
 
-from ..base import expanded
+from ..numerics.batched import expanded
+from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
 from .limits import DENSE
-from .trajectory import PhaseTrajectory, wrapped
+from .trajectory import PhaseTrajectory
 
 EXPLICIT = ("RK23", "RK45", "DOP853")
 METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")

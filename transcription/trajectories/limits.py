@@ -10,8 +10,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
 
-from ..base import expanded
-from ..numerics.batched import Batched
+from ..numerics.batched import Batched, expanded
 from ..numerics.polynomials import lobatto_nodes
 from .trajectory import PhaseTrajectory, Trajectory
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from problems.compiled import Limit, Variable
 
+from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
 
 
@@ -126,28 +127,6 @@ class PhaseTrajectory:
             raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
         values = np.concatenate([self.state(times), wrapped(self.control(times), self.control_variables)], axis=-1)
         return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
-
-
-def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
-    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
-    result = np.array(controls, dtype=float)
-    for i, v in enumerate(variables):
-        if v.period:
-            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
-    return result
-
-
-def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
-    """Coefficients (N, degree + 1, nu) of which those of periodic controls follow each other the short way round inside an element.
-
-    A step of half a period goes down: other than `numpy.unwrap`, and exactly as the equations of a transcription have it.
-    """
-    result = np.array(coefficients, dtype=float)
-    for i, v in enumerate(variables):
-        for k in range(1, result.shape[1] if v.period else 0):
-            step = result[:, k, i] - result[:, k - 1, i]
-            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
-    return result
 
 
 @dataclass(frozen=True, eq=False)

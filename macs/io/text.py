@@ -1,0 +1,67 @@
+"""Plain text for people: tables, numbers, counts and durations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+LEFT = str.ljust
+
+
+RIGHT = str.rjust
+
+
+def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
+    """Columns of equal width under a rule.
+
+    Parameters
+    ----------
+    headers : lines of cells
+    rows : n rows of cells
+    left : bool for each column
+        Set flush left instead of right.
+    """
+    cells = [*headers, *rows]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(left))]
+    lines = ["  ".join((LEFT if flush else RIGHT)(cell, w) for cell, w, flush in zip(row, widths, left, strict=True)) for row in cells]
+    lines.insert(len(headers), "  ".join("-" * w for w in widths))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def numbers(values: Any) -> list[str]:
+    """A column of numbers, all with the same decimals: six significant digits, and at least four of the column's range."""
+    values = np.asarray(values, dtype=float) + 0.0
+    finite = values[np.isfinite(values)]
+    largest = np.abs(finite).max(initial=0.0)
+    if largest and not 1e-3 <= largest < 1e8:
+        return [f"{value:.5e}" for value in values]
+    digits = 5 - _decade(largest)
+    span = np.ptp(finite) if len(finite) else 0.0
+    if span > 1e-9 * largest:
+        digits = max(digits, 3 - _decade(span))
+    digits = int(np.clip(digits, 0, 11 - _decade(largest)))
+    return [f"{value:.{digits}f}" for value in values]
+
+
+def counted(number: int, what: str) -> str:
+    """1 evaluation, 10 000 evaluations."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}".replace(",", " ")
+
+
+def call(name: str, settings: Mapping[str, Any]) -> str:
+    """A method and its settings, as one would type them: `DFET(elements=4, order=6)`."""
+    return f"{name}({', '.join(f'{key}={value!r}' for key, value in settings.items() if value is not None)})"
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 0.25 s, 3.6 s, 4 min 05 s, 2 h 03 min."""
+    if seconds < 60:
+        return f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _decade(value: float) -> int:
+    return int(np.floor(np.log10(value))) if value else 0
