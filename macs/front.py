@@ -310,7 +310,7 @@ class Front:
 
         return polished(self, transcription, solves, limit, verify, time_limit, progress)
 
-    def flown(
+    def simulate(
         self,
         problem: Problem | CompiledProblem | None = None,
         *,
@@ -335,17 +335,17 @@ class Front:
         Returns
         -------
         Front
-            In the same order, with `objectives`, `violation`, `status` and trajectories as flown. `Front.merge([front.flown()])` are those
-            that are feasible in the air, without what is dominated there.
+            In the same order, with `objectives`, `violation`, `status` and trajectories as simulated.
+            `Front.merge([front.simulate()])` are those that are feasible when simulated, without what is dominated.
 
         Raises
         ------
         ValueError
             For a black box, a problem that cannot be found, and one of which the points cannot be.
         """
-        from .fronts.simulated import flown
+        from .fronts.simulated import simulated
 
-        return flown(self, problem, tolerance, rtol, atol, method)
+        return simulated(self, problem, tolerance, rtol, atol, method)
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, and what there is to beware of.

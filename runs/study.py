@@ -66,7 +66,7 @@ class Study:
         How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: the
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float, optional
-        Fly the points of each run's front, see `Front.flown`, and have reports count only those that violate nothing by more than this, in
+        Simulate the points of each run, see `Front.simulate`; reports count only those that violate nothing by more than this, in
         the constraints' scales, with their objectives as flown. Default: points are what the solver says.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.

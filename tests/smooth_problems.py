@@ -112,4 +112,4 @@ def vector(nlp: NLP, **values: float) -> np.ndarray:
     for i, v in enumerate(nlp.variables):
         name = v.name.rpartition(".")[2].partition("[")[0]
         z[i] = values.get(name, z[i])
-    return nlp.march(z[None])[0]
+    return nlp.propagate(z[None])[0]

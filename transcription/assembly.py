@@ -139,7 +139,7 @@ class Assembly:
 
     def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
         """What propagation leaves to satisfy."""
-        left = [i for i, marched in enumerate(rows.marched) if not marched]
+        left = [i for i, propagated in enumerate(rows.propagated) if not propagated]
         function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
         return Reduced(
@@ -237,7 +237,7 @@ class Assembly:
         for k in range(len(peaks)):
             samples = written.peak_samples[k, :]
             scale = self.layout.variables[peaks[k]].scale
-            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", marched=True)
+            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
         initials = phase.initials(first, written.first_control, s[0], s)
         finals = phase.finals(last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]

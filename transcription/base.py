@@ -139,14 +139,14 @@ class NLP:
         """What is `guessed` of candidates (k, d), with the peaks that belong to it: vectors (k, n) for a solver to begin from."""
         return self.tighten(self.guessed(candidates))
 
-    def march(self, Z: np.ndarray) -> np.ndarray:
+    def propagate(self, Z: np.ndarray) -> np.ndarray:
         """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
         equations, where that fails."""
         return self.reduced.fly(Z).Z
 
     def fly(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `march` makes of vectors (k, n), with what `residuals` tells of that: in one go, where the method sees on the way all that
-        these depend on."""
+        """What `propagate` makes of vectors (k, n), with what `residuals` tells of that: in one go, where the method sees all that
+        these depend on on the way."""
         flown = self.reduced.fly(Z)
         if flown.scores is None:
             return flown.Z, *self.residuals(flown.Z)

@@ -163,7 +163,7 @@ class MOPSO(PopulationSolver):
         X, best, leaders = (box.to_unit(some.Z[:, free]) for some in (state.members, state.best, state.leaders.take(followed)))
         weights = inertia(share, self.inertia, self.final_inertia), self.cognitive, self.social
         V = velocities(box, X, state.velocity, best, leaders, weights=weights, chance=chance, largest=self.max_velocity)
-        X, V = flown(box, X, V, rebound)
+        X, V = moved(box, X, V, rebound)
 
         seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
         n = len(seen)
@@ -271,7 +271,7 @@ def velocities(
     return np.clip(V, -largest, largest)
 
 
-def flown(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def moved(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (n, d) after an interval of 1.
 
     A coordinate that leaves the box is set to the bound, and its velocity is multiplied by a number of `rebound` (n, d), in [-1, 0]. One

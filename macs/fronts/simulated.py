@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from transcription.trajectories.trajectory import Trajectory
 
 
-def flown(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
-    """The front as flown, in the same order; see `Front.flown`."""
+def simulated(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
+    """The front with objectives and violations as simulated, in the same order; see `Front.simulate`."""
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
     known = front.compiled()

@@ -12,7 +12,7 @@ from problems.checks import check_count, check_positive
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
-from transcription.inner import March
+from transcription.inner import Propagate
 from transcription.stopping import stopped_by
 from transcription.trajectories.simulate import simulate_all
 
@@ -59,7 +59,7 @@ def polished(
         check_positive("time_limit", time_limit)
     refuse_peaks(problem)
     nlp = _written(problem, transcription)
-    evaluator = Bilevel(nlp, March(), float(front.stats["tolerance"]))
+    evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
     with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
         evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
         left = Solves(evaluator, solves)
@@ -204,7 +204,7 @@ def believable(found: np.ndarray, known: Front, verify: float) -> Front:
             return known[rows]
         seen[look] = True
         rtol, atol = _accuracy(verify)
-        holds[look] = known[look].flown(tolerance=verify, rtol=rtol, atol=atol).status == CONVERGED
+        holds[look] = known[look].simulate(tolerance=verify, rtol=rtol, atol=atol).status == CONVERGED
 
 
 def _accuracy(verify: float) -> tuple[float, float]:

@@ -130,7 +130,7 @@ class Descents:
         nlp = self.nlp
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         guessed = nlp.first_guess((lower + self._rng.random(len(lower)) * span)[None])
-        flown = nlp.march(guessed)
+        flown = nlp.propagate(guessed)
         usable = np.isfinite(flown).all() and nlp.evaluate(flown)[1][0] <= HOPELESS
         attempts = [flown[0], guessed[0]] if usable else [guessed[0]]
         found: list[Solved] = []

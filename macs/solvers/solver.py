@@ -112,7 +112,7 @@ class Solver(ABC):
         seed : int, optional
             The same one gives the same bits. None draws one, which `stats` record.
         inner : str or InnerSolver
-            "auto", "march", "ipopt", "ipopt-feasibility", or one of your own.
+            "auto", "propagate", "ipopt", "ipopt-feasibility", or one of your own.
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional

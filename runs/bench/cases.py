@@ -37,7 +37,7 @@ class Case:
     warm : bool
         Candidates near feasible points, starting from their states; else uniformly random ones, from a first guess.
     tolerance : float
-    marches : bool
+    propagates : bool
         Every candidate is feasible as it is flown, as far as the bounds of states let it: propagation alone is an inner level here.
     quick : bool
         Also part of the quick benchmark.
@@ -50,7 +50,7 @@ class Case:
     mesh: DFET
     warm: bool = False
     tolerance: float = 1e-6
-    marches: bool = False
+    propagates: bool = False
     quick: bool = True
     asked: Mapping[str, float] = field(default_factory=dict)
 
@@ -99,10 +99,10 @@ COARSE, FINE = DFET(4, 6), DFET(30, 1)
 INNER = (
     Case("goddard, cold", GODDARD, COARSE, asked={"speed": 5}),
     Case("goddard, warm", GODDARD, COARSE, warm=True, asked={"speed": 15, "moved": 0.07}),
-    Case("orbit_rise, cold", ORBIT, FINE, marches=True, quick=False, asked={"speed": 100}),
-    Case("orbit_rise, warm", ORBIT, FINE, warm=True, marches=True, quick=False, asked={"speed": 100}),
-    Case("orbit_rise, cold, 1e-9", ORBIT, FINE, tolerance=1e-9, marches=True, asked={"speed": 100}),
-    Case("orbit_rise, warm, 1e-9", ORBIT, FINE, warm=True, tolerance=1e-9, marches=True, asked={"speed": 100}),
+    Case("orbit_rise, cold", ORBIT, FINE, propagates=True, quick=False, asked={"speed": 100}),
+    Case("orbit_rise, warm", ORBIT, FINE, warm=True, propagates=True, quick=False, asked={"speed": 100}),
+    Case("orbit_rise, cold, 1e-9", ORBIT, FINE, tolerance=1e-9, propagates=True, asked={"speed": 100}),
+    Case("orbit_rise, warm, 1e-9", ORBIT, FINE, warm=True, tolerance=1e-9, propagates=True, asked={"speed": 100}),
     Case("corridor, cold", corridor, DFET(4, 2), quick=False),
     Case("corridor, warm", corridor, DFET(4, 2), warm=True, quick=False),
     Case("needle, cold", needle, DFET(8, 3)),

@@ -14,7 +14,7 @@ import numpy as np
 from macs.io.console import Steps
 from macs.io.text import text_table
 from transcription import NLP
-from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, March, Newton
+from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, Newton, Propagate
 from transcription.inner.base import CONVERGED
 from transcription.numerics.batched import compiler
 
@@ -108,7 +108,7 @@ def _contenders(case: Case, effort: Effort) -> list[Contender]:
     with compiling(when):
         nlp = case.mesh.transcribe(problem)
     solvers: dict[str, InnerSolver] = {BASELINE: Ipopt(objective="constant"), PROJECTION: Ipopt(), "newton": Newton()}
-    solvers |= {DEFAULT: Auto()} | ({"march": March()} if case.marches else {})
+    solvers |= {DEFAULT: Auto()} | ({"propagate": Propagate()} if case.propagates else {})
     contenders = [Contender(Row(case.name, name), solver, nlp, when) for name, solver in solvers.items()]
     if when != "0" and effort.interpreted:
         with compiling("0"):

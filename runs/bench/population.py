@@ -11,7 +11,7 @@ import numpy as np
 from macs.io.console import Steps
 from problems import load
 from transcription import Smooth, Transcription, parse
-from transcription.inner import March
+from transcription.inner import Propagate
 from transcription.numerics.batched import compiler
 
 from .inner import compiling
@@ -67,7 +67,7 @@ def _flier(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
 
     def fly(candidates: np.ndarray) -> None:
         with compiling(when):
-            March().solve(nlp, candidates)
+            Propagate().solve(nlp, candidates)
 
     return fly
 

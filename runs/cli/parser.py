@@ -147,7 +147,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
-    solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, march, ipopt, ... (default: the problem's own)")
+    solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, propagate, ipopt, ... (default: the problem's own)")
     solve.add_argument(
         "--start", metavar="KIND", help="first candidates: smooth about the guess, or uniform, without it (default: the problem's own)"
     )

@@ -14,8 +14,8 @@ Ends = Mapping[str, Mapping[str, np.ndarray]]
 
 
 def record(front: Front, tolerance: float) -> dict[str, Any]:
-    """ "F" (n, m), all minimised, and "violation" (n,) of the points as flown, and "ends" of their flights; see `Front.flown`."""
-    flights = front.flown(tolerance=tolerance)
+    """ "F" (n, m), all minimised, and "violation" (n,) of the points as flown, and "ends" of their flights; see `Front.simulate`."""
+    flights = front.simulate(tolerance=tolerance)
     found = {phase: {name: values.tolist() for name, values in states.items()} for phase, states in ends(flights).items()}
     return {"F": flights.F.tolist(), "violation": flights.violation.tolist(), "ends": found}
 

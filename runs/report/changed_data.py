@@ -187,7 +187,7 @@ def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: 
         problems = {label: _problem(grounds, label) for label in labels}
     except ValueError as error:
         return Change(transcription, solver, union, note=f"nothing was flown: {error}")
-    return Change(transcription, solver, union, {label: some.flown(problem, tolerance=tolerance) for label, problem in problems.items()})
+    return Change(transcription, solver, union, {label: some.simulate(problem, tolerance=tolerance) for label, problem in problems.items()})
 
 
 def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:

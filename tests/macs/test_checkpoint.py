@@ -437,7 +437,7 @@ def test_another_black_box_is_refused(file, other, message) -> None:
     [
         ({"problem": "goddard"}, r"problem.name is 'orbit_rise' there, 'goddard' here; problem.fingerprint .*bounds, equations"),
         ({"mesh": DFET(3, 3)}, "transcription.settings.order is 2 there, 3 here"),
-        ({"inner": "march"}, "inner is 'auto' there, 'march' here"),
+        ({"inner": "propagate"}, "inner is 'auto' there, 'propagate' here"),
         ({"solver": MACS(agents=4, archive=6, refine=False), "seed": 7}, "solver.settings.refine is True there, False here; seed"),
     ],
 )

@@ -83,11 +83,11 @@ class Foreign(InnerSolver):
     """One that tells nothing beyond the contract."""
 
     def solve(self, nlp, candidates, warm=None, *, tolerance=1e-6) -> InnerResult:
-        found = inner_solver("march").solve(nlp, candidates, warm, tolerance=tolerance)
+        found = inner_solver("propagate").solve(nlp, candidates, warm, tolerance=tolerance)
         return InnerResult(found.z, found.F, found.violation, found.status, found.moved, found.iterations)
 
 
-@pytest.mark.parametrize("inner", ["march", "auto", Foreign()], ids=["march", "auto", "own"])
+@pytest.mark.parametrize("inner", ["propagate", "auto", Foreign()], ids=["propagate", "auto", "own"])
 def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
     nlp = DFET(2, 3).transcribe(load("orbit_rise"))
     evaluator = Bilevel(nlp, inner_solver(inner), 1e-6)
@@ -102,7 +102,7 @@ def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
 def test_nothing_is_spent_on_them_unless_somebody_asks(monkeypatch) -> None:
     nlp = DFET(2, 3).transcribe(load("goddard"))
     monkeypatch.setattr(type(nlp), "by_constraint", lambda *_: pytest.fail("asked for"))
-    evaluator = Bilevel(nlp, inner_solver("march"), 1e-6)
+    evaluator = Bilevel(nlp, inner_solver("propagate"), 1e-6)
     state = NSGA2(population=4).begin(evaluator, 4, np.random.default_rng(0))
     assert len(state.members) == 4
 
@@ -115,7 +115,7 @@ def test_a_peak_without_bounds_is_no_violation() -> None:
     problem.minimize("peak", phase.peak(x))
     problem.minimize("effort", phase.integral(u**2))
     nlp = DFET(2, 2).transcribe(problem)
-    z = nlp.march(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
+    z = nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
     assert max(nlp.violations(z).values()) <= 1e-9
 
 

@@ -19,7 +19,7 @@ from macs.gradients.front_polish import believable, hold
 from macs.io import interrupts as monitor
 from problems import Problem
 from transcription import DFET, SingleShooting
-from transcription.inner import March
+from transcription.inner import Propagate
 
 COARSE, SHOOTING = DFET(3, 3), SingleShooting(10, control="linear")
 VERIFY = 1e-4
@@ -56,13 +56,13 @@ def rough() -> Front:
 
 def share(front: Front) -> np.ndarray:
     """The effort as flown, by the least that any flight of this height takes."""
-    flown = front.flown(tolerance=np.inf).objectives
+    flown = front.simulate(tolerance=np.inf).objectives
     return flown[:, 0] / (4 / (9 * flown[:, 1]))
 
 
 def test_points_hold_at_a_price_that_is_small(rough):
     promised, held = (rough.polished(COARSE, solves=30, verify=verify) for verify in (None, VERIFY))
-    before, after = (front.flown(tolerance=VERIFY) for front in (promised, held))
+    before, after = (front.simulate(tolerance=VERIFY) for front in (promised, held))
     assert before.violation.max() > 10 * VERIFY and share(promised).min() < 0.99, "better than there is: they exceed what they promise"
     assert after.violation.max() <= VERIFY and share(held).min() > 1 - 1e-3
     assert len(held) == len(promised) and np.median(share(held)) < 1.03
@@ -72,8 +72,8 @@ def test_points_hold_at_a_price_that_is_small(rough):
 
 
 def test_what_cannot_be_made_to_hold_is_told():
-    evaluator = Bilevel(DFET(2, 1).transcribe(gust()), March(), 1e-6)
-    start = evaluator.nlp.march(evaluator.first_guess(np.zeros((1, len(evaluator.free)))))
+    evaluator = Bilevel(DFET(2, 1).transcribe(gust()), Propagate(), 1e-6)
+    start = evaluator.nlp.propagate(evaluator.first_guess(np.zeros((1, len(evaluator.free)))))
     flat = evaluator.refine(start, np.full((1, 1), 0.0), np.ones((1, 1)))
     assert flat.status[0] == "converged"
     Z, holds, _ = hold(evaluator, flat.Z, np.ones(1), VERIFY)
@@ -83,13 +83,13 @@ def test_what_cannot_be_made_to_hold_is_told():
 
 
 def test_known_points_are_flown_only_if_it_matters(rough, monkeypatch):
-    flown, fly = [], Front.flown
+    flown, fly = [], Front.simulate
 
     def counted(self, *arguments, **settings):
         flown.append(len(self))
         return fly(self, *arguments, **settings)
 
-    monkeypatch.setattr(Front, "flown", counted)
+    monkeypatch.setattr(Front, "simulate", counted)
     assert len(believable(rough.F.min(axis=0)[None] - 1.0, rough, VERIFY)) == len(rough) and not flown, "dominated, all of them"
     nothing = np.empty((0, 2))
     kept = believable(nothing, rough, VERIFY)
@@ -100,7 +100,7 @@ def test_known_points_are_flown_only_if_it_matters(rough, monkeypatch):
 
 def test_margins_keep_rows_inside(rough):
     nlp = COARSE.transcribe(bryson_denham())
-    evaluator = Bilevel(nlp, March(), 1e-6)
+    evaluator = Bilevel(nlp, Propagate(), 1e-6)
     start = nlp.interpolate(rough[4].trajectory)[None]
     height = np.array(["height" in label for label in nlp.g_labels])
     margins = np.where(height, 0.01, 0.0)[None]
@@ -123,7 +123,7 @@ def test_an_interruption_leaves_what_holds(rough, monkeypatch):
     monkeypatch.setattr(Bilevel, "_refine", interrupted)
     found = rough.polished(COARSE, solves=30, verify=VERIFY)
     assert found.stats["stopped"] == "interrupted" and len(found)
-    assert found.flown(tolerance=VERIFY).violation.max() <= VERIFY
+    assert found.simulate(tolerance=VERIFY).violation.max() <= VERIFY
 
 
 def test_if_nothing_holds_the_front_says_so():

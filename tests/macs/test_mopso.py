@@ -11,7 +11,7 @@ from moocore import igd
 from plain import zdt
 
 from macs import MOPSO, MOPSOCD
-from macs.baselines.mopso import flown, hypercubes, improved, inertia, roulette, thin_out, velocities
+from macs.baselines.mopso import hypercubes, improved, inertia, moved, roulette, thin_out, velocities
 from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.box import Box
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
@@ -98,9 +98,9 @@ def test_particles_are_drawn_to_what_they_follow() -> None:
 
 def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:
     X, V, rebound = np.array([[0.9, 0.9], [0.1, 0.1]]), np.array([[0.3, 0.3], [-0.3, -0.3]]), np.full((2, 2), -0.25)
-    there, speed = flown(PLAIN, X, V, rebound)
+    there, speed = moved(PLAIN, X, V, rebound)
     assert there == pytest.approx(np.array([[1, 1], [0, 0]])) and speed == pytest.approx(-0.25 * V)
-    there, speed = flown(ROUND, X, V, rebound)
+    there, speed = moved(ROUND, X, V, rebound)
     assert there == pytest.approx(np.array([[0.2, 1], [0.8, 0]]))
     assert speed == pytest.approx(np.array([[0.3, -0.075], [-0.3, 0.075]]))
     V = velocities(
@@ -112,7 +112,7 @@ def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:
 @given(arrays(float, (6, 2), elements=st.floats(0, 1)), arrays(float, (6, 2), elements=st.floats(-1, 1)), st.integers(0, 9))
 def test_particles_stay_in_the_box(X, V, seed) -> None:
     for box in (PLAIN, ROUND):
-        there, speed = flown(box, X, V, -np.random.default_rng(seed).random((6, 2)))
+        there, speed = moved(box, X, V, -np.random.default_rng(seed).random((6, 2)))
         assert ((there >= 0) & (there <= 1)).all()
         assert (np.abs(speed) <= np.abs(V)).all()
 

@@ -64,7 +64,7 @@ def test_the_same_bits_again(rough, smooth):
 
 
 def test_it_begins_from_what_is_nearest_to_feasible_where_nothing_is(rough):
-    lost = NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=12, seed=1, inner="march")
+    lost = NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=12, seed=1, inner="propagate")
     assert not len(lost) and lost.closest is not None
     found = lost.polished(FINE, solves=60, limit=12)
     assert len(found) >= 6 and distance_to_curve(found.objectives, reference(20001)).max() < 1e-3
@@ -114,4 +114,4 @@ def test_what_makes_no_sense_is_refused(rough):
     problem.maximize("top", phase.peak(x))
     problem.minimize("effort", phase.integral(u**2))
     with pytest.raises(ValueError, match="peak"):
-        NSGA2(population=4).solve(problem, SingleShooting(5), evaluations=8, inner="march", seed=1).polished(DFET(2, 2))
+        NSGA2(population=4).solve(problem, SingleShooting(5), evaluations=8, inner="propagate", seed=1).polished(DFET(2, 2))

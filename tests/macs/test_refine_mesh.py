@@ -182,7 +182,7 @@ def test_points_that_did_not_converge_stay_as_they_are():
 def front_with_a_bad_point() -> Front:
     nlp = DFET(2, 3).transcribe(load("orbit_rise"))
     candidates = 0.5 * (nlp.lower + nlp.upper)[nlp.free] * np.array([[1.0], [1.2]])
-    columns = trajectory_columns(nlp, nlp.march(nlp.first_guess(candidates)), 1e-6)
+    columns = trajectory_columns(nlp, nlp.propagate(nlp.first_guess(candidates)), 1e-6)
     columns["status"] = np.array(["converged", "infeasible"])
     return Front(**columns, goals=nlp.problem.goals, problem=nlp.problem)
 

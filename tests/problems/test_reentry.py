@@ -263,7 +263,7 @@ def test_any_data_make_a_problem(data):
 def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():
     """What stands for the absolute values is what they are, once a candidate is flown."""
     nlp = DFET(8, 2).transcribe(load("reentry_case1"))
-    Z = nlp.march(nlp.first_guess(nlp.guess[None]))
+    Z = nlp.propagate(nlp.first_guess(nlp.guess[None]))
     phase, flight = nlp.problem.phases[0], nlp.unpack(Z[0])["entry"]
     nodes, weights = np.polynomial.legendre.leggauss(3)
     total = 0.0

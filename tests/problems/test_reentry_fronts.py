@@ -136,7 +136,7 @@ def test_there_is_no_way_north_of_a_zone(passed, least):
         laws, candidate = np.radians(row[4:]).reshape(-1, 2), np.full(len(nlp.free), 40.0)
         for profile, law in zip(nlp.profiles, laws.T, strict=True):
             candidate[profile.columns] = law
-        start = nlp.march(nlp.first_guess(candidate[None]))[0]
+        start = nlp.propagate(nlp.first_guess(candidate[None]))[0]
         only = np.append(np.full(4, np.inf), 0.0)
         solved = scalarize(nlp, start, reference=only, weights=np.eye(5)[4], max_iterations=200)
         found += [solved.F[4]] if solved.status == "converged" else []

@@ -42,7 +42,7 @@ transcriptions = ["shooting:5"]
 evaluations = 120
 runs = 2
 seed = 1
-inner = "march"
+inner = "propagate"
 nominal = "light"
 
 [problems]
@@ -140,7 +140,7 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
         evaluations=16,
         runs=1,
         seed=1,
-        inner="march",
+        inner="propagate",
         nominal="2",
     )
     study.run(tmp_path / "out")

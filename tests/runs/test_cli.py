@@ -132,7 +132,7 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
 
 @pytest.mark.parametrize("method", ["shooting:6:linear", "multiple-shooting:4x2:kutta3:spline:3"])
 def test_shooting_is_solved_shown_and_verified(capsys, method):
-    assert main(["solve", "glide.py:build", "--transcription", method, "--inner", "march", "--seed", "1", "--out", "shot.nc"]) == 0
+    assert main(["solve", "glide.py:build", "--transcription", method, "--inner", "propagate", "--seed", "1", "--out", "shot.nc"]) == 0
     assert main(["show", "shot.nc", "--point", "0"]) == 0 and "Shooting(" in capsys.readouterr().out
     assert main(["verify", "shot.nc", "--tolerance", "1e-6"]) == 0
 
@@ -174,7 +174,7 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--polish-on", "dfet:8x3", "--no-refine"], ["polish_on", "refine=False"]),
         (["solve", "goddard", "--polish-on", "dfet:8x3", "--solver", "nsga2"], ["--polish-on dfet:8x3", "'nsga2'"]),
         (["solve", "goddard", "--mesh", "adaptve"], ["'adaptve'", "did you mean adaptive?", "fixed"]),
-        (["solve", "goddard", "--inner", "marsh"], ["'marsh'", "did you mean march?", "ipopt"]),
+        (["solve", "goddard", "--inner", "propagat"], ["'propagat'", "did you mean propagate?", "ipopt"]),
         (["solve", "goddard", "--evaluations", "ten"], ["--evaluations", "'ten' is not a whole number above 0"]),
         (["solve", "goddard", "--evaluations", "0"], ["'0' is not a whole number above 0"]),
         (["solve", "goddard", "--seed", "-1"], ["'-1' is not"]),

@@ -161,7 +161,7 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
     said = capsys.readouterr().out
     studies = {name: Study.load(f"reentry-{name}") for name in ("nodes", "discretisations", "uncertainty")}
     for name, study in studies.items():
-        assert f"reentry-{name}" in said and (study.inner, study.start, study.verify) == ("march", "smooth", 0.01)
+        assert f"reentry-{name}" in said and (study.inner, study.start, study.verify) == ("propagate", "smooth", 0.01)
         beside = {("MACS", 10_000)} if name == "uncertainty" else set()
         assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)} | beside
         assert Study.load(f"reentry-{name}").quick().cells[0].evaluations <= 500

@@ -15,11 +15,11 @@ from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
 SOLVERS = {"macs": Plain(agents=4), "nsga2": NSGA2(population=10)}
-MARCHED = {"inner": "march", "transcriptions": ["shooting:5", "shooting:9"]}
+PROPAGATED = {"inner": "propagate", "transcriptions": ["shooting:5", "shooting:9"]}
 
 
 def study(**more) -> Study:
-    given = {"problems": glide(), "solvers": SOLVERS, "terms": APART, "evaluations": 60, "runs": 2, "seed": 1, **MARCHED}
+    given = {"problems": glide(), "solvers": SOLVERS, "terms": APART, "evaluations": 60, "runs": 2, "seed": 1, **PROPAGATED}
     return Study("both", **given | more)
 
 
@@ -59,7 +59,7 @@ def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
 
 
 def test_all_may_work_apart(tmp_path):
-    terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "march"}}
+    terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "propagate"}}
     each = study(terms=terms, transcriptions=None, inner="auto", runs=1)
     each.run(tmp_path / "out", executor=Inline())
     (ground,) = grounds(Store.open(tmp_path / "out"), {})
@@ -103,7 +103,7 @@ def test_terms_that_make_no_sense_are_refused(terms, message):
 def narrow(**own) -> Problem:
     """Half of what is drawn flies too far: how it is made feasible tells."""
     problem = glide(most=6.0)
-    for name, value in {"default_inner": "march", "default_start": "smooth", **own}.items():
+    for name, value in {"default_inner": "propagate", "default_start": "smooth", **own}.items():
         setattr(problem, name, value)
     return problem
 
@@ -116,7 +116,7 @@ def test_a_study_that_says_nothing_does_as_the_command_line_does(tmp_path):
     (run,) = bare(narrow()).run(tmp_path / "own", executor=Inline()).runs
     (plain,) = bare(glide(most=6.0)).run(tmp_path / "plain", executor=Inline()).runs
     given = {"evaluations": 60, "seed": run.seed}
-    front = Plain().solve(narrow(), parse("dfet:2x2"), inner="march", start="smooth", **given)
+    front = Plain().solve(narrow(), parse("dfet:2x2"), inner="propagate", start="smooth", **given)
     assert run.front.F.tolist() == front.F.tolist()
     assert plain.front.F.tolist() == Plain().solve(narrow(), parse("dfet:2x2"), **given).F.tolist() != front.F.tolist()
 
@@ -136,17 +136,17 @@ def test_what_a_study_or_a_solver_says_comes_before_what_the_case_says():
         )
         return one.inner_of(one.cells[0]), one.sampling_of(one.cells[0])
 
-    assert found() == ("march", Smooth()) and found(glide()) == ("auto", None)
-    assert found(inner="auto") == ("auto", Smooth()) and found(start="uniform") == ("march", "uniform")
+    assert found() == ("propagate", Smooth()) and found(glide()) == ("auto", None)
+    assert found(inner="auto") == ("auto", Smooth()) and found(start="uniform") == ("propagate", "uniform")
     assert found(terms={"plain": {"inner": "ipopt"}}) == ("ipopt", Smooth())
-    assert found(terms={"plain": {"start": {"spread": 0.2}}}) == ("march", Smooth(spread=0.2))
-    assert found(narrow(default_start=Smooth(length=0.2))) == ("march", Smooth(length=0.2))
+    assert found(terms={"plain": {"start": {"spread": 0.2}}}) == ("propagate", Smooth(spread=0.2))
+    assert found(narrow(default_start=Smooth(length=0.2))) == ("propagate", Smooth(length=0.2))
     assert "terms" not in bare(narrow(), inner="auto", start="uniform").cells[0].details
 
 
 def test_each_problem_has_its_own(tmp_path):
     both = bare(glide(), problems={"plain": glide(), "narrow": narrow()})
-    assert [both.inner_of(cell) for cell in both.cells] == ["auto", "march"]
+    assert [both.inner_of(cell) for cell in both.cells] == ["auto", "propagate"]
     both.run(tmp_path / "out", executor=Inline())
     assert both.status(tmp_path / "out").finished == 2
     with pytest.raises(ValueError, match=r"another study: narrow, dfet:2x2, plain: details\.terms"):
@@ -155,7 +155,7 @@ def test_each_problem_has_its_own(tmp_path):
 
 def test_the_reentry_is_searched_as_the_case_says():
     study = Study("reentry", problems="reentry_case1", solvers="macs", runs=1, seed=1)
-    assert (study.inner_of(study.cells[0]), study.sampling_of(study.cells[0])) == ("march", Smooth())
+    assert (study.inner_of(study.cells[0]), study.sampling_of(study.cells[0])) == ("propagate", Smooth())
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def braking(pace: float = 0.6) -> Problem:
 
 def study(**more) -> Study:
     solvers = {"nsga2": NSGA2(population=16), "macs": MACS(agents=4, archive=6, refine=False)}
-    given = {"problems": braking(), "solvers": solvers, "evaluations": 160, "runs": 2, "seed": 1, "inner": "march"}
+    given = {"problems": braking(), "solvers": solvers, "evaluations": 160, "runs": 2, "seed": 1, "inner": "propagate"}
     return Study("brakes", **given | {"verify": 0.01, "paper": PAPER} | more)
 
 
@@ -61,7 +61,7 @@ def test_only_what_holds_counts_and_as_it_is_flown(folder):
     claimed = held = 0
     for solver, runs in ground.runs.items():
         for run, front, verified in zip(runs, ground.fronts[solver], ground.verified[solver], strict=True):
-            flown = Front.load(run.path, problem).flown(tolerance=0.01)
+            flown = Front.load(run.path, problem).simulate(tolerance=0.01)
             best = Front.merge([flown])
             np.testing.assert_allclose(front.F, best.F, rtol=1e-9)
             assert (front.status == "converged").all() and (front.violation <= 0.01).all()

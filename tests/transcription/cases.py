@@ -18,7 +18,7 @@ def candidates(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
 
 def flown(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
     """Propagated vectors (k, n)."""
-    return inner_solver("march").solve(nlp, candidates(nlp, k, seed)).z
+    return inner_solver("propagate").solve(nlp, candidates(nlp, k, seed)).z
 
 
 def solved(nlp: NLP, k: int = 3, seed: int = 0, inner: str = "ipopt") -> InnerResult:

@@ -60,7 +60,7 @@ def test_candidates_are_scored_by_the_absolute_values_themselves():
     nlp = DFET(3, 2).transcribe(transfer())
     rng = np.random.default_rng(0)
     candidates = rng.uniform(-1, 1, (5, len(nlp.free)))
-    Z = nlp.march(nlp.first_guess(candidates))
+    Z = nlp.propagate(nlp.first_guess(candidates))
     nodes, weights = np.polynomial.legendre.leggauss(3)
     for z, F in zip(Z, nlp.evaluate(Z)[0], strict=True):
         flight = nlp.unpack(z)["push"]

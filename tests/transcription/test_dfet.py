@@ -58,7 +58,7 @@ def test_boundary_values_converge_with_order_2l_plus_2(basis, order):
     errors = []
     for n in (2, 4):
         nlp = DFET(n, order, basis=basis).transcribe(problem)
-        phase = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
+        phase = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
         errors.append(np.abs(phase.edge_states[:, 0] - np.exp(-phase.state.edges)).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * (order + 1), abs=0.35)
 
@@ -69,7 +69,7 @@ def test_between_nodes_the_states_converge_with_order_l_plus_2(order):
     errors, times = [], np.linspace(0, 2, 401)
     for n in (4, 8):
         nlp = DFET(n, order).transcribe(problem)
-        phase = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
+        phase = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
         errors.append(np.abs(phase.at(times)["x"] - np.exp(-times)).max())
     assert np.log2(errors[0] / errors[1]) > order + 1.6
 
@@ -92,7 +92,7 @@ def test_bases_agree_where_both_are_exact():
         for k in range(order + 1):
             for i, name in enumerate("uv"):
                 other[0, slot(second, f"swing.{name}[{j},{k}]")] = coefficients[k, i]
-    other = second.march(other)
+    other = second.propagate(other)
     assert second.unpack(other[0])["swing"].edge_states == pytest.approx(phase.edge_states, abs=1e-12)
     F, _ = first.evaluate(z[None])
     G, _ = second.evaluate(other)
@@ -168,20 +168,20 @@ def test_batches_are_rows():
     for i in range(4):
         one, worst = nlp.evaluate(Z[i : i + 1])
         assert np.array_equal(one[0], F[i]) and worst[0] == violation[i]
-    assert np.array_equal(nlp.march(Z), Z) or np.abs(nlp.march(Z) - Z).max() < 1e-12
+    assert np.array_equal(nlp.propagate(Z), Z) or np.abs(nlp.propagate(Z) - Z).max() < 1e-12
     C = candidates(nlp, 4)
     before = C.copy()
     first = nlp.first_guess(C)
     assert np.array_equal(C, before) and np.array_equal(first[:, nlp.free], C)
     assert ((first >= nlp.lower) & (first <= nlp.upper)).all()
-    assert np.array_equal(nlp.march(first)[:, nlp.free], C)
+    assert np.array_equal(nlp.propagate(first)[:, nlp.free], C)
 
 
 def test_march_leaves_what_it_was_given_alone():
     nlp = DFET(2, 3).transcribe(oscillator())
     Z = nlp.first_guess(candidates(nlp, 2))
     before = Z.copy()
-    nlp.march(Z), nlp.tighten(Z), nlp.evaluate(Z), nlp.unpack(Z[0])
+    nlp.propagate(Z), nlp.tighten(Z), nlp.evaluate(Z), nlp.unpack(Z[0])
     assert np.array_equal(Z, before)
 
 
@@ -191,7 +191,7 @@ def test_violations_name_what_is_violated():
     problem.constraint("late", phase.integral(phase["x"]), lower=4, scale=2)
     problem.minimize("cost", phase.final(phase["x"]))
     nlp = DFET(2, 2).transcribe(problem)
-    Z = nlp.march(nlp.first_guess(np.ones((1, 6))))
+    Z = nlp.propagate(nlp.first_guess(np.ones((1, 6))))
     found = nlp.violations(Z[0])
     assert found["path 'gate' of 'run'"] == pytest.approx(1 + 0.5 * (1 + np.sqrt(0.6)) - 0.5)
     assert found["constraint 'late'"] == pytest.approx((4 - 2) / 2)
@@ -213,7 +213,7 @@ def test_integrals_have_their_closed_form(basis):
     problem.maximize("moment", phase.integral(t * x))
     problem.minimize("clock", phase.integral(1))
     nlp = DFET(3, 6, basis=basis).transcribe(problem)
-    F, _ = nlp.evaluate(nlp.march(nlp.first_guess(np.empty((1, 0)))))
+    F, _ = nlp.evaluate(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))
     e = np.exp(-1.5)
     assert F[0] == pytest.approx([e, (1 - e**2) / 2, -(1 - e * 2.5), 1.5], rel=1e-10)
 
@@ -227,7 +227,7 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
     rows = [i for i, label in enumerate(nlp.g_labels) if "gate" in label]
     assert len(rows) == 3 * (3 + 2)
     assert set(nlp.g_lower[rows]) == {-1} and set(nlp.g_upper[rows]) == {3}
-    z = nlp.march(nlp.first_guess(np.ones((1, 9))))[0]
+    z = nlp.propagate(nlp.first_guess(np.ones((1, 9))))[0]
     values = np.array(nlp.functions(z)[1]).ravel()[rows]
     times = nlp.unpack(z)["run"].time
     assert np.unique(values.round(12)) == pytest.approx(2 * times), "x = t here"
@@ -253,9 +253,9 @@ def test_fixed_things_are_no_variables():
     problem.minimize("cost", m * phase.final(phase["x"]))
     nlp = DFET(2, 2).transcribe(problem)
     assert len(nlp.free) == 0 and all(v.lower < v.upper for v in nlp.variables)
-    F, violation = nlp.evaluate(nlp.march(nlp.first_guess(np.empty((2, 0)))))
+    F, violation = nlp.evaluate(nlp.propagate(nlp.first_guess(np.empty((2, 0)))))
     assert pytest.approx(np.full((2, 1), 3.0)) == F and violation.max() < 1e-14
-    flight = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
     assert flight.parameters == {"m": 3} and flight["run"]["u"] == pytest.approx(np.full(9, 0.5))
 
 
@@ -288,7 +288,7 @@ def test_tables_are_looked_up(kind):
     phase.dynamics(x=-phase["x"], y=table(phase.time) + surface(ca.vertcat(phase.time, phase["x"])))
     problem.minimize("end", phase.final(phase["y"]))
     nlp = DFET(20, 2).transcribe(problem)
-    Z = nlp.march(nlp.first_guess(np.empty((1, 0))))
+    Z = nlp.propagate(nlp.first_guess(np.empty((1, 0))))
     exact = np.sin(1) + 0.5 + 2 * (1 - np.exp(-1))
     F, violation = nlp.evaluate(Z)
     assert F[0, 1] == pytest.approx(exact, rel=2e-3 if kind == "linear" else 1e-5)

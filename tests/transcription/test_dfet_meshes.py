@@ -38,7 +38,7 @@ def test_equal_elements_given_by_their_edges_are_equal_elements(basis):
         one, two = plain.transcribe(oscillator()), given.transcribe(oscillator())
         assert [v.name for v in one.variables] == [v.name for v in two.variables]
         Z = flown(one)
-        assert np.array_equal(two.march(Z), Z)
+        assert np.array_equal(two.propagate(Z), Z)
         assert all(np.array_equal(a, b) for a, b in zip(one.evaluate(Z), two.evaluate(Z), strict=True))
         assert np.array_equal(one.unpack(Z[0])["swing"].time, two.unpack(Z[0])["swing"].time)
 
@@ -67,7 +67,7 @@ def test_halving_uneven_elements_gains_the_order_of_the_method(order):
 
 def test_phases_have_their_own_elements_and_orders():
     nlp = DFET(3, 2, mesh={"two": (UNEVEN, 5)}).transcribe(two_phases())
-    flight = nlp.unpack(flown(nlp, k=1)[0]) if len(nlp.free) else nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])
+    flight = nlp.unpack(flown(nlp, k=1)[0]) if len(nlp.free) else nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
     assert len(flight["one"].state.edges) == 4 and flight["one"].state.coefficients.shape[1] == 5
     assert len(flight["two"].state.edges) == 5 and flight["two"].state.coefficients.shape[1] == 8
     assert flight["two"].edge_states[-1, 0] == pytest.approx(np.exp(-5.0), abs=1e-7)

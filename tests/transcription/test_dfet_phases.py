@@ -33,7 +33,7 @@ def test_a_period_more_changes_nothing(basis):
     F, g = (np.array(v).T for v in nlp.functions(Z.T))
     G, h = (np.array(v).T for v in nlp.functions(moved.T))
     assert pytest.approx(F, abs=1e-12) == G and pytest.approx(g, abs=1e-12) == h
-    assert nlp.march(moved)[:, [i for i in range(Z.shape[1]) if i not in nlp.free]] == pytest.approx(
+    assert nlp.propagate(moved)[:, [i for i in range(Z.shape[1]) if i not in nlp.free]] == pytest.approx(
         Z[:, [i for i in range(Z.shape[1]) if i not in nlp.free]], abs=1e-12
     )
     assert nlp.distance(Z, moved) == pytest.approx(np.zeros(5), abs=1e-12)
@@ -45,7 +45,7 @@ def test_a_period_more_changes_nothing(basis):
 def test_inside_an_element_a_periodic_control_takes_the_short_way(values):
     """And the trajectory takes the same as the equations, also at half a period."""
     nlp = DFET(1, 1, basis="bernstein").transcribe(spinner())
-    z = nlp.march(nlp.first_guess(np.array([values], dtype=float)))[0]
+    z = nlp.propagate(nlp.first_guess(np.array([values], dtype=float)))[0]
     phase = nlp.unpack(z)["run"]
     law = phase.control.coefficients[0, :, 0]
     assert abs(law[1] - law[0]) <= np.pi + 1e-12
@@ -104,7 +104,7 @@ def test_a_phase_of_no_duration_still_has_its_ends(second):
     nlp = DFET(3, 2).transcribe(problem)
     C = candidates(nlp, 1)
     C[0, [list(nlp.free).index(slot(nlp, f"leg {i}.tf")) for i in range(2)]] = second
-    z = nlp.march(nlp.first_guess(C))[0]
+    z = nlp.propagate(nlp.first_guess(C))[0]
     flight = nlp.unpack(z)
     assert np.array_equal(flight["leg 1"].edge_states[0], flight["leg 0"].edge_states[-1])
     assert flight["leg 1"].edge_states[-1, 1] == pytest.approx(10 - 0.1 * second[1]) == flight["leg 1"]["m"][-1]

@@ -73,7 +73,7 @@ def test_peaks_are_the_largest_values(basis):
     problem.maximize("bottom", -phase.peak(-phase["y"]))
     problem.minimize("both", phase.peak(phase["x"]) + phase.integral(1))
     nlp = DFET(12, 4, basis=basis).transcribe(problem)
-    Z = nlp.march(nlp.first_guess(np.empty((1, 0))))
+    Z = nlp.propagate(nlp.first_guess(np.empty((1, 0))))
     F, violation = nlp.evaluate(Z)
     assert F[0] == pytest.approx([1, -np.cos(3), 4], abs=1e-3) and violation[0] < 1e-12
     assert not len(nlp.free), "peaks follow"
@@ -164,7 +164,7 @@ def test_states_between_nodes_are_as_accurate_with_controls_of_a_higher_order(or
         phase.dynamics(x=v, v=-x + 0 * u)
         problem.minimize("end", phase.final(x))
         nlp = DFET(elements, order, control_order=control_order).transcribe(problem)
-        flight = nlp.unpack(nlp.march(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0])["swing"]
+        flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0])["swing"]
         times = np.linspace(0, 4, 401)
         errors.append(np.abs(flight.at(times)["x"] - np.cos(times)).max())
     assert np.log2(errors[0] / errors[1]) > order + 1.3

@@ -13,9 +13,9 @@ from scipy.optimize import minimize
 from macs import MACS
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
-from transcription.inner import Auto, Ipopt, March, inner_solver
+from transcription.inner import Auto, Ipopt, Propagate, inner_solver
 
-NAMES = ("auto", "march", "ipopt", "ipopt-feasibility")
+NAMES = ("auto", "propagate", "ipopt", "ipopt-feasibility")
 STATUSES = {"converged", "infeasible", "failed", "timeout"}
 
 
@@ -69,12 +69,12 @@ def test_a_batch_comes_back_as_a_batch_and_means_what_it_says(inner, make):
     assert {f.name: getattr(found, f.name).shape for f in fields(found) if f.name in shapes} == shapes
     assert found.clocked is False
     assert set(found.status.tolist()) <= STATUSES and np.array_equal(C, before)
-    assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all() or inner == "march" or "converged" not in found.status
+    assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all() or inner == "propagate" or "converged" not in found.status
     for i in range(4):
         assert found.violation[i] == pytest.approx(violation(nlp, found.z[i]), rel=1e-9, abs=1e-14)
         assert (found.status[i] == "converged") == (violation(nlp, found.z[i]) <= 1e-6)
     assert pytest.approx(nlp.evaluate(found.z)[0]) == found.F
-    if inner == "march":
+    if inner == "propagate":
         assert np.array_equal(found.z[:, nlp.free], C) and not found.moved.any()
 
 
@@ -97,7 +97,7 @@ def test_the_projection_is_the_nearest_feasible_point(inner):
 
 def test_a_feasible_candidate_is_left_alone():
     nlp = DFET(3, 1).transcribe(hop())
-    found = Ipopt().solve(nlp, np.full((1, 6), 0.5), nlp.march(nlp.first_guess(np.full((1, 6), 0.5))))
+    found = Ipopt().solve(nlp, np.full((1, 6), 0.5), nlp.propagate(nlp.first_guess(np.full((1, 6), 0.5))))
     assert np.array_equal(found.z[0, nlp.free], np.full(6, 0.5)) and found.moved[0] == 0 and found.iterations[0] == 0
 
 
@@ -176,7 +176,7 @@ def test_objectives_that_are_no_numbers_fail():
 def test_march_equals_projection_where_every_candidate_is_feasible():
     nlp = DFET(30, 1).transcribe(load("orbit_rise"))
     C = candidates(nlp, 3)
-    flown, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("march", "ipopt", "auto"))
+    flown, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("propagate", "ipopt", "auto"))
     assert set(flown.status) == set(projected.status) == {"converged"}
     assert projected.z == pytest.approx(flown.z, abs=1e-5) and pytest.approx(flown.F, abs=1e-6) == projected.F
     assert np.array_equal(auto.z, flown.z) and flown.violation.max() < 1e-12
@@ -190,7 +190,7 @@ def test_auto_repairs_what_leaves_the_bounds_of_states():
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(3, 2).transcribe(problem)
     C = np.vstack([np.full(9, 0.1), np.ones(9)])
-    assert inner_solver("march").solve(nlp, C).status.tolist() == ["converged", "infeasible"]
+    assert inner_solver("propagate").solve(nlp, C).status.tolist() == ["converged", "infeasible"]
     found = inner_solver("auto").solve(nlp, C)
     assert found.status.tolist() == ["converged", "converged"]
     assert found.moved[0] < 1e-12 and found.moved[1] > 0.01 and found.z[0, nlp.free] == pytest.approx(C[0], abs=1e-12)
@@ -306,10 +306,10 @@ def test_dates_keep_their_digits():
 
 
 def test_inner_solvers_by_name():
-    assert isinstance(inner_solver("auto"), Auto) and isinstance(inner_solver("march"), March)
+    assert isinstance(inner_solver("auto"), Auto) and isinstance(inner_solver("propagate"), Propagate)
     own = Ipopt(max_iterations=5)
     assert inner_solver(own) is own
-    for wrong in ("newton", "", None, 3, March, ["auto"]):
+    for wrong in ("newton", "", None, 3, Propagate, ["auto"]):
         with pytest.raises(ValueError, match="ipopt-feasibility"):
             inner_solver(wrong)
     with pytest.raises(ValueError, match="newton"):
@@ -325,7 +325,7 @@ class Bisection(InnerSolver):
     def solve(self, nlp, candidates, warm=None, *, tolerance=1e-6):
         assert warm is None or warm.shape == (len(candidates), len(nlp.variables))
         C = np.clip(candidates + (self.goal / 2 - candidates.mean(axis=1, keepdims=True)), -1, 1)
-        Z = nlp.march(nlp.first_guess(C))
+        Z = nlp.propagate(nlp.first_guess(C))
         F, worst = nlp.evaluate(Z)
         status = np.where(worst <= tolerance, "converged", "infeasible")
         return InnerResult(Z, F, worst, status, np.linalg.norm(C - candidates, axis=1), np.ones(len(C), dtype=int))

@@ -110,7 +110,7 @@ def test_quadrature_is_held_against_the_flight():
     phase.dynamics(x=1)
     problem.minimize("cost", phase.integral(1 + ca.cos(40 * x)))
     nlp = DFET(2, 1).transcribe(problem)
-    flight = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
     found = phase_errors(nlp.problem, flight, rtol=1e-10, atol=1e-11)[0]
     assert found.defect.max() < 1e-10 and found.integral.max() > 0.01
 
@@ -124,10 +124,10 @@ def test_controls_that_switch_are_found():
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(1, 8, basis="bernstein").transcribe(problem)
     names = [nlp.variables[i].name for i in nlp.free]
-    z = nlp.march(nlp.first_guess(np.array([[1.0 if i < 5 else -1.0 for i in range(len(names))]])))[0]
+    z = nlp.propagate(nlp.first_guess(np.array([[1.0 if i < 5 else -1.0 for i in range(len(names))]])))[0]
     found = phase_errors(nlp.problem, nlp.unpack(z), rtol=1e-9, atol=1e-10)[0]
     assert abs(found.steep[0] - 0.1) < 0.2
-    z = nlp.march(nlp.first_guess(np.linspace(-0.9, 0.9, len(names))[None]))[0]
+    z = nlp.propagate(nlp.first_guess(np.linspace(-0.9, 0.9, len(names))[None]))[0]
     assert np.isnan(phase_errors(nlp.problem, nlp.unpack(z), rtol=1e-9, atol=1e-10)[0].steep[0])
 
 
@@ -147,7 +147,7 @@ def test_trajectories_become_as_exact_as_wanted(method):
         finer = next_method(method, verdict, flight)
         assert finer != method
         method, nlp = finer, finer.transcribe(nlp.problem)
-        z = nlp.march(nlp.interpolate(flight)[None])[0]
+        z = nlp.propagate(nlp.interpolate(flight)[None])[0]
     assert simulate(nlp.problem, nlp.unpack(z), rtol=1e-11, atol=1e-12).max_defect < 1e-6
 
 
@@ -157,7 +157,7 @@ def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
     for i in nlp.free:
         if ".u[" in nlp.variables[i].name:
             z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0
-    flight = nlp.unpack(nlp.march(z[None])[0])
+    flight = nlp.unpack(nlp.propagate(z[None])[0])
     verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
     assert verdict.leaving > 0.01 and "a control leaves its bounds" in " ".join(verdict.complaints())
     finer = next_method(DFET(1, 2), verdict, flight)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from problems import Problem, load
 from transcription import DFET
-from transcription.inner import Auto, Ipopt, March, Newton
+from transcription.inner import Auto, Ipopt, Newton, Propagate
 from transcription.inner.least_distance import least_distance
 from transcription.numerics import batched
 
@@ -153,7 +153,7 @@ def test_compiled_functions_give_the_same_bits(monkeypatch):
 def test_what_is_feasible_already_is_one_propagation():
     nlp = DFET(30, 1).transcribe(load("orbit_rise"))
     C = candidates(nlp, 5)
-    flown, found = March().solve(nlp, C), Newton().solve(nlp, C)
+    flown, found = Propagate().solve(nlp, C), Newton().solve(nlp, C)
     inside = flown.status == "converged"
     assert inside.any() and np.array_equal(found.z[inside], flown.z[inside])
     assert (found.iterations[inside] == 1).all() and not found.moved[inside].any()

@@ -119,7 +119,7 @@ def solved(nlp: NLP, ranges: np.ndarray, share: float) -> np.ndarray:
     """A vector of the front that scalarize finds, from random controls."""
     rng = np.random.default_rng(5)
     candidates = nlp.lower[nlp.free] + rng.random((1, len(nlp.free))) * nlp.span[nlp.free]
-    start = nlp.march(nlp.first_guess(candidates))[0]
+    start = nlp.propagate(nlp.first_guess(candidates))[0]
     (F,), _ = nlp.evaluate(start[None])
     found = scalarize(nlp, start, reference=F - ranges * np.array([share, 1 - share]), weights=ranges)
     assert found.status == "converged"
@@ -167,7 +167,7 @@ def test_a_weakly_optimal_point_has_none_either() -> None:
     # Time at its least value is optimal in the weak sense, whatever is made of it: the first order cannot tell. `payoff` can.
     nlp = CASES["orbit_rise"][0].transcribe(load("orbit_rise"))
     free = np.where(np.array([nlp.variables[i].name for i in nlp.free]) == "rise.tf", 20.0, 1.0)
-    z = nlp.march(nlp.first_guess(free[None]))
+    z = nlp.propagate(nlp.first_guess(free[None]))
     assert optimality(nlp, z[0], CASES["orbit_rise"][1]) == pytest.approx(0, abs=1e-9)
 
 

@@ -40,7 +40,7 @@ def feasible(nlp: NLP, seed: int) -> np.ndarray:
 
 
 def middle(nlp: NLP) -> np.ndarray:
-    return nlp.march(nlp.first_guess(0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])[None]))[0]
+    return nlp.propagate(nlp.first_guess(0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])[None]))[0]
 
 
 def close(solved: Solved, F: object, miss: float) -> bool:

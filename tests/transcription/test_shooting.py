@@ -106,7 +106,7 @@ def test_flying_and_scoring_in_one_go_is_flying_and_then_scoring(method):
     Z = nlp.first_guess(candidates(nlp, 5))
     flight, F, residuals = nlp.fly(Z)
     violation = largest(residuals)
-    assert np.array_equal(flight, nlp.march(Z)) and np.array_equal(flight[:, nlp.free], Z[:, nlp.free])
+    assert np.array_equal(flight, nlp.propagate(Z)) and np.array_equal(flight[:, nlp.free], Z[:, nlp.free])
     again, worst = nlp.evaluate(flight)
     assert pytest.approx(again, abs=1e-12) == F and worst == pytest.approx(violation, abs=1e-12)
     assert violation == pytest.approx([max(nlp.violations(z).values()) for z in flight], abs=1e-12)
@@ -160,7 +160,7 @@ def test_dynamics_of_a_table_and_of_a_callback_fly_too():
         phase.dynamics(x=make(phase.time) * phase["u"])
         problem.minimize("end", phase.final(phase["x"]))
         nlp = SingleShooting(9, control="linear").transcribe(problem)
-        ends.append(inner_solver("march").solve(nlp, candidates(nlp, 30)).F)
+        ends.append(inner_solver("propagate").solve(nlp, candidates(nlp, 30)).F)
     assert ends[1] == pytest.approx(ends[0], abs=1e-8) and ends[2] == pytest.approx(ends[0], abs=1e-14)
 
 
@@ -212,7 +212,7 @@ def test_periodic_controls_go_the_short_way_round(kind):
     nlp = SingleShooting(41, scheme="rk8", control=kind, control_nodes=5).transcribe(problem)
     angles = np.array([2.5, 3.5, 4.5, 6.0, 7.0])
     wrapped = np.mod(angles + np.pi, 2 * np.pi) - np.pi
-    z = nlp.march(nlp.first_guess(wrapped[None]))[0]
+    z = nlp.propagate(nlp.first_guess(wrapped[None]))[0]
     straight = law(kind, 0, 2, angles)
     fine = np.linspace(0, 2, 20_001)
     assert z[slot(nlp, "run.x(tf)")] == pytest.approx(np.trapezoid(np.cos(straight(fine)), fine), abs=1e-7)
@@ -242,7 +242,7 @@ def test_paths_and_peaks_are_looked_at_at_nodes_and_where_asked_between(method):
     seen = {}
     for points in (0, 1, 4):
         nlp = method(control="linear", path_points=points).transcribe(bump())
-        z = nlp.march(nlp.first_guess(np.ones((1, 5))))
+        z = nlp.propagate(nlp.first_guess(np.ones((1, 5))))
         seen[points] = nlp.evaluate(z)[0][0, 0], nlp.evaluate(z)[1][0]
         assert nlp.g_labels.count("path 'low' of 'run'") == 4 * (points + 1) + 1
     nodes = np.linspace(-1, 1, 5)
@@ -258,7 +258,7 @@ def test_where_a_control_jumps_both_of_its_values_count():
     phase.path("thrust", phase["u"] * phase.time, upper=0.5)
     problem.minimize("peak", phase.peak(phase["u"] * phase.time))
     nlp = SingleShooting(3).transcribe(problem)
-    z = nlp.march(nlp.first_guess(np.array([[0.9, 0.0]])))
+    z = nlp.propagate(nlp.first_guess(np.array([[0.9, 0.0]])))
     assert nlp.evaluate(z)[0][0, 0] == pytest.approx(0.9) and nlp.violations(z[0])["path 'thrust' of 'run'"] == pytest.approx(0.4)
 
 
@@ -269,7 +269,7 @@ def test_bounds_of_states_hold_at_the_nodes():
     phase._final["x"] = (-10, 0.7)
     for method in (SingleShooting(5), MultipleShooting(4)):
         nlp = method.transcribe(problem)
-        z = nlp.march(nlp.first_guess(np.array([[1.0, 1.0, -1.0, -1.0]])))[0]
+        z = nlp.propagate(nlp.first_guess(np.array([[1.0, 1.0, -1.0, -1.0]])))[0]
         assert nlp.violations(z)["bounds of run.x"] == pytest.approx(0.3)
 
 
@@ -364,7 +364,7 @@ def test_a_trajectory_interpolates_with_the_order_of_its_scheme(kind, scheme):
         nlp = SingleShooting(n + 1, scheme=scheme, control=kind, control_nodes=5).transcribe(oscillator())
         C = np.full((1, len(nlp.free)), 0.5)
         C[:, [slot(nlp, "m"), slot(nlp, "swing.tf"), slot(nlp, "swing.t0")]] = 1.0, 1.8, 0.2
-        flight = nlp.unpack(nlp.march(nlp.first_guess(C))[0])
+        flight = nlp.unpack(nlp.propagate(nlp.first_guess(C))[0])
         phase, exact = flight["swing"], simulate(nlp.problem, flight, rtol=1e-12, atol=1e-13).trajectory["swing"]
         times = np.linspace(phase.t0, phase.tf, 200)
         worst.append(np.abs(phase.state(times) - exact.state(times)).max())
@@ -389,7 +389,7 @@ def test_flights_go_from_one_method_to_another():
     for method in (SingleShooting(41, control="linear"), MultipleShooting(20, control="spline"), MultipleShooting(30)):
         nlp = method.transcribe(problem)
         z = nlp.interpolate(start.trajectory)
-        assert nlp.evaluate(nlp.march(z[None]))[1][0] < 0.02
+        assert nlp.evaluate(nlp.propagate(z[None]))[1][0] < 0.02
         back = DFET(4, 6).transcribe(problem).interpolate(nlp.unpack(z))
         assert np.abs(back - start.decision).max() < 0.2
     again = optimize(problem, MultipleShooting(30), objective="horizontal speed", start=start)
@@ -406,8 +406,8 @@ def test_a_front_is_found_saved_and_loaded(tmp_path):
     times = np.linspace(0, loaded[0].trajectory["ascent"].tf, 33)
     assert loaded[0].trajectory["ascent"].at(times)["y"] == pytest.approx(front[0].trajectory["ascent"].at(times)["y"], abs=1e-13)
     assert from_dict(loaded[0].transcription) == method
-    marched = MACS(agents=4, archive=4, refine=False).solve(load("goddard"), method, evaluations=40, seed=1, inner="march")
-    assert marched.stats["evaluations"] == 40
+    propagated = MACS(agents=4, archive=4, refine=False).solve(load("goddard"), method, evaluations=40, seed=1, inner="propagate")
+    assert propagated.stats["evaluations"] == 40
 
 
 # Words and settings

@@ -33,7 +33,7 @@ def test_a_flight_without_controls_has_its_closed_form(method):
     problem.minimize("top", phase.peak(-phase["x"]))
     problem.maximize("end", phase.final(phase["x"] * phase.time))
     nlp = DFET(3, 4).transcribe(problem)
-    check = fly(nlp, nlp.march(nlp.first_guess(np.empty((1, 0))))[0], rtol=1e-9, method=method)
+    check = fly(nlp, nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0], rtol=1e-9, method=method)
     e = np.exp(-1.5)
     exact = {"rest": e, "square": (1 - e**2) / 2, "moment": 1.125, "top": -e, "end": 1.5 * e}
     assert check.objectives == pytest.approx(exact, rel=1e-5)
@@ -55,7 +55,7 @@ def test_an_exact_trajectory_has_no_defect():
 def test_the_defect_is_that_of_the_mesh():
     problem, _phase = decay(tf=2.0)
     nlp = DFET(2, 0).transcribe(problem)
-    flight = nlp.unpack(nlp.march(nlp.first_guess(np.empty((1, 0))))[0])
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
     check = simulate(nlp.problem, flight)
     error = np.abs(flight["fall"].edge_states[:, 0] - np.exp(-flight["fall"].state.edges)).max()
     assert error > 0.02
@@ -85,7 +85,7 @@ def test_objectives_and_violations_are_those_of_the_transcription():
     nlp = DFET(4, 8).transcribe(oscillator())
     C = candidates(nlp, 1)
     C[0, 4:] = 0.3
-    z = nlp.march(nlp.first_guess(C))[0]
+    z = nlp.propagate(nlp.first_guess(C))[0]
     check, F = fly(nlp, z), nlp.evaluate(z[None])[0][0]
     assert list(check.objectives.values()) == pytest.approx((F * nlp.problem.signs).tolist(), rel=1e-8)
     assert set(check.defect) == {"swing"} and set(check.defect["swing"]) == {"x", "y"}
@@ -99,7 +99,7 @@ def test_violations_of_paths_constraints_bounds_and_ends_are_named():
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(2, 2).transcribe(problem)
     C = np.full((1, 6), 6.0)
-    check = fly(nlp, nlp.march(nlp.first_guess(C))[0])
+    check = fly(nlp, nlp.propagate(nlp.first_guess(C))[0])
     assert check.violations["final value of run.x"] == pytest.approx(11 / 20)
     assert check.violations["bounds of run.x"] == pytest.approx(2 / 20)
     assert check.violations["path 'gate' of 'run'"] == pytest.approx(20)
@@ -180,7 +180,7 @@ def test_a_phase_of_no_duration_is_flown_through():
     problem.link(burn, coast)
     problem.minimize("end", coast.final(coast["x"]) + coast.integral(coast["x"]))
     nlp = DFET(2, 2).transcribe(problem)
-    check = fly(nlp, nlp.march(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
+    check = fly(nlp, nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
     assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
 
 
@@ -194,7 +194,7 @@ def test_stiff_dynamics_have_their_methods():
     phase.dynamics(x=-1e5 * (x - ca.cos(phase.time)))
     problem.minimize("end", phase.final(x))
     nlp = DFET(4, 3).transcribe(problem)
-    z = nlp.march(nlp.first_guess(np.empty((1, 0))))[0]
+    z = nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0]
     assert fly(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
 
 
@@ -231,7 +231,7 @@ def test_unstable_dynamics_are_flown_as_far_as_they_go():
 def test_bad_settings_are_refused(options):
     problem, _ = decay()
     nlp = DFET(1, 1).transcribe(problem)
-    z = nlp.march(nlp.first_guess(np.array([[1.5]])))[0]
+    z = nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0]
     with pytest.raises(ValueError, match=next(iter(options))):
         fly(nlp, z, **options)
 
@@ -239,7 +239,7 @@ def test_bad_settings_are_refused(options):
 def test_a_tighter_tolerance_than_arithmetic_allows_is_met_as_well_as_can_be():
     problem, _ = decay()
     nlp = DFET(2, 5).transcribe(problem)
-    assert fly(nlp, nlp.march(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
+    assert fly(nlp, nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
 
 
 # Between nodes
@@ -251,7 +251,7 @@ def overshooting(basis: str):
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(1, 4, basis=basis).transcribe(problem)
     # Bang-bang coefficients: between its nodes, a polynomial through them overshoots.
-    z = nlp.march(nlp.first_guess(np.array([[1, 1, -1, -1, 1.0]])))[0]
+    z = nlp.propagate(nlp.first_guess(np.array([[1, 1, -1, -1, 1.0]])))[0]
     return nlp, z
 
 
@@ -276,12 +276,12 @@ def test_periodic_controls_and_missing_controls_have_no_excursions():
     phase.dynamics(x=ca.cos(phase["u"]))
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(1, 3).transcribe(problem)
-    z = nlp.march(nlp.first_guess(np.array([[3, -3, 3.1, -2.5]])))[0]
+    z = nlp.propagate(nlp.first_guess(np.array([[3, -3, 3.1, -2.5]])))[0]
     assert excursions(nlp.problem, nlp.unpack(z)) == {}
     assert fly(nlp, z).max_defect < 1e-3
     problem, _ = decay()
     nlp = DFET(1, 3).transcribe(problem)
-    assert excursions(nlp.problem, nlp.unpack(nlp.march(nlp.first_guess(np.array([[1.5]])))[0])) == {}
+    assert excursions(nlp.problem, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0])) == {}
 
 
 def test_what_was_flown_is_a_trajectory():
@@ -322,14 +322,14 @@ def bursting() -> Problem:
 def planned(nlp, x0: float, tf: float) -> Trajectory:
     """A flight of `bursting`, as the transcription has it."""
     C = [[tf if nlp.variables[i].name == "fall.tf" else x0 for i in nlp.free]]
-    return nlp.unpack(nlp.march(nlp.first_guess(np.array(C)))[0])
+    return nlp.unpack(nlp.propagate(nlp.first_guess(np.array(C)))[0])
 
 
 def test_several_are_flown_as_each_is_alone():
     nlp = DFET(4, 4).transcribe(oscillator())
-    flights = [nlp.unpack(z) for z in nlp.march(nlp.first_guess(candidates(nlp, 6)))]
+    flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 6)))]
     other = DFET(3, 5).transcribe(oscillator())
-    flights[2:2] = [other.unpack(z) for z in other.march(other.first_guess(candidates(other, 2)))]
+    flights[2:2] = [other.unpack(z) for z in other.propagate(other.first_guess(candidates(other, 2)))]
     together = simulate_all(nlp.problem, flights)
     assert len(together) == len(flights)
     for flight, check in zip(flights, together, strict=True):
@@ -353,6 +353,6 @@ def test_one_that_breaks_down_takes_no_other_with_it():
 @pytest.mark.parametrize("method", ["Radau", "LSODA"])
 def test_several_by_an_implicit_method(method):
     nlp = DFET(4, 4).transcribe(oscillator())
-    flights = [nlp.unpack(z) for z in nlp.march(nlp.first_guess(candidates(nlp, 2)))]
+    flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 2)))]
     for flight, check in zip(flights, simulate_all(nlp.problem, flights, method=method), strict=True):
         assert check.objectives == pytest.approx(simulate(nlp.problem, flight).objectives, rel=1e-5)

@@ -118,7 +118,7 @@ def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
 
     def roughness(start) -> float:
         batches.clear()
-        solver.solve(climb(**GUESS), mesh, evaluations=12, seed=1, start=start, inner="march")
+        solver.solve(climb(**GUESS), mesh, evaluations=12, seed=1, start=start, inner="propagate")
         first = np.vstack(batches)[:, nlp.free]
         assert np.array_equal(first[0][np.isfinite(nlp.guess)], nlp.guess[np.isfinite(nlp.guess)])  # the guess itself comes first
         return float(np.abs(np.diff(first[1 : min(len(batches[0]), 6), nlp.profiles[0].columns], axis=1)).mean())
@@ -135,7 +135,7 @@ def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
     nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
     inside = Bilevel._evaluate
     monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (first.append(Z.copy()), inside(self, Z))[1])
-    solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="march")
+    solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="propagate")
     throttle = nlp.profiles[0].columns
     assert not np.isclose(np.vstack(first)[:, nlp.free][:, throttle], nlp.guess[throttle]).all(axis=1).any()
 
@@ -143,7 +143,7 @@ def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
 def test_an_array_of_them_is_a_start_too() -> None:
     problem, mesh = climb(**GUESS), DFET(4, 2)
     start = Smooth().draw(problem, mesh, 8, np.random.default_rng(3))
-    assert len(NSGA2(population=8).solve(problem, mesh, evaluations=16, seed=1, start=start, inner="march"))
+    assert len(NSGA2(population=8).solve(problem, mesh, evaluations=16, seed=1, start=start, inner="propagate"))
 
 
 def test_an_unknown_start_is_refused_before_any_work() -> None:
@@ -154,7 +154,7 @@ def test_an_unknown_start_is_refused_before_any_work() -> None:
 
 
 def test_a_checkpoint_belongs_to_its_start(tmp_path) -> None:
-    given = {"evaluations": 24, "seed": 1, "inner": "march", "checkpoint": tmp_path / "run.ckpt"}
+    given = {"evaluations": 24, "seed": 1, "inner": "propagate", "checkpoint": tmp_path / "run.ckpt"}
     solver, mesh = MOPSO(particles=8), DFET(4, 2)
     solver.solve(climb(**GUESS), mesh, start="smooth", callback=lambda progress: True, **given)
     with pytest.raises(ValueError, match="first candidates"):

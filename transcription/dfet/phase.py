@@ -64,7 +64,7 @@ class DFETPhase(PhaseWriter):
         weak, integrals, paths, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
-        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), marched=True)
+        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), propagated=True)
         for k, limit in enumerate(phase.paths):
             rows.add(paths[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
         nu, totals = len(phase.controls), ca.sum2(integrals)
@@ -76,7 +76,7 @@ class DFETPhase(PhaseWriter):
         """The integrals, those of absolute values as sums of the variables S (sizes, n k), which are not to be less than these."""
         scales = np.tile([v.scale for v in self._sizes], sizes.shape[1])
         for sign in (1.0, -1.0):
-            rows.add(sign * sizes - S, -np.inf, 0.0, scales, f"absolute values in '{self.phase.name}'", marched=True)
+            rows.add(sign * sizes - S, -np.inf, 0.0, scales, f"absolute values in '{self.phase.name}'", propagated=True)
         entries = ca.vertsplit(totals)
         for row, one in zip(self.phase.sized, ca.vertsplit(S), strict=True):
             on_elements = ca.DM(self.tables.weights).T @ ca.reshape(one, -1, self.n)
@@ -101,8 +101,8 @@ class DFETPhase(PhaseWriter):
         share = self.mesh.inside(self.tables.control_nodes).ravel()
         return self.U.reshape(len(share), len(self.phase.controls)), share
 
-    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """See `PhaseWriter.march`."""
+    def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """See `PhaseWriter.propagate`."""
         initial = self._layout.pick(extended, self.ends.initial)
         right, X, residual = self._propagation.fly(robust)(initial, *self._inputs(extended))
         extended = self._layout.replaced(extended, np.concatenate([self.X.ravel(), self.B[1:].ravel()]), ca.veccat(X, right))

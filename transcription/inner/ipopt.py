@@ -60,12 +60,12 @@ class Ipopt(InnerSolver):
         _, violation = nlp.evaluate(Z)
         again = np.flatnonzero(~(violation <= tolerance) & (said != TIMEOUT))
         if len(again) and self.objective == "projection":
-            Z[again], said[again], more = self._solve_all(nlp, start[again], nlp.march(start[again]), tolerance)
+            Z[again], said[again], more = self._solve_all(nlp, start[again], nlp.propagate(start[again]), tolerance)
             iterations[again] += more
             _, violation = nlp.evaluate(Z)
         left = np.flatnonzero(~(violation <= tolerance))
         if len(left):
-            flown = nlp.march(Z[left])
+            flown = nlp.propagate(Z[left])
             usable = np.isfinite(nlp.evaluate(flown)[1])
             Z[left[usable]] = flown[usable]
         return result(nlp, Z, start, said, iterations, tolerance)

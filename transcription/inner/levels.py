@@ -34,7 +34,7 @@ class Auto(InnerSolver):
 
 
 @dataclass(frozen=True)
-class March(InnerSolver):
+class Propagate(InnerSolver):
     """Propagates the states from the free variables and changes nothing else; what constraints are left show in the violation."""
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
@@ -46,7 +46,7 @@ class March(InnerSolver):
 
 NAMED: dict[str, InnerSolver] = {
     "auto": Auto(),
-    "march": March(),
+    "propagate": Propagate(),
     "ipopt": Ipopt(),
     "ipopt-feasibility": Ipopt(objective="constant"),
 }

@@ -130,7 +130,7 @@ class Reduced:
         start = ca.MX.sym("z", len(self._layout.variables), k)
         extended, finals, residuals = self._layout.extended_symbol(start), [], []
         for writer in self._writers:
-            extended, final, residual = writer.march(extended, robust=robust)
+            extended, final, residual = writer.propagate(extended, robust=robust)
             finals.append(final)
             residuals.append(residual)
         z, *found = self._judged().map(k).call([extended, ca.vertcat(*finals)])

@@ -40,26 +40,26 @@ class Rows:
     upper: list[np.ndarray] = field(default_factory=list)
     scale: list[np.ndarray] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
-    marched: list[bool] = field(default_factory=list)
+    propagated: list[bool] = field(default_factory=list)
 
     def add(
-        self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, marched: bool = False
+        self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
     ) -> None:
         """A matrix of rows, taken column by column; limits, scale and label one for each or one for all.
 
-        `marched` rows are satisfied by propagation, where no final value is imposed.
+        `propagated` rows are satisfied by propagation, where no final value is imposed.
         """
         count = expression.numel()
         self.expressions.append(ca.vec(expression))
         for target, value in ((self.lower, lower), (self.upper, upper), (self.scale, scale)):
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
-        self.marched.append(marched)
+        self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
 
     @property
     def left(self) -> np.ndarray:
         """Indices of the rows that propagation does not satisfy."""
-        return np.flatnonzero(np.repeat(~np.array(self.marched, dtype=bool), [e.numel() for e in self.expressions]))
+        return np.flatnonzero(np.repeat(~np.array(self.propagated, dtype=bool), [e.numel() for e in self.expressions]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +82,11 @@ class PhaseWriter(ABC):
     interior: np.ndarray
     """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
     compilable: bool
-    """Whether what `march` does fast, and `sensitivity`, can be written in C."""
+    """Whether what `propagate` does fast, and `sensitivity`, can be written in C."""
     magnitudes: np.ndarray = np.empty(0, dtype=int)
     """Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known."""
     wide: bool = False
-    """Whether `march` takes several extended vectors side by side."""
+    """Whether `propagate` takes several extended vectors side by side."""
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -115,7 +115,7 @@ class PhaseWriter(ABC):
         return found
 
     @abstractmethod
-    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
+    def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Propagation from the initial states.
 
         Parameters

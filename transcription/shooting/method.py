@@ -119,7 +119,7 @@ class Shooting(Transcription):
 class SingleShooting(Shooting):
     """Each phase is integrated in one go from its initial states; its final states are the only ones that are variables.
 
-    Made for searches that propagate their candidates (`inner="march"`): one pass gives the trajectory, its objectives and all residuals.
+    Made for searches that propagate their candidates (`inner="propagate"`): one pass gives trajectory, objectives and all residuals.
     Bounds of states hold at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of nodes:
     `MultipleShooting` is made for these.
 

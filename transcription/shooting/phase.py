@@ -65,7 +65,7 @@ class ShootingPhase(PhaseWriter):
         """See `PhaseWriter.write`."""
         phase, pick, n = self.phase, self._layout.pick, len(self.R)
         residual = pick(extended, self.R) - pick(extended, self._arrivals)
-        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], n), self._labels(), marched=True)
+        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], n), self._labels(), propagated=True)
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
             rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
@@ -91,8 +91,8 @@ class ShootingPhase(PhaseWriter):
         """See `PhaseWriter.control_nodes`."""
         return self.U, self.law.places
 
-    def march(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """See `PhaseWriter.march`. There is nothing to solve."""
+    def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """See `PhaseWriter.propagate`. There is nothing to solve."""
         k, n = extended.shape[1], self.mesh.steps
         begun = self._before.map(k)(extended)
         if k == 1:

@@ -158,7 +158,7 @@ def reentry(
     # seconds to make a candidate feasible: they are scored as they fly, and what is worth it is left to the gradients.
     problem.default_transcription = "dfet:50x2:bernstein:1"
     problem.default_evaluations = 700
-    problem.default_inner, problem.default_start = "march", "smooth"
+    problem.default_inner, problem.default_start = "propagate", "smooth"
     problem.verify_tolerance = 2e-2
     return problem
 

@@ -28,7 +28,7 @@ def push(mass: float = 2.0, unit: str = "m", drag: float = 0.0, most: float = 2.
 
 @pytest.fixture(scope="module")
 def front() -> Front:
-    return NSGA2(population=12).solve(push(), SingleShooting(5), evaluations=48, seed=1, inner="march")
+    return NSGA2(population=12).solve(push(), SingleShooting(5), evaluations=48, seed=1, inner="propagate")
 
 
 def by_hand(point, mass: float) -> tuple[float, float]:
@@ -40,7 +40,7 @@ def by_hand(point, mass: float) -> tuple[float, float]:
 
 
 def test_as_stated(front):
-    again = front.flown()
+    again = front.simulate()
     assert len(again) == len(front) and (again.status == "converged").all()
     np.testing.assert_allclose(again.F, front.F, rtol=1e-6)
     for point, flight in zip(front, again, strict=True):
@@ -51,7 +51,7 @@ def test_as_stated(front):
 
 def test_under_other_data(front):
     heavy = push(mass=4.0)
-    other = front.flown(heavy)
+    other = front.simulate(heavy)
     assert other.problem.fingerprint == heavy.compile().fingerprint != front.problem.fingerprint
     for point, flight in zip(front, other, strict=True):
         assert list(flight.objectives.values()) == pytest.approx(by_hand(point, 4.0), rel=1e-5)
@@ -62,18 +62,18 @@ def test_under_other_data(front):
 def test_what_becomes_infeasible_says_so_and_does_not_merge(front):
     speeds = np.array([point.trajectory["run"]["v"][-1] for point in front])
     limit = float(np.median(speeds)) + 0.013
-    limited = front.flown(push(gate=limit), tolerance=1e-3)
+    limited = front.simulate(push(gate=limit), tolerance=1e-3)
     assert (limited.violation > 1e-3).tolist() == (speeds > limit + 1e-3).tolist()
     assert set(limited.status[speeds > limit + 1e-3]) == {"infeasible"}
     assert len(Front.merge([limited])) == (speeds <= limit + 1e-3).sum()
     assert best(limited).tolist() == [k for k in range(len(front)) if speeds[k] <= limit + 1e-3]
-    assert (front.flown(push(gate=limit), tolerance=100.0).status == "converged").all()
+    assert (front.simulate(push(gate=limit), tolerance=100.0).status == "converged").all()
 
 
 def test_what_is_dominated_in_the_air_is_not_the_best():
     """A coarse mesh promises what does not come true."""
-    front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="march")
-    again = front.flown(tolerance=1.0)
+    front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="propagate")
+    again = front.simulate(tolerance=1.0)
     kept = best(again)
     merged = Front.merge([again])
     np.testing.assert_array_equal(again.F[kept], merged.F)
@@ -83,8 +83,8 @@ def test_what_is_dominated_in_the_air_is_not_the_best():
 def test_flown_fronts_are_saved_like_others(front, tmp_path):
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc", push())
-    np.testing.assert_allclose(loaded.flown().F, front.flown().F, rtol=1e-9)
-    again = front.flown()
+    np.testing.assert_allclose(loaded.simulate().F, front.simulate().F, rtol=1e-9)
+    again = front.simulate()
     again.save(tmp_path / "flown.nc")
     back = Front.load(tmp_path / "flown.nc", push())
     np.testing.assert_array_equal(back.F, again.F)
@@ -98,17 +98,17 @@ def test_other_problems_are_refused_by_what_differs(front):
     phase.dynamics(x=phase.control("u", bounds=(0, 2)))
     problem.minimize("effort", phase.final(phase["x"]))
     with pytest.raises(ValueError, match="'push' cannot be flown under 'pull': objectives are minimize effort"):
-        front.flown(problem)
+        front.simulate(problem)
     with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* there and maximize distance \[m\]"):
-        front.flown(push(unit="ft"))
+        front.simulate(push(unit="ft"))
     with pytest.raises(ValueError, match="tolerance must not be negative"):
-        front.flown(tolerance=-1.0)
+        front.simulate(tolerance=-1.0)
     with pytest.raises(ValueError, match="black box"):
-        NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).flown()
+        NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).simulate()
 
 
 def test_where_nothing_holds_the_merged_front_says_what_is_violated(front):
-    merged = Front.merge([front.flown(push(gate=-1.0), tolerance=1e-3)])
+    merged = Front.merge([front.simulate(push(gate=-1.0), tolerance=1e-3)])
     assert not len(merged) and merged.closest is not None
     assert "the nearest violates path 'gate' of 'run' by " in merged.message
 
@@ -118,7 +118,7 @@ def test_where_nothing_holds_the_merged_front_says_what_is_violated(front):
     [({"end": 3.0}, "bounds of run.tf", 1.0), ({"start": 50.0}, "initial value of run.x", 0.5), ({"most": 0.01}, "bounds of run.u", None)],
 )
 def test_what_was_decided_has_to_be_within_the_other_bounds(front, data, what, amount):
-    other = front.flown(push(**data))
+    other = front.simulate(push(**data))
     assert set(other.status) == {"infeasible"}
     for point in other:
         thrust = point.trajectory["run"].control.coefficients
