@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import casadi as ca
 
 from . import checks
 from .compiled import CompiledPhase, Limit, Variable, vector_function
 
-if TYPE_CHECKING:
-    from .problem import Problem
-
 _KINDS = ("initial", "final", "integral", "peak")
 
 
 class Phase:
     """A stretch of time with its own states, controls and dynamics. Made by `Problem.phase`.
+
+    Parameters
+    ----------
+    name, t0, tf, duration, time_unit
+        See `Problem.phase`.
+    problem : str
+        Name of the problem, for messages.
+    parameters : mapping
+        Symbols of the problem's parameters by name: a live view, since parameters may be declared after the phase.
 
     Attributes
     ----------
@@ -25,9 +32,11 @@ class Phase:
         Time, and the times at which the phase begins and ends: always symbols, usable in any expression of the phase.
     """
 
-    def __init__(self, problem: Problem, name: str, t0: Any, tf: Any, duration: Any, time_unit: str) -> None:
-        self._problem = problem
+    def __init__(
+        self, name: str, t0: Any, tf: Any, duration: Any, time_unit: str, *, problem: str, parameters: Mapping[str, ca.MX]
+    ) -> None:
         self.name = name
+        self._problem, self._parameters = problem, parameters
         self._time_unit = time_unit
         self._t0_range = checks.fixed_or_interval(t0, f"phase '{name}': t0")
         self._tf_range = checks.fixed_or_interval(tf, f"phase '{name}': tf")
@@ -175,11 +184,11 @@ class Phase:
         return self._symbols[name]
 
     def _known(self) -> dict[int, str]:
-        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._problem.parameters.values()]
+        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._parameters.values()]
         return {symbol.__hash__(): symbol.name() for symbol in own}
 
     def _expression(self, value: Any, what: str) -> ca.MX:
-        hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem.name}'"
+        hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"
         return checks.expression(value, self._known(), what, hint)
 
     def _quantity(self, kind: str, expr: Any) -> ca.MX:
@@ -215,7 +224,7 @@ class Phase:
             "x": [self._symbols[name] for name in self._states],
             "u": [self._symbols[name] for name in self._controls],
             "t": [self.time],
-            "s": [self.t0, self.tf, *self._problem.parameters.values()],
+            "s": [self.t0, self.tf, *self._parameters.values()],
         }
 
         def function(name: str, expressions: list[ca.MX]) -> ca.Function:
