@@ -172,12 +172,12 @@ class Assembly:
         write = self.layout.write
         write(extended, self.parameters, np.array([[trajectory.parameters[v.name] for v in self.problem.parameters]]))
         for writer in self._writers.values():
-            flown = trajectory[writer.phase.name]
-            write(extended, writer.ends.statics[:2], np.array([[flown.t0, flown.tf]]))
-            states = flown.edge_states
+            phase = trajectory[writer.phase.name]
+            write(extended, writer.ends.statics[:2], np.array([[phase.t0, phase.tf]]))
+            states = phase.edge_states
             write(extended, writer.ends.initial, states[None, 0])
             write(extended, writer.ends.final, states[None, -1])
-            writer.interpolate(extended, flown)
+            writer.interpolate(extended, phase)
         Z = extended[:, : len(self.layout.variables)]
         lower, upper = (np.array([getattr(v, side) for v in self.layout.variables]) for side in ("lower", "upper"))
         return self.tighten(np.clip(Z, lower, upper))[0]

@@ -57,7 +57,7 @@ class Propagation:
         self.quick = self._step is not None
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
-    def fly(self, robust: bool) -> ca.Function:
+    def elements(self, robust: bool) -> ca.Function:
         """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N (l + 1)), residuals (1, N));
         inputs of elements stand side by side."""
         step = self._step

@@ -85,10 +85,10 @@ class Layout:
         shape = slots.shape[-1], int(np.prod(slots.shape[:-1]))
         return ca.reshape(extended[self.index(slots).tolist()], *shape) if slots.size else ca.MX(*shape)
 
-    def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX) -> ca.MX:
-        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are. It is one
-        permutation: to split rows and join them again would cost far more."""
-        total, kept = extended.shape[0], np.flatnonzero(slots.ravel() >= 0)
+    def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX, *, constants: bool = False) -> ca.MX:
+        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are, unless they are
+        to be replaced too. It is one permutation: to split rows and join them again would cost far more."""
+        total, kept = extended.shape[0], np.flatnonzero((slots.ravel() >= 0) | constants)
         places = np.arange(total)
         places[self.index(slots)[kept]] = total + kept
         return ca.vertcat(extended, values)[places.tolist(), :]
