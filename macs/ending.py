@@ -8,9 +8,8 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import Transcription
+from transcription.base import Meshed, Transcription
 from transcription.catalogue import parse
-from transcription.dfet.method import DFET
 
 from .front import Front
 from .pareto.dominance import dominates
@@ -41,8 +40,8 @@ def check(settings: MACS) -> None:
 
 def check_transcription(settings: MACS, transcription: Transcription, problem: CompiledProblem) -> None:
     """Raise ValueError where they do not suit the transcription of a problem."""
-    if settings.mesh == "adaptive" and not isinstance(transcription, DFET):
-        raise ValueError(f"MACS: mesh='adaptive' needs DFET, not {type(transcription).__name__}")
+    if settings.mesh == "adaptive" and not isinstance(transcription, Meshed):
+        raise ValueError(f"MACS: mesh='adaptive' needs DFET or another method on elements, not {type(transcription).__name__}")
     if settings.polish_on is not None:
         refuse_peaks(problem)
 

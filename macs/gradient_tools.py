@@ -21,7 +21,7 @@ from problems.problem import Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
-from transcription.nlp.scaling import objective_scales
+from transcription.nlp.scaling import nlp_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
@@ -234,7 +234,7 @@ class _Job:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other, and so has none."""
         F = np.array([end.F for end in ends])
         ranges, sizes = np.ptp(F, axis=0), np.abs(F).max(axis=0)
-        return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * objective_scales(self.nlp)), ranges, 0.0)
+        return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * nlp_scales(self.nlp)), ranges, 0.0)
 
     def surpassed(self, ends: Sequence[Solved], found: Sequence[Solved]) -> bool:
         """Whether a sweep found an objective to be better than at its end, which then is a local optimum only."""
@@ -243,7 +243,7 @@ class _Job:
         return bool((best - F > BETTER * self._unit(self.ranges(ends))).any())
 
     def _unit(self, ranges: np.ndarray | None) -> np.ndarray:
-        scales = objective_scales(self.nlp)
+        scales = nlp_scales(self.nlp)
         return scales if ranges is None else np.where(ranges > 0, ranges, scales)
 
     def sifted(self, found: Sequence[Solved], ranges: np.ndarray | None = None) -> Front:

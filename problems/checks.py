@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, fields
 from typing import Any
 
 import casadi as ca
@@ -179,8 +180,32 @@ def check_count(name: str, value: Any, least: int) -> None:
         raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
+def check_choice(name: str, value: Any, choices: Iterable[str]) -> None:
+    """Raise ValueError unless `value` is one of these words."""
+    words = [*choices]
+    if not isinstance(value, str) or value not in words:
+        shown = " or ".join(map(repr, words)) if len(words) == 2 else f"one of {', '.join(map(repr, words))}"
+        raise ValueError(f"{name} must be {shown}, not {value!r}")
+
+
 def unknown(what: str, word: Any, known: Iterable[str]) -> str:
     """What to say of a word that is none of those known: the nearest, and all."""
     words = [*known]
     near = difflib.get_close_matches(str(word), words, n=1)
     return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
+
+
+def settings_of(value: Any) -> list[Field[Any]]:
+    """The settings of a dataclass as its constructor takes them: those that are also positional first."""
+    return sorted((one for one in fields(value) if one.init), key=lambda one: bool(one.kw_only))
+
+
+def short_repr(value: Any) -> str:
+    """A dataclass of settings as its constructor is called, without those that have their default value."""
+    shown = [f"{one.name}={given!r}" for one in settings_of(value) if not _is_default(given := getattr(value, one.name), one)]
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+def _is_default(value: Any, setting: Field[Any]) -> bool:
+    default = setting.default if setting.default_factory is MISSING else setting.default_factory()
+    return value is default or (type(value) is type(default) and bool(value == default))

@@ -14,6 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .derived import Deriving
+
 FINGERPRINT_POINTS = 64
 
 
@@ -70,8 +72,8 @@ class Link:
     states: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CompiledPhase:
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledPhase(Deriving):
     """One phase.
 
     Every Function takes `(x, u, t, s)`: states (nx), controls (nu), time, and `s = [t0, tf, *parameters]`. `dynamics` returns the rates
@@ -104,14 +106,18 @@ class CompiledPhase:
     size_scales: tuple[float, ...] = ()
     """... and how large they mostly are within the bounds."""
 
+    def __repr__(self) -> str:
+        names = ([v.name for v in group] for group in (self.states, self.controls))
+        return "CompiledPhase('{}', states=[{}], controls=[{}])".format(self.name, *(", ".join(group) for group in names))
+
     @property
     def n_quantities(self) -> int:
         """Length of the column `q` that objectives and constraints see: t0, tf, initials, finals, integrals, peaks."""
         return 2 + sum(f.size1_out(0) for f in (self.initials, self.finals, self.integrands, self.peaks))
 
 
-@dataclass(frozen=True, eq=False)
-class CompiledProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledProblem(Deriving):
     """A whole problem. `objectives` and `constraints` take `(q of phase 1, ..., q of phase n, parameters)`.
 
     `objectives` returns the column that is minimised (m); `constraints` the column that `limits` bounds.
@@ -130,6 +136,10 @@ class CompiledProblem:
     """What `problems.load` made it from; empty for a problem built in a script."""
     data: Mapping[str, Any] = field(default_factory=dict)
     """The keyword arguments that `problems.load` was given."""
+
+    def __repr__(self) -> str:
+        phases, goals = (", ".join(one.name for one in group) for group in (self.phases, self.goals))
+        return f"CompiledProblem('{self.name}', phases=[{phases}], objectives=[{goals}])"
 
     @property
     def signs(self) -> np.ndarray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from problems.checks import check_positive
 from problems.problem import Problem
 
 from .base import NLP, Transcription
@@ -50,7 +51,8 @@ class Smooth:
 
     def __post_init__(self) -> None:
         for name, value, most in (("spread", self.spread, 1), ("length", self.length, 10)):
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= most:
+            check_positive(f"Smooth: {name}", value)
+            if value > most:
                 raise ValueError(f"Smooth: {name} must be in (0, {most}], not {value!r}")
         if not isinstance(self.guess, bool):
             raise ValueError(f"Smooth: guess must be True or False, not {self.guess!r}")

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from problems.checks import check_count, check_positive
-from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import Propagate
@@ -58,7 +56,7 @@ def polished(
     if time_limit is not None:
         check_positive("time_limit", time_limit)
     refuse_peaks(problem)
-    nlp = _written(problem, transcription)
+    nlp = transcription.nlp(problem)
     evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
     with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
         evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
@@ -118,12 +116,6 @@ def _costs(front: Front, counts: Counts, taken: float, stopped: str) -> dict[str
         "reproducible": before["reproducible"] and not (counts.clocked or stopped),
         **({"stopped": stopped} if stopped else {}),
     }
-
-
-@lru_cache(maxsize=4)
-def _written(problem: CompiledProblem, transcription: Transcription) -> NLP:
-    """The problem by this method: fronts of one problem share it, and all that is compiled of it."""
-    return transcription.transcribe(problem)
 
 
 ROUNDS = 3

@@ -144,9 +144,6 @@ def _flown(task: Task, front: Front) -> dict[str, Any]:
 
 @lru_cache(maxsize=8)
 def _unpacked(payload: bytes) -> tuple[Any, Any]:
-    """Problem and transcription; the runs that one process makes of them share an NLP, and all that is compiled of it."""
+    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
     problem, scheme = pickle.loads(payload)
-    nlp = scheme.transcribe(problem)
-    # It hides the method in this one value, which nobody else has.
-    object.__setattr__(scheme, "transcribe", lambda _: nlp)
     return problem, scheme

@@ -239,11 +239,11 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
 )
 def test_controls_may_have_another_order_than_states(method):
     nlp = method.transcribe(oscillator())
-    assert len(nlp.free) == 4 + 2 * method.elements * (method.degree_of_controls + 1) - 0
+    assert len(nlp.free) == 4 + 2 * method.elements * (method.degree_of_controls(method.order) + 1) - 0
     Z = flown(nlp)
     assert nlp.evaluate(Z)[1].max() < 1e-12
     phase = nlp.unpack(Z[0])["swing"]
-    assert phase.control.coefficients.shape == (method.elements, method.degree_of_controls + 1, 2)
+    assert phase.control.coefficients.shape == (method.elements, method.degree_of_controls(method.order) + 1, 2)
     assert (np.diff(phase.time) > 0).all()
 
 

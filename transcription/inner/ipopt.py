@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
+
+from problems.checks import check_choice, check_count, check_positive
+from problems.derived import remembered
 
 from ..base import NLP
 from ..nlp.scaling import SAID, back_in_bounds, origin, quiet, scaled_bounds
@@ -41,12 +43,9 @@ class Ipopt(InnerSolver):
     seconds: float = 60.0
 
     def __post_init__(self) -> None:
-        if self.objective not in ("projection", "constant"):
-            raise ValueError(f"Ipopt: objective must be 'projection' or 'constant', not {self.objective!r}")
-        if isinstance(self.max_iterations, bool) or not isinstance(self.max_iterations, int) or self.max_iterations < 1:
-            raise ValueError(f"Ipopt: max_iterations must be a whole number of at least 1, not {self.max_iterations!r}")
-        if not 0 < self.seconds < float("inf"):
-            raise ValueError(f"Ipopt: seconds must be a positive number, not {self.seconds!r}")
+        check_choice("Ipopt: objective", self.objective, ("projection", "constant"))
+        check_count("Ipopt: max_iterations", self.max_iterations, 1)
+        check_positive("Ipopt: seconds", self.seconds)
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`.
@@ -96,7 +95,7 @@ class Ipopt(InnerSolver):
         return nlp.tighten(Z), said, iterations
 
 
-@lru_cache(maxsize=8)
+@remembered
 def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
     """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))

@@ -16,6 +16,10 @@ NEAR = 0.1
 way."""
 
 
+CAP = 0.3
+"""Longest step, in spans."""
+
+
 STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
 
@@ -39,12 +43,9 @@ class Newton(InnerSolver):
     Parameters
     ----------
     max_iterations : int
-    cap : float
-        Longest step, in spans.
     """
 
     max_iterations: int = 40
-    cap: float = 0.3
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
@@ -83,11 +84,11 @@ class Newton(InnerSolver):
             pull = np.where(going.settled[:, None], 0.0, pull)
         step = going.towards(flown, pull)
         length = _norm(step)
-        if length.max() > self.cap:
-            far = np.flatnonzero(length > self.cap)
-            step[far] *= self.cap / length[far, None]
+        if length.max() > CAP:
+            far = np.flatnonzero(length > CAP)
+            step[far] *= CAP / length[far, None]
             going.multipliers[far] = 0.0  # the next step is of another kind: these would lead it astray
-            length = np.minimum(length, self.cap)
+            length = np.minimum(length, CAP)
         # The next step, if it shrinks as this one did.
         left = length * np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
@@ -98,7 +99,7 @@ class Newton(InnerSolver):
         accelerated = near & ~going.settled
         if iteration >= PLAIN and accelerated.any():
             improved = going.memory.improve(going.x, step, accelerated)
-            improved *= np.minimum(1.0, self.cap / np.maximum(_norm(improved), 1e-300))[:, None]
+            improved *= np.minimum(1.0, CAP / np.maximum(_norm(improved), 1e-300))[:, None]
             step = np.where(accelerated[:, None], improved, step)
         going.x = np.minimum(np.maximum(going.x + step, -going.walls), 1.0 + going.walls)
 

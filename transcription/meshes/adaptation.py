@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from problems.compiled import CompiledProblem
 
-from ..dfet.method import DFET
+from ..base import Meshed
 from ..phases.mesh import PhaseMesh
 from ..trajectories.simulate import Simulation, simulate
 from ..trajectories.trajectory import Trajectory
 from .errors import PhaseErrors, phase_errors
+
+Method = TypeVar("Method", bound=Meshed)
 
 MOST_ELEMENTS = 40
 """Of each phase; or twice as many as the method began with, if that is more."""
@@ -75,7 +78,7 @@ class Verdict:
             found.append(f"flown, it violates '{worst}' by {self.flight.violation:.1e}")
         return found
 
-    def scores(self, method: DFET, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
+    def scores(self, method: Meshed, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
         """For each phase the error of each element (N,), in units of what it may be; that of integrals too, if wanted."""
         total = sum(float(phase.defect.sum()) for phase in self.errors)
         # What an error at one element becomes at the end of the flight, at least.
@@ -94,7 +97,7 @@ class Verdict:
             found.append(np.max(parts, axis=0))
         return found
 
-    def worst_place(self, method: DFET, trajectory: Trajectory) -> str:
+    def worst_place(self, method: Meshed, trajectory: Trajectory) -> str:
         """Where the largest error is, in words."""
         scores = self.scores(method, trajectory)
         names = list(trajectory)
@@ -118,20 +121,20 @@ def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float, fe
     )
 
 
-def next_method(method: DFET, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = False) -> DFET:
-    """The method on finer meshes, with controls that their coefficients bound where one leaves its bounds between nodes.
+def next_method(method: Method, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = False) -> Method:
+    """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes.
 
     `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
     """
-    meshes, most = {}, max(MOST_ELEMENTS, 2 * method.elements)
+    finer, most = {}, max(MOST_ELEMENTS, 2 * method.elements)
     scores = verdict.scores(method, trajectory, integrals=integrals)
     for name, phase, score in zip(trajectory, verdict.errors, scores, strict=True):
         old = method.mesh_of(name)
-        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=most)
-        meshes[name] = PhaseMesh(tuple(edges.tolist()), order)
-    if all(mesh == method.mesh_of(name) for name, mesh in meshes.items()) and not (verdict.leaving and method.basis != "bernstein"):
-        return method
-    return method.remeshed(meshes, basis="bernstein" if verdict.leaving else None)
+        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=most, highest=method.highest_order)
+        mesh = PhaseMesh(tuple(edges.tolist()), order)
+        if mesh != old:
+            finer[name] = mesh
+    return method.remeshed(finer, bounded=verdict.leaving > 0.0)
 
 
 SMOOTH = 0.8
@@ -142,10 +145,6 @@ SLOWEST = 1e-3
 """A rate below this is none."""
 
 
-HIGHEST = 10
-"""Highest order."""
-
-
 WORST_SHARE = 0.1
 """Elements whose error is at least this share of the largest are refined together."""
 
@@ -154,12 +153,16 @@ LAYER = 0.3
 """Half width, on [-1, 1], of the element that is put around a place where a control changes steeply."""
 
 
+SHORTEST = 1e-7
+"""No element is cut to less than this length, relative to its phase."""
+
+
 MARGIN = 0.1
 """How near the ends of an element, on [-1, 1], it is not cut."""
 
 
 def refine(
-    edges: np.ndarray, order: int, error: np.ndarray, rate: np.ndarray, steep: np.ndarray, *, most: int, shortest: float = 1e-7
+    edges: np.ndarray, order: int, error: np.ndarray, rate: np.ndarray, steep: np.ndarray, *, most: int, highest: int
 ) -> tuple[np.ndarray, int]:
     """A finer mesh of one phase.
 
@@ -179,10 +182,8 @@ def refine(
         At which coefficients decay with the degree; see `errors.decay_rates`.
     steep : array (N,)
         Where, on [-1, 1], a control is much steeper than elsewhere on the element; NaN if it is not.
-    most : int
-        Number of elements that is not exceeded.
-    shortest : float
-        Length, relative to the phase, below which elements are not cut.
+    most, highest : int
+        Number of elements, and order, that are not exceeded.
 
     Returns
     -------
@@ -194,9 +195,9 @@ def refine(
     error = np.where(np.isnan(error), np.inf, error)
     marked = error >= min(1.0, WORST_SHARE * error.max(initial=0.0))
     more = np.array([degrees(e, r) for e, r in zip(error, rate, strict=True)])
-    smooth = np.isnan(steep) & (rate >= SMOOTH) & (order + more <= HIGHEST)
+    smooth = np.isnan(steep) & (rate >= SMOOTH) & (order + more <= highest)
     raised = order + int(min(more[marked & smooth].max(initial=0.0), max(2, order // 2 + 1)))
-    cut = [j for j in np.flatnonzero(marked & ~smooth) if edges[j + 1] - edges[j] >= 2.0 * shortest]
+    cut = [j for j in np.flatnonzero(marked & ~smooth) if edges[j + 1] - edges[j] >= 2.0 * SHORTEST]
     worst_first = sorted(cut, key=lambda j: (-error[j], j))
     return split(edges, {int(j): cuts(steep[j]) for j in worst_first}, most), raised
 

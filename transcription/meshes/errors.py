@@ -153,8 +153,8 @@ def _coefficients(flown: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
         k = piece.coefficients.shape[1]
         tau = gauss_legendre(k)[0]
         found.append(legendre_coefficients(piece.on_elements(tau)) / np.array([v.span for v in variables]))
-    # States pass through the stages and both ends of an element, but by collocation their degree is one less: the last is always 0.
-    return found[0], found[1][:, :-1]
+    # Through stages and both ends of an element pass polynomials whose degree, by collocation, is one less: the last is always 0.
+    return found[0], found[1][:, :-1] if flown.state.basis == "closed-legendre" else found[1]
 
 
 def _steepest(flown: PhaseTrajectory, j: int) -> float:

@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
-from .scaling import gradients, objective_scales
+from .scaling import gradients, nlp_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
@@ -43,7 +43,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         Feasible.
     F_scales : array (m,), optional
         What counts as one in each objective, the front's range for instance; by default, and for entries
-        that are not positive, `objective_scales`.
+        that are not positive, `nlp_scales`.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
     if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
         return float("inf")
-    natural = objective_scales(nlp)
+    natural = nlp_scales(nlp)
     scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
     unit = _units(nlp)
     dF = dF * unit / scales[:, None]

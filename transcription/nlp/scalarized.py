@@ -11,17 +11,17 @@ objectives of a feasible point as the reference, alpha <= 0 says that none got w
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from problems.derived import remembered
 from problems.peaks import refuse_peaks
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import stopping
-from .scaling import SAID, back_in_bounds, objective_scales, origin, quiet, scaled_bounds, symbol
+from .scaling import SAID, back_in_bounds, nlp_scales, origin, quiet, scaled_bounds, symbol
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
@@ -216,7 +216,7 @@ def _task(
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
-    scale = objective_scales(nlp)
+    scale = nlp_scales(nlp)
     slope = np.where(moving, weights, 0.0) / scale
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))
@@ -285,7 +285,7 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
     return (missed if missed > tolerance else 0.0, value if np.isfinite(value) else np.inf)
 
 
-@lru_cache(maxsize=32)
+@remembered
 def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
     """The program of `_parts` for IPOPT, with these settings and options."""
     parts, derivatives = _parts(nlp)
@@ -299,7 +299,7 @@ def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], 
     return ca.nlpsol("scalarized", "ipopt", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
 
 
-@lru_cache(maxsize=16)
+@remembered
 def _parts(nlp: NLP) -> tuple[dict[str, Any], dict[str, ca.Function]]:
     """The program in x = (y, a), y the scaled variables, and its derivatives; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
+
+from problems.derived import remembered
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
 
@@ -55,8 +56,8 @@ SAMPLES = 31
 """Where the slopes of objectives are looked at to know their scales."""
 
 
-@lru_cache(maxsize=16)
-def objective_scales(nlp: NLP) -> np.ndarray:
+@remembered
+def nlp_scales(nlp: NLP) -> np.ndarray:
     """What counts as one in each objective (m,) as long as nobody knows the front: what it would change by, to first order, if all
     variables moved by their scales; the median over the box, 1 where that is nothing.
     """
@@ -67,7 +68,7 @@ def objective_scales(nlp: NLP) -> np.ndarray:
     return np.where(sizes > 0, sizes, 1.0)
 
 
-@lru_cache(maxsize=8)
+@remembered
 def gradients(nlp: NLP) -> ca.Function:
     """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
     z = symbol(nlp, "z", len(nlp.variables))

@@ -89,13 +89,6 @@ def moved(y: Any, h: Any, weights: Sequence[float], slopes: Sequence[Any]) -> An
     return y
 
 
-def tableau(name: str) -> Tableau:
-    """A method by its name. Raises ValueError that names those there are."""
-    if name not in TABLEAUX:
-        raise ValueError(f"unknown Runge-Kutta scheme {name!r}; there are {', '.join(TABLEAUX)}")
-    return TABLEAUX[name]
-
-
 def _cooper_verner() -> Tableau:
     s = sqrt(21.0)
     A = (

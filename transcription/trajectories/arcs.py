@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase
+from problems.derived import remembered
 
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped
@@ -137,7 +137,7 @@ class Arcs:
         return rates
 
 
-@lru_cache(maxsize=64)
+@remembered
 def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
     """(x, u, t, s) -> rates of the states and of the integrals, in n columns."""
     inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
+from problems.derived import remembered
 
 from ..numerics.batched import Batched, expanded
 from ..numerics.polynomials import lobatto_nodes
@@ -36,7 +36,7 @@ def looked_at(
     return paths, peaks
 
 
-@lru_cache(maxsize=64)
+@remembered
 def _watched(phase: CompiledPhase) -> Batched:
     inputs = [ca.MX.sym(name, phase.path.size1_in(i)) for i, name in enumerate("xuts")]
     return Batched(expanded(ca.Function("watched", inputs, [ca.densify(function(*inputs)) for function in (phase.path, phase.peaks)])))
