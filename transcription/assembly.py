@@ -147,7 +147,7 @@ class Assembly:
             list(self._writers.values()),
             (self._least, peaks),
             (function, lower, upper, scale),
-            # What hangs on hidden quantities is looked at where these are flown; elsewhere on demand.
+            # What depends on hidden quantities is evaluated where these are propagated; elsewhere on demand.
             (scores, rows.left) if self.layout.hidden else None,
         )
 

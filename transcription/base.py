@@ -106,14 +106,15 @@ class Meshed(Transcription):
         Number of equal elements, and degree of the states on them, of the phases that have no mesh of their own.
     mesh : mapping or pairs, optional
         Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
-    highest_order : int
-        Up to which degree mesh refinement raises the order.
+    highest_order, most_elements : int
+        What mesh refinement does not exceed in a phase; of elements, there may be twice as many as it began with, if that is more.
     """
 
     elements: int
     order: int
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None
     highest_order: ClassVar[int] = 10
+    most_elements: ClassVar[int] = 40
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -264,16 +265,16 @@ class NLP(Deriving):
     def propagate(self, Z: np.ndarray) -> np.ndarray:
         """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
         equations, where that fails."""
-        return self.reduced.fly(Z).Z
+        return self.reduced.propagate(Z).Z
 
-    def fly(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `propagate` makes of vectors (k, n), with what `residuals` tells of that: in one go, where the method sees all that
-        these depend on on the way."""
-        flown = self.reduced.fly(Z)
-        if flown.scores is None:
-            return flown.Z, *self.residuals(flown.Z)
-        F, g = flown.scores
-        return flown.Z, F, self._residuals(flown.Z, g)
+    def propagate_and_score(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Propagated vectors (k, n), their objectives (k, m) and their residuals (k, n + r): `propagate`, then `residuals`, at once where
+        the method knows on the way all that these depend on."""
+        propagated = self.reduced.propagate(Z)
+        if propagated.scores is None:
+            return propagated.Z, *self.residuals(propagated.Z)
+        F, g = propagated.scores
+        return propagated.Z, F, self._residuals(propagated.Z, g)
 
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""

@@ -5,6 +5,7 @@ import shutil
 import casadi as ca
 import numpy as np
 import pytest
+from euler import Euler
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -47,15 +48,16 @@ def two_phases():
         (load("orbit_rise"), DFET(5, 2)),
         (load("goddard"), DFET(3, 3, control_order=4, basis="bernstein")),
         (two_phases(), DFET(3, 2)),
+        (two_phases(), Euler(6)),
     ],
-    ids=["goddard", "orbit", "bernstein", "two phases"],
+    ids=["goddard", "orbit", "bernstein", "two phases", "default derivatives"],
 )
 def test_total_derivatives_are_those_of_differences(problem, mesh):
     nlp = mesh.transcribe(problem)
     reduced, free = nlp.reduced, nlp.free
     inner = nlp.lower[free] + 0.1 * nlp.span[free] + 0.8 * (candidates(nlp, 2) - nlp.lower[free])
     Z = nlp.first_guess(inner)
-    flown = reduced.fly(Z)
+    flown = reduced.propagate(Z)
     every = np.arange(len(reduced.scale))
     A = reduced.derivatives(flown, every)
     for j, variable in enumerate(free):
@@ -63,7 +65,7 @@ def test_total_derivatives_are_those_of_differences(problem, mesh):
         up, down = Z.copy(), Z.copy()
         up[:, variable] += h
         down[:, variable] -= h
-        differences = (reduced.fly(up).values - reduced.fly(down).values) / (2 * h)
+        differences = (reduced.propagate(up).values - reduced.propagate(down).values) / (2 * h)
         error = np.abs(differences - A[:, :, j]) * nlp.span[variable] / reduced.scale
         assert error.max() < 1e-6
     at_ends = np.flatnonzero(~reduced.inside)
@@ -72,7 +74,7 @@ def test_total_derivatives_are_those_of_differences(problem, mesh):
 
 def test_what_propagation_leaves_is_what_the_nlp_says():
     nlp = DFET(3, 2).transcribe(two_phases())
-    flown = nlp.reduced.fly(nlp.first_guess(candidates(nlp, 4)))
+    flown = nlp.reduced.propagate(nlp.first_guess(candidates(nlp, 4)))
     reduced = nlp.reduced
     outside = np.maximum(np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale, 0).max(axis=1)
     assert outside == pytest.approx(nlp.evaluate(flown.Z)[1], rel=1e-9)

@@ -96,7 +96,7 @@ def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
     exact = np.array([np.exp(-2), 0.5 + 0.5 * np.exp(-2) * (np.sin(2) - np.cos(2))])
     n = 3 if scheme == "rk8" else 20
     nlps = [method(k, scheme=scheme).transcribe(problem) for k in (n, 2 * n)]
-    coarse, fine = (np.abs(nlp.fly(np.zeros((1, len(nlp.variables))))[1][0] - exact) for nlp in nlps)
+    coarse, fine = (np.abs(nlp.propagate_and_score(np.zeros((1, len(nlp.variables))))[1][0] - exact) for nlp in nlps)
     assert np.log2(coarse / fine) == pytest.approx([TABLEAUX[scheme].order] * 2, abs=0.45)
 
 
@@ -104,7 +104,7 @@ def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
 def test_flying_and_scoring_in_one_go_is_flying_and_then_scoring(method):
     nlp = method.transcribe(rich())
     Z = nlp.first_guess(candidates(nlp, 5))
-    flight, F, residuals = nlp.fly(Z)
+    flight, F, residuals = nlp.propagate_and_score(Z)
     violation = largest(residuals)
     assert np.array_equal(flight, nlp.propagate(Z)) and np.array_equal(flight[:, nlp.free], Z[:, nlp.free])
     again, worst = nlp.evaluate(flight)
@@ -119,7 +119,7 @@ def test_flying_and_scoring_in_one_go_is_flying_and_then_scoring(method):
 def test_many_candidates_at_once_are_the_same_bits_as_one_by_one(method):
     nlp = method.transcribe(rich(period=2 * np.pi))
     Z = nlp.first_guess(candidates(nlp, 101))
-    together, alone = nlp.fly(Z), [nlp.fly(z[None]) for z in Z[[0, 1, 63, 64, 100]]]
+    together, alone = nlp.propagate_and_score(Z), [nlp.propagate_and_score(z[None]) for z in Z[[0, 1, 63, 64, 100]]]
     for found, singles in zip(together, zip(*alone, strict=True), strict=True):
         assert np.array_equal(found[[0, 1, 63, 64, 100]], np.concatenate(singles))
 
@@ -130,14 +130,14 @@ def test_derivatives_of_the_reduced_problem(method, period):
     nlp = method.transcribe(rich(period))
     reduced, Z = nlp.reduced, nlp.first_guess(candidates(nlp, 2, seed=4))
     rows = np.arange(len(reduced.lower))
-    A = reduced.derivatives(reduced.fly(Z), rows)
+    A = reduced.derivatives(reduced.propagate(Z), rows)
     ends = np.flatnonzero(~reduced.inside)
-    assert np.allclose(reduced.derivatives(reduced.fly(Z), ends), A[:, ends], rtol=1e-12, atol=1e-13)
+    assert np.allclose(reduced.derivatives(reduced.propagate(Z), ends), A[:, ends], rtol=1e-12, atol=1e-13)
     for k, column in enumerate(nlp.free):
         moved = [Z.copy(), Z.copy()]
         moved[0][:, column] += 1e-6
         moved[1][:, column] -= 1e-6
-        slope = (reduced.fly(moved[0]).values - reduced.fly(moved[1]).values) / 2e-6
+        slope = (reduced.propagate(moved[0]).values - reduced.propagate(moved[1]).values) / 2e-6
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
 
 

@@ -63,7 +63,7 @@ class Propagation:
         step = self._step
         if robust or step is None:
             step = _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
-        return step.mapaccum("flight", self.n)
+        return step.mapaccum("elements", self.n)
 
     def derivatives(self, interior: bool) -> ca.Function:
         """(X, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls' coefficients

@@ -51,7 +51,7 @@ class Ipopt(InnerSolver):
         """See `InnerSolver.solve`.
 
         A projection that does not converge is tried once more from propagated states. What stays infeasible comes back as it would be
-        flown, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
+        propagated, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
         (`stopping`), what is left of the batch is not solved, and has the status "timeout".
         """
         start = nlp.tighten(started(nlp, candidates, warm))
@@ -64,9 +64,9 @@ class Ipopt(InnerSolver):
             _, violation = nlp.evaluate(Z)
         left = np.flatnonzero(~(violation <= tolerance))
         if len(left):
-            flown = nlp.propagate(Z[left])
-            usable = np.isfinite(nlp.evaluate(flown)[1])
-            Z[left[usable]] = flown[usable]
+            propagated = nlp.propagate(Z[left])
+            usable = np.isfinite(nlp.evaluate(propagated)[1])
+            Z[left[usable]] = propagated[usable]
         return result(nlp, Z, start, said, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

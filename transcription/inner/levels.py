@@ -41,7 +41,7 @@ class Propagate(InnerSolver):
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
         k = len(start)
-        return scored(nlp, nlp.fly(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        return scored(nlp, nlp.propagate_and_score(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
 
 
 NAMED: dict[str, InnerSolver] = {

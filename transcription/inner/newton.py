@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import NLP
-from ..phases.reduced import Flown, Reduced
+from ..phases.reduced import Propagated, Reduced
 from .base import INFEASIBLE, InnerResult, InnerSolver, result, started
 from .least_distance import least_distance
 
@@ -55,34 +55,36 @@ class Newton(InnerSolver):
         # Numbers that overflowed are told by what comes back, not by warnings.
         with np.errstate(invalid="ignore", over="ignore"):
             for iteration in range(self.max_iterations):
-                flown = nlp.reduced.fly(going.vectors())
-                outside = _outside(nlp.reduced, flown)
+                propagated = nlp.reduced.propagate(going.vectors())
+                outside = _outside(nlp.reduced, propagated)
                 worst, pull = outside.max(axis=1, initial=0.0), going.center - going.x
                 distance = _norm(pull)
                 found = (worst <= 0.1 * tolerance) & (going.settled | (distance == 0.0))
                 # Keep what was found; else what is nearest to the candidate of what is feasible, else what is least infeasible.
                 merit = np.where(found, -1.0, np.where(worst <= 0.5 * tolerance, distance, 2.0 * len(nlp.free) + worst))
                 better = np.flatnonzero(merit < best[going.index])
-                Z[going.index[better]], best[going.index[better]] = flown.Z[better], merit[better]
+                Z[going.index[better]], best[going.index[better]] = propagated.Z[better], merit[better]
                 iterations[going.index] = iteration + 1
                 on = np.flatnonzero((worst < np.inf) & ~found)
                 if len(on) < len(found):
                     if not len(on):
                         break
                     going.keep(on)
-                    flown, outside, pull = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on]
-                self._advance(going, iteration, flown, outside, pull, tolerance)
+                    propagated, outside, pull = Propagated(propagated.Z[on], propagated.values[on]), outside[on], pull[on]
+                self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
 
-    def _advance(self, going: _Going, iteration: int, flown: Flown, outside: np.ndarray, pull: np.ndarray, tolerance: float) -> None:
-        """One step of those that go on, from where they were flown."""
+    def _advance(
+        self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
+    ) -> None:
+        """One step of those that go on, from their propagated vectors."""
         near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
         going.watch((outside > 0.1 * tolerance) & near[:, None])
         if going.settled.any():
             pull = np.where(going.settled[:, None], 0.0, pull)
-        step = going.towards(flown, pull)
+        step = going.towards(propagated, pull)
         length = _norm(step)
         if length.max() > CAP:
             far = np.flatnonzero(length > CAP)
@@ -156,17 +158,17 @@ class _Going:
         self._vectors[:, self.free] = np.minimum(np.maximum(self.origin + x * self.span, self.origin), self.top)
         return self._vectors
 
-    def towards(self, flown: Flown, pull: np.ndarray) -> np.ndarray:
+    def towards(self, propagated: Propagated, pull: np.ndarray) -> np.ndarray:
         """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched."""
         count = int(np.count_nonzero(self.inside))
         if count in (0, len(pull)):
-            return self._towards(slice(None), flown, pull)
+            return self._towards(slice(None), propagated, pull)
         step = np.empty_like(pull)
         for some in np.flatnonzero(self.inside), np.flatnonzero(~self.inside):  # apart: the derivatives of the first are costly
-            step[some] = self._towards(some, Flown(flown.Z[some], flown.values[some]), pull[some])
+            step[some] = self._towards(some, Propagated(propagated.Z[some], propagated.values[some]), pull[some])
         return step
 
-    def _towards(self, some: slice | np.ndarray, flown: Flown, pull: np.ndarray) -> np.ndarray:
+    def _towards(self, some: slice | np.ndarray, propagated: Propagated, pull: np.ndarray) -> np.ndarray:
         """The same for some of them, whose vectors and pull are given."""
         reduced, watched = self.reduced, self.watched[some]
         rows = np.flatnonzero(watched.any(axis=0))
@@ -174,8 +176,8 @@ class _Going:
         if not len(rows):
             return np.clip(pull, *box)
         scale, equation = reduced.scale[rows], reduced.equation[rows]
-        A = reduced.derivatives(flown, rows) * (self.span / scale[:, None])
-        values = flown.values[:, rows]
+        A = reduced.derivatives(propagated, rows) * (self.span / scale[:, None])
+        values = propagated.values[:, rows]
         lower, upper = (reduced.lower[rows] - values) / scale, (reduced.upper[rows] - values) / scale
         multipliers = self.multipliers[some][:, rows]
         if not equation.all():
@@ -196,9 +198,9 @@ def _norm(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("kd,kd->k", vectors, vectors))
 
 
-def _outside(reduced: Reduced, flown: Flown) -> np.ndarray:
+def _outside(reduced: Reduced, propagated: Propagated) -> np.ndarray:
     """Scaled distance (k, rows) from the limits of what is left to satisfy, negative inside; NaN where it is no number."""
-    return np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale
+    return np.maximum(reduced.lower - propagated.values, propagated.values - reduced.upper) / reduced.scale
 
 
 REGULAR = 1e-10

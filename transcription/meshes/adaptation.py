@@ -17,10 +17,6 @@ from .errors import PhaseErrors, phase_errors
 
 Method = TypeVar("Method", bound=Meshed)
 
-MOST_ELEMENTS = 40
-"""Of each phase; or twice as many as the method began with, if that is more."""
-
-
 SAFETY = 0.5
 """Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
 
@@ -126,7 +122,7 @@ def next_method(method: Method, verdict: Verdict, trajectory: Trajectory, *, int
 
     `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
     """
-    finer, most = {}, max(MOST_ELEMENTS, 2 * method.elements)
+    finer, most = {}, max(method.most_elements, 2 * method.elements)
     scores = verdict.scores(method, trajectory, integrals=integrals)
     for name, phase, score in zip(trajectory, verdict.errors, scores, strict=True):
         old = method.mesh_of(name)

@@ -30,9 +30,9 @@ class ShootingPhase(PhaseWriter):
     """One phase on M intervals.
 
     Slots: `U` (values, nu) of the controls and, where the intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends,
-    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of whatever is flown in one
-    go; `Y` (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) what path
-    constraints and peaks see.
+    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of each shot; `Y`
+    (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) samples of path
+    constraints and peaks.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class ShootingPhase(PhaseWriter):
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """See `PhaseWriter.fill`."""
-        states, integrals, samples = zip(*self._shots_flown(extended), strict=True)
+        states, integrals, samples = zip(*self._propagated_shots(extended), strict=True)
         return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
@@ -87,15 +87,15 @@ class ShootingPhase(PhaseWriter):
         if k == 1:
             return *self._after(extended, *self._chain(n)(*begun)), ca.MX(0, 1)
         step = self.step.forward
-        flown = widened(step, k).mapaccum("steps", n)(_by_step(begun[0], k, 1), *(_by_step(part, k, n) for part in begun[1:]))
-        back = (_by_candidate(part, k, n, step.size_out(i)) for i, part in enumerate(flown))
+        results = widened(step, k).mapaccum("steps", n)(_by_step(begun[0], k, 1), *(_by_step(part, k, n) for part in begun[1:]))
+        back = (_by_candidate(part, k, n, step.size_out(i)) for i, part in enumerate(results))
         return *self._after.map(k)(extended, *back), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
         nx, nq, n = len(self.phase.states), len(self.Q), self.mesh.steps
         inputs, initial = self._inputs(extended), self.layout.pick(extended, self.ends.initial)
-        states = self._fly(initial, *inputs)[0]
+        states = self._propagated(initial, *inputs)[0]
         before = ca.horzcat(initial, states[:, :-1])
         blocks = ca.horzsplit(self.step.gradient(samples=interior).map(n)(before, *inputs), self.step.inputs)
         ends, q, seen = [S[self.layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
@@ -116,7 +116,7 @@ class ShootingPhase(PhaseWriter):
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, k = self.phase, self.law.degree + 1
-        C, states = (values[0] for values in self._flight(extended[None]))
+        C, states = (values[0] for values in self._on_steps(extended[None]))
         s = extended[self.layout.index(self.ends.statics)]
         edges = s[0] + (s[1] - s[0]) * self.mesh.places
         control = PiecewisePolynomial(edges, C.reshape(self.mesh.steps, k, len(phase.controls)), "lobatto")
@@ -133,16 +133,16 @@ class ShootingPhase(PhaseWriter):
 
     @property
     def _arrivals(self) -> np.ndarray:
-        """Slots of the states at the ends of what is flown in one go, as variables."""
+        """Slots of the states at the ends of the shots, as variables."""
         return self.B[1:] if self.apart else self.B[-1:]
 
     @cached_property
-    def _flight(self) -> Batched:
+    def _on_steps(self) -> Batched:
         """Extended vectors -> coefficients (N, degree + 1, nu) of the controls and states (N, order + 1, nx) at Gauss-Lobatto nodes of the
         steps, both flat."""
         extended = ca.MX.sym("extended", self.layout.total)
         inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
-        before = [part for j, (states, *_) in enumerate(self._shots_flown(extended)) for part in (left[:, j], states[:, :-1])]
+        before = [part for j, (states, *_) in enumerate(self._propagated_shots(extended)) for part in (left[:, j], states[:, :-1])]
         places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
         states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
         return Batched(ca.Function("unpacked", [extended], [ca.densify(inputs[0]), ca.densify(states)]), compiled=self.compilable)
@@ -170,18 +170,18 @@ class ShootingPhase(PhaseWriter):
         symbols = chain.mx_in()
         return ca.Function(CHAIN, symbols, chain.call(symbols))
 
-    def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+    def _propagated(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
         nx = len(self.phase.states)
         y, samples = self._chain(inputs[1].shape[1])(self._begun(initial), *inputs)
         return y[:nx, :], y[nx:, -1], samples
 
-    def _shots_flown(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
-        """What `_fly` gives of each shot, from its own initial states."""
+    def _propagated_shots(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
+        """What `_propagated` gives of each shot, from its own initial states."""
         k, left = self.law.degree + 1, self.layout.pick(extended, self.B[:-1])
         C, *others = self._inputs(extended)
         return [
-            self._fly(left[:, j], C[:, first * k : last * k], *(values[:, first:last] for values in others))
+            self._propagated(left[:, j], C[:, first * k : last * k], *(values[:, first:last] for values in others))
             for j, (first, last) in enumerate(pairwise(self._shots.tolist()))
         ]
 
@@ -197,7 +197,7 @@ class ShootingPhase(PhaseWriter):
         """(extended vector, what comes out of it) -> (the same with the states and hidden quantities, final states)."""
         nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
         extended = ca.MX.sym("extended", self.layout.total)
-        y, samples = (ca.MX.sym(f"flown{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
+        y, samples = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
         filled = self._filled(extended, y[:nx, :], y[nx:, -1], samples)
         filled = self.layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
         return ca.Function("after", [extended, y, samples], [ca.densify(filled), ca.densify(y[:nx, -1])])
@@ -207,7 +207,7 @@ class ShootingPhase(PhaseWriter):
         return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1))
 
     def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> ca.MX:
-        """With the hidden quantities of a flight: states (nx, N) after each step, integrals, samples."""
+        """With the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples."""
         if len(self.W) > samples.shape[1]:
             samples = ca.horzcat(samples, self.step.at_end(states[:, -1], *self._inputs(extended, self.mesh.steps - 1)))
         at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
