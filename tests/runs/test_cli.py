@@ -167,7 +167,7 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--transcription", "dfet:4"], ["'dfet:4'", "dfet:4x6"]),
         (["solve", "goddard", "--transcription", "shot:4x4"], ["'shot:4x4'", "dfet:4x6"]),
         (["solve", "goddard", "--transcription", "shooting:9:cubic"], ["'cubic'", "constant, linear, spline", "rk4"]),
-        (["solve", "goddard", "--transcription", "shooting:1"], ["nodes must be an integer of at least 2"]),
+        (["solve", "goddard", "--transcription", "shooting:1"], ["nodes must be a whole number of at least 2"]),
         (["solve", "glide.py:lagging", "--transcription", "shooting:20"], ["'leg'", "'x'", "rk4", "nodes=", "steps="]),
         (["solve", "goddard", "--transcription", "shooting:9", "--mesh", "adaptive"], ["needs DFET", "SingleShooting"]),
         (["solve", "goddard", "--polish-on", "dfet:4"], ["polish_on", "'dfet:4'", "dfet:4x6"]),
