@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.checks import check_positive
+from problems.checks import check_positive, short_repr
 from problems.problem import Problem
 
 from .base import NLP, Transcription
@@ -48,6 +48,8 @@ class Smooth:
     spread: float = 0.2
     length: float = 0.2
     guess: bool = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name, value, most in (("spread", self.spread, 1), ("length", self.length, 10)):

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from problems.checks import short_repr
+
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT, largest
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class InnerResult:
     """What became of k candidates.
 
@@ -48,6 +50,11 @@ class InnerResult:
     fallbacks: int = 0
     residuals: np.ndarray | None = None
 
+    def __repr__(self) -> str:
+        found, counts = np.unique(self.status, return_counts=True)
+        shown = ", ".join(f"{count} {status}" for status, count in zip(found, counts, strict=True))
+        return f"InnerResult({len(self.z)} candidates{': ' * bool(shown)}{shown})"
+
 
 class InnerSolver(ABC):
     """Makes candidates feasible. An implementation is a frozen dataclass of its settings; nothing that it keeps between two calls
@@ -55,6 +62,10 @@ class InnerSolver(ABC):
 
     The result for one candidate depends on that candidate, its warm start and the composition of the batch, and on nothing else.
     """
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.__repr__ = short_repr  # type: ignore[method-assign]
 
     @abstractmethod
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:

@@ -59,7 +59,7 @@ SLOW = _Manner((("mu_init", 0.1),))
 """IPOPT as it comes."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solved:
     """What came of one solve.
 
@@ -88,6 +88,9 @@ class Solved:
     iterations: int
     clocked: bool = False
     begun: bool = True
+
+    def __repr__(self) -> str:
+        return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from .limits import DENSE, excess, looked_at
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Simulation:
     """What came of flying a trajectory's controls.
 
@@ -38,6 +38,10 @@ class Simulation:
     violations: Mapping[str, float]
     objectives: Mapping[str, float]
     trajectory: Trajectory
+
+    def __repr__(self) -> str:
+        objectives = ", ".join(f"'{name}': {value:g}" for name, value in self.objectives.items())
+        return f"Simulation(max_defect={self.max_defect:.1e}, violation={self.violation:.1e}, objectives={{{objectives}}})"
 
     @property
     def max_defect(self) -> float:

@@ -13,7 +13,7 @@ from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PiecewisePolynomial:
     """Polynomials on consecutive elements, right-continuous.
 
@@ -30,6 +30,11 @@ class PiecewisePolynomial:
     edges: np.ndarray
     coefficients: np.ndarray
     basis: str
+
+    def __repr__(self) -> str:
+        elements, coefficients, quantities = self.coefficients.shape
+        ends = f"from {self.edges[0]:g} to {self.edges[-1]:g}"
+        return f"PiecewisePolynomial({quantities} of degree {coefficients - 1} on {elements} elements {ends})"
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """Values at `times` (any shape), with a last axis of length k. Times outside the elements use the nearest element."""
@@ -55,7 +60,7 @@ class PiecewisePolynomial:
         return ends[:, 0], ends[:, 1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PhaseTrajectory:
     """One phase of a flight, at nodes and between them.
 
@@ -76,6 +81,10 @@ class PhaseTrajectory:
     state_variables: tuple[Variable, ...]
     control_variables: tuple[Variable, ...]
     path_limits: tuple[Limit, ...]
+
+    def __repr__(self) -> str:
+        size = f"{len(self.time)} nodes on {len(self.state.edges) - 1} elements"
+        return f"PhaseTrajectory('{self.name}', {self.t0:g} to {self.tf:g} {self.time_unit}, {size}, [{', '.join(self.names)}])"
 
     @property
     def t0(self) -> float:
@@ -129,12 +138,17 @@ class PhaseTrajectory:
         return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Mapping[str, PhaseTrajectory]):
     """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
 
     phases: tuple[PhaseTrajectory, ...]
     parameters: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        phases = ", ".join(f"'{phase.name}' {phase.t0:g} to {phase.tf:g} {phase.time_unit}" for phase in self.phases)
+        parameters = "".join(f", {name}={value:g}" for name, value in self.parameters.items())
+        return f"Trajectory({phases}{parameters})"
 
     def __getitem__(self, name: str) -> PhaseTrajectory:
         for phase in self.phases:
