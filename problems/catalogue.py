@@ -1,4 +1,4 @@
-"""From a name or an address to a Problem."""
+"""The catalogue of cases: from a name or an address to a Problem."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CASES: dict[str, tuple[str, str]] = {
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
 }
 FILE = "_problem_file_"
-"""What the modules of files are called: this, and more."""
+"""Beginning of the names of modules that are read from files."""
 
 
 def names() -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def describe(name: str) -> str:
 
 
 def is_catalogued(address: str) -> bool:
-    """Whether this is a name of the catalogue, or the address of one of its cases: then `load` runs no code but the project's own."""
+    """True for a name of the catalogue and for the address of one of its cases: then `load` runs no code but the project's own."""
     return address in CASES or any(address == own for own, _ in CASES.values())
 
 
@@ -47,7 +47,7 @@ def load(name: str, **data: Any) -> Problem:
     """The problem of a case or an address.
 
     The module or file that an address names is imported, which runs its code; see `is_catalogued`. The function is only called if it is a
-    plain one that is defined there, and does not say that it returns anything but a Problem.
+    plain one that is defined there, and is not annotated to return anything but a Problem.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def load(name: str, **data: Any) -> Problem:
     Returns
     -------
     Problem
-        Its `address` and `data` say where it came from, so that a saved front finds it again.
+        Its `address` and `data` are kept, so that a saved front finds it again.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def _builder(module: ModuleType, function_name: str, name: str) -> FunctionType:
     returned = function.__annotations__.get("return", "")
     word = returned.strip("'\"") if isinstance(returned, str) else getattr(returned, "__name__", str(returned))
     made = word.rpartition(".")[2] in ("Problem", "CompiledProblem")
-    # A file is the user's own; of what is installed, most functions that say nothing do not make problems.
+    # A file is the user's own; of what is installed, most functions without annotation do not make problems.
     if (word and not made) or (not word and not (module.__name__.startswith(FILE) or _knows_problems(module))):
-        raise ValueError(f"problem '{name}': '{function_name}' does not say that it returns a Problem; annotate it with '-> Problem'")
+        raise ValueError(f"problem '{name}': '{function_name}' is not known to return a Problem; annotate it with '-> Problem'")
     return function
 
 

@@ -67,7 +67,7 @@ def within(inner: tuple[float, float], outer: tuple[float, float], what: str) ->
 
 
 def intersection(first: tuple[float, float], second: tuple[float, float], what: str) -> tuple[float, float]:
-    """What two intervals share; an error if they share nothing."""
+    """The intersection of two intervals; an error if it is empty."""
     lower, upper = max(first[0], second[0]), min(first[1], second[1])
     if lower > upper:
         raise ValueError(f"{what}: nothing lies both in ({first[0]:g}, {first[1]:g}) and in ({second[0]:g}, {second[1]:g})")
@@ -87,8 +87,8 @@ def scale(value: Any, default: float, what: str) -> float:
 def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
     """A row lower <= expression <= upper, of which one side may be missing.
 
-    What counts as one in it is, unless told, the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
-    the limit's size: so at the usual tolerance of 1e-6 none has to hold to more than nine digits, which scaled solvers cannot reach.
+    What counts as one in it is by default the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
+    the limit's size: so at the usual tolerance of 1e-6 none has to be met to more than nine digits, which scaled solvers cannot reach.
     """
     low, high = one_sided(lower, upper, what)
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
@@ -189,7 +189,7 @@ def check_choice(name: str, value: Any, choices: Iterable[str]) -> None:
 
 
 def unknown(what: str, word: Any, known: Iterable[str]) -> str:
-    """What to say of a word that is none of those known: the nearest, and all."""
+    """The message for a word that is none of those known: the nearest, and all."""
     words = [*known]
     near = difflib.get_close_matches(str(word), words, n=1)
     return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"

@@ -1,4 +1,4 @@
-"""What a problem is once it is stated: plain data and named CasADi Functions, no symbols.
+"""Compiled problems: plain data and named CasADi Functions, no symbols.
 
 Everything above this floor reads a problem through these classes. They pickle, compare by their fingerprint, and never change.
 """
@@ -24,7 +24,7 @@ class Variable:
     """A state, control, parameter or time: its bounds, and how it is shown and scaled.
 
     `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
-    quantity of which `bounds` hold exactly one period.
+    quantity of which `bounds` are exactly one period.
     """
 
     name: str
@@ -133,7 +133,7 @@ class CompiledProblem(Deriving):
     objectives: ca.Function
     constraints: ca.Function
     address: str = ""
-    """What `problems.load` made it from; empty for a problem built in a script."""
+    """The name or address that `problems.load` made it from; empty for a problem built in a script."""
     data: Mapping[str, Any] = field(default_factory=dict)
     """The keyword arguments that `problems.load` was given."""
 
@@ -160,7 +160,7 @@ class CompiledProblem(Deriving):
         """A hash of everything that decides what the problem's trajectories are: two problems with the same one are the same.
 
         Of each Function it takes the operations and the values at fixed points, to nine digits. Its serialised form would not do: that of
-        a table changes when somebody asks for its derivatives.
+        a table changes once its derivatives are asked for.
         """
         digest = hashlib.sha256()
         digest.update(repr((self.name, self.parameters, self.goals, self.limits, self.links)).encode())
@@ -177,7 +177,7 @@ class CompiledProblem(Deriving):
 
 
 def _essence(function: ca.Function, ranges: Sequence[Sequence[tuple[float, float]]]) -> bytes:
-    """What a Function does: its operations, and its values at fixed points within the ranges of its inputs."""
+    """The identity of a Function: its operations, and its values at fixed points within the ranges of its inputs."""
     rng = np.random.default_rng(0)
     points = [np.array([rng.uniform(*limits, FINGERPRINT_POINTS) for limits in group]).reshape(-1, FINGERPRINT_POINTS) for group in ranges]
     values = np.array(function(*points)) if function.size1_out(0) else np.empty(0)

@@ -1,4 +1,4 @@
-"""What is computed once from a value that never changes, kept as long as the value lives."""
+"""Results that are computed once from a value that never changes, and kept as long as the value lives."""
 
 from __future__ import annotations
 

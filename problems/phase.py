@@ -86,7 +86,7 @@ class Phase:
         what = self._new_name("state", name)
         limits = checks.interval(bounds, f"the bounds of {what}")
         if limits[0] == limits[1]:
-            raise ValueError(f"the bounds of {what} hold one value only, {limits[0]:g}; a constant is no state")
+            raise ValueError(f"the bounds of {what} are one value only, {limits[0]:g}; a constant is no state")
         ends = []
         for word, value in (("initial", initial), ("final", final)):
             end = limits if value is None else checks.fixed_or_interval(value, f"the {word} value of {what}")
@@ -202,11 +202,11 @@ class Phase:
             raise ValueError(f"phase '{self.name}': dynamics given for [{', '.join(given)}], states are [{', '.join(self._states)}]")
 
     def _quantity_symbols(self) -> list[ca.MX]:
-        """What objectives and constraints may use of this phase, in the order of `CompiledPhase.n_quantities`."""
+        """Symbols of this phase for objectives and constraints, in the order of `CompiledPhase.n_quantities`."""
         return [self.t0, self.tf, *(symbol for kind in _KINDS for symbol, _ in self._quantities[kind])]
 
     def _labels(self) -> dict[str, list[str]]:
-        """What to call each row of each compiled Function."""
+        """Labels of the rows of each compiled Function."""
         place = f"phase '{self.name}'"
         functions = {"initials": "initial", "finals": "final", "integrands": "integral", "peaks": "peak"}
         return {

@@ -24,7 +24,7 @@ class Problem:
     Attributes
     ----------
     default_transcription, default_evaluations, default_inner, default_start, verify_tolerance : str, int, str, str or None, float
-        What the command line and studies use when they are told nothing else. A case may set its own.
+        What the command line and studies use by default. A case may set its own.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Floor 2: from a continuous problem to numbers and back: transcriptions, the inner level, trajectories, their independent check."""
+"""Floor 2: from a continuous problem to an NLP and back: transcriptions, the inner level, trajectories, their simulation."""
 
 from .base import NLP, Meshed, Transcription
 from .catalogue import from_dict, parse, word

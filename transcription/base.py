@@ -22,7 +22,7 @@ from .phases.reduced import Reduced
 from .trajectories.trajectory import Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
-"""What became of a candidate or of a solve: feasible within the tolerance (and optimal, where that is asked for); or why not."""
+"""The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
 
 
 class Transcription(ABC):
@@ -58,7 +58,7 @@ class Transcription(ABC):
         """Write `problem` as an NLP. Raises ValueError if the problem is stated wrongly or the method cannot express it."""
 
     def nlp(self, problem: Problem | CompiledProblem) -> NLP:
-        """What `transcribe` gives, kept with the compiled problem: all that use both share it, and what is compiled of it."""
+        """The NLP that `transcribe` makes, kept with the compiled problem: all that use both share it, and what is compiled of it."""
         return _transcribed(problem.compile() if isinstance(problem, Problem) else problem, self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ class Transcription(ABC):
         return cls(*numbers)
 
     def to_word(self) -> str:
-        """How the method is written on the command line, as far as that is possible: not all settings have a place there.
+        """The method as it is written on the command line, as far as that is possible: not all settings have a place there.
 
         By default the settings that have no default value.
         """
@@ -250,7 +250,7 @@ class NLP(Deriving):
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """What counts as one in each variable (n,)."""
+        """The scales of the variables (n,)."""
         return np.array([v.scale for v in self.variables])
 
     @cached_property
@@ -259,7 +259,7 @@ class NLP(Deriving):
         return np.array([v.period or 0.0 for v in self.variables])
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
-        """What is `guessed` of candidates (k, d), with the peaks that belong to it: vectors (k, n) for a solver to begin from."""
+        """Vectors (k, n) for a solver to begin from: those `guessed` of candidates (k, d), with the peaks that belong to them."""
         return self.tighten(self.guessed(candidates))
 
     def propagate(self, Z: np.ndarray) -> np.ndarray:
@@ -315,7 +315,7 @@ class NLP(Deriving):
         """Scaled residuals (k, n + r) of bounds and rows of g (k, r)."""
         n = Z.shape[1]
         residuals = np.empty((len(Z), n + g.shape[1]))
-        # Numbers that overflowed are told by what comes back, not by warnings.
+        # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore"):
             for part, values, lower, upper in (
                 (residuals[:, :n], Z, self.lower, self.upper),

@@ -1,8 +1,7 @@
-"""First candidates that can be flown: smooth random profiles about what the user guessed.
+"""First candidates with smooth controls: random profiles about what the user guessed.
 
-Where a control has many nodes, values drawn one by one make a noise that averages to the middle of its bounds, all candidates fly much
-the same, and none of them anywhere useful. Nobody flies like that either. Of a profile that somebody has in mind, and of smooth deviations
-from it, a search has something to choose from.
+Where a control has many nodes, values drawn one by one are noise that averages to the middle of its bounds: the trajectories of all
+candidates are much alike, and none is useful. A guessed profile and smooth deviations from it give a search something to choose from.
 """
 
 from __future__ import annotations

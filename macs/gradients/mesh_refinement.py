@@ -220,7 +220,7 @@ class Refinement:
     def _missed(self, point: _Refined) -> float:
         """How far flown objectives are from those of the mesh, in ranges of the front."""
         objectives = dict(zip(self.front.names, (point.F * self.problem.signs).tolist(), strict=True))
-        return missed(point.verdict.flight, objectives, self.ranges)
+        return missed(point.verdict.simulation, objectives, self.ranges)
 
     def _complaints(self, point: _Refined) -> list[str]:
         """What keeps a point from meeting the tolerance."""

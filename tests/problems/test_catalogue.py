@@ -140,10 +140,10 @@ def test_what_is_no_case_is_refused(case):
         ("subprocess:run", {"args": ["touch", "{}"]}, "Python's own library"),
         ("shutil:rmtree", {"path": "{}"}, "Python's own library"),
         ("numpy:savetxt", {"fname": "{}", "X": [1]}, "has no function 'savetxt' of its own"),
-        ("numpy.ma.core:array", {"data": [1]}, "'array' does not say that it returns a Problem; annotate it with '-> Problem'"),
+        ("numpy.ma.core:array", {"data": [1]}, "'array' is not known to return a Problem; annotate it with '-> Problem'"),
         ("problems.problem:Problem", {}, "has no function 'Problem' of its own"),
         ("problems.cases.goddard:Problem", {}, "has no function 'Problem' of its own"),
-        ("problems.cases.goddard:reference", {}, "'reference' does not say that it returns a Problem"),
+        ("problems.cases.goddard:reference", {}, "'reference' is not known to return a Problem"),
     ],
 )
 def test_nothing_is_called_that_makes_no_problem(address, data, word, tmp_path):
@@ -158,7 +158,7 @@ def test_nothing_is_called_that_makes_no_problem(address, data, word, tmp_path):
 def test_a_function_of_a_file_is_called_only_if_it_is_defined_there_and_says_nothing_else(case):
     case.write_text(CASE + "from os import system\ndef count() -> int:\n    return 1\ndef mine() -> 'Problem':\n    return problem()\n")
     refused(lambda: load(f"{case}:system", command="true"), "has no function 'system' of its own")
-    refused(lambda: load(f"{case}:count"), "'count' does not say that it returns a Problem")
+    refused(lambda: load(f"{case}:count"), "'count' is not known to return a Problem")
     refused(lambda: load(f"{case}:Data"), "has no function 'Data'")
     assert load(f"{case}:mine").name == "mine"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from cases import decay, flown, oscillator
+from cases import decay, oscillator, propagated
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -99,7 +99,7 @@ def test_decay_rates_are_those_of_the_function():
 
 def test_local_defects_are_those_of_the_single_elements():
     nlp = DFET(1, 1, mesh={"fall": ((0, 0.5, 1), 0)}).transcribe(decay(tf=2.0)[0])
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     found = phase_errors(nlp.problem, flight, rtol=1e-12, atol=1e-13)[0]
     edges = flight["fall"].edge_states[:, 0]
     assert found.defect == pytest.approx(np.abs(edges[:-1] * np.exp(-1.0) - edges[1:]) / 4.0, rel=1e-6)
@@ -140,11 +140,11 @@ def test_controls_that_switch_are_found():
 def test_trajectories_become_as_exact_as_wanted(method):
     """Flown anew on each mesh with the same controls: nothing is optimised, and errors fall all the same."""
     nlp = method.transcribe(oscillator())
-    z = flown(nlp, k=1)[0]
+    z = propagated(nlp, k=1)[0]
     for _ in range(8):
         flight = nlp.unpack(z)
         verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
-        if not verdict.flight.max_defect > 1e-6:
+        if not verdict.simulation.max_defect > 1e-6:
             break
         finer = next_method(method, verdict, flight)
         assert finer != method
@@ -155,7 +155,7 @@ def test_trajectories_become_as_exact_as_wanted(method):
 
 def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
     nlp = DFET(1, 2).transcribe(oscillator())
-    z = flown(nlp, k=1)[0]
+    z = propagated(nlp, k=1)[0]
     for i in nlp.free:
         if ".u[" in nlp.variables[i].name:
             z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0

@@ -77,7 +77,7 @@ def test_the_conditions_as_the_paper_prints_them(name):
         assert not all(found == pytest.approx(wanted, abs=1e-6) for found, wanted in conditions[method.order])
 
 
-def flown(name: str, n: int) -> np.ndarray:
+def propagated(name: str, n: int) -> np.ndarray:
     """The error after n steps from 0 to 2 of an equation whose solution is (exp(sin t), cos t)."""
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ def flown(name: str, n: int) -> np.ndarray:
 @pytest.mark.parametrize("name", TABLEAUX)
 def test_errors_fall_with_the_order_on_an_equation_with_a_closed_form(name):
     n = 6 if name == "rk8" else 40
-    coarse, fine = (np.linalg.norm(flown(name, steps)) for steps in (n, 2 * n))
+    coarse, fine = (np.linalg.norm(propagated(name, steps)) for steps in (n, 2 * n))
     assert np.log2(coarse / fine) == pytest.approx(TABLEAUX[name].order, abs=0.35)
 
 

@@ -5,7 +5,7 @@ import pickle
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, flown, integrator, oscillator, oscillator_rates, slot
+from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -72,7 +72,7 @@ METHODS = [
 @pytest.mark.parametrize(("kind", "nodes"), [("constant", 4), ("linear", None), ("spline", 4), ("spline", None)])
 def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
     nlp = SingleShooting(12, scheme="rk8", steps=3, control=kind, control_nodes=nodes).transcribe(oscillator())
-    for z in flown(nlp, 2):
+    for z in propagated(nlp, 2):
         t0, tf, m = (z[slot(nlp, name)] for name in ("swing.t0", "swing.tf", "m"))
         u, v = (law(kind, t0, tf, values_of(nlp, z, name)) for name in ("swing.u", "swing.v"))
         x, cost, kinks = np.array([z[slot(nlp, "swing.x(t0)")], 0.5]), 0.0, np.linspace(t0, tf, nodes or 12)
@@ -183,7 +183,7 @@ def test_the_integral_of_a_control_is_exact(nodes, control_nodes, kind, seed):
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
     nlp = SingleShooting(nodes, control=kind, control_nodes=control_nodes).transcribe(problem)
-    z = flown(nlp, 1, seed)[0]
+    z = propagated(nlp, 1, seed)[0]
     values = values_of(nlp, z, "run.u")
     if kind == "spline":
         exact = CubicSpline(np.linspace(0, 2, control_nodes), values).integrate(0, 2)
@@ -198,7 +198,7 @@ def test_controls_are_what_scipy_makes_of_their_values(kind, nodes):
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
     nlp = MultipleShooting(6, control=kind, control_nodes=nodes, steps=2).transcribe(problem)
-    z = flown(nlp, 1)[0]
+    z = propagated(nlp, 1)[0]
     flight, times = nlp.unpack(z)["run"], np.linspace(0, 2, 301)[:-1] + 1e-4
     assert flight.at(times)["u"] == pytest.approx(law(kind, 0, 2, values_of(nlp, z, "run.u"))(times), abs=1e-12)
 
@@ -345,7 +345,7 @@ def test_linked_phases_a_free_time_between_them_and_a_parameter():
     assert flight["first"].tf == flight["second"].t0 and np.array_equal(flight["first"].edge_states[-1], flight["second"].edge_states[0])
     assert found[0].simulate().max_defect < 1e-5
     nlp = SingleShooting(9).transcribe(two_legs())
-    Z = flown(nlp, 2)
+    Z = propagated(nlp, 2)
     for z in Z:
         check = simulate(nlp.problem, nlp.unpack(z))
         # Flown one after the other: what is imposed at the end is missed by what the flight says.

@@ -114,7 +114,7 @@ class DFETPhase(PhaseWriter):
         return self.layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
 
     def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
-        """What else goes into the elements, side by side: controls, starts, lengths, and s."""
+        """The other inputs of the elements, side by side: controls, starts, lengths, and s."""
         s = self.layout.pick(extended, self.ends.statics)
         mean = (s[1] - s[0]) / self.n
         starts, lengths = s[0] + mean * ca.DM(self.places[:-1]).T, mean * ca.DM(self.widths).T

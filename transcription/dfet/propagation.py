@@ -42,7 +42,7 @@ class Propagation:
     quick : bool
         Whether Newton steps are written out.
     inputs : int
-        nx + (q + 1) nu + 2 + len(s): how many numbers an element is a function of.
+        nx + (q + 1) nu + 2 + len(s): the number of scalar inputs of an element.
     """
 
     def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:

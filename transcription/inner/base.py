@@ -16,7 +16,7 @@ __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "Inner
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InnerResult:
-    """What became of k candidates.
+    """Feasible points near k candidates, as far as they were found.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class InnerResult:
     fallbacks : int
         How many candidates a faster method left to a slower one.
     residuals : array (k, n + r), optional
-        What `NLP.residuals` returns there, for those who want to know each constraint's own. Without it, they have it computed from z.
+        What `NLP.residuals` returns there, from which the violation of each constraint follows; None: to be computed from z.
     """
 
     z: np.ndarray
@@ -92,16 +92,16 @@ def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.nda
     return Z
 
 
-def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
-    """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
-    return scored(nlp, (Z, *nlp.residuals(Z)), start, said, iterations, tolerance)
+def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, otherwise: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
+    """Score vectors (k, n) that a solver returned for `start` (k, n); `otherwise` (k,) is the status of those that are infeasible."""
+    return scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
 
 
 def scored(
     nlp: NLP,
     found: tuple[np.ndarray, np.ndarray, np.ndarray],
     start: np.ndarray,
-    said: np.ndarray,
+    otherwise: np.ndarray,
     iterations: np.ndarray,
     tolerance: float,
 ) -> InnerResult:
@@ -109,13 +109,13 @@ def scored(
     Z, F, residuals = found
     violation = largest(residuals)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
-    status = np.where(violation <= tolerance, CONVERGED, said)
+    status = np.where(violation <= tolerance, CONVERGED, otherwise)
     moved = nlp.distance(Z, start)
     if not finite.all():
         broken = ~finite
         Z = np.where(finite[:, None], Z, start)
         F[broken], violation[broken], moved[broken], status[broken] = np.nan, np.inf, 0.0, FAILED
-    clocked = TIMEOUT in said
+    clocked = TIMEOUT in otherwise
     return InnerResult(
         z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=clocked, residuals=residuals
     )

@@ -12,7 +12,7 @@ from problems.checks import check_choice, check_count, check_positive
 from problems.derived import remembered
 
 from ..base import NLP
-from ..nlp.scaling import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..numerics.batched import expanded
 from ..stopping import stopping
 from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
@@ -55,11 +55,11 @@ class Ipopt(InnerSolver):
         (`stopping`), what is left of the batch is not solved, and has the status "timeout".
         """
         start = nlp.tighten(started(nlp, candidates, warm))
-        Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
+        Z, status, iterations = self._solve_all(nlp, start, start, tolerance)
         _, violation = nlp.evaluate(Z)
-        again = np.flatnonzero(~(violation <= tolerance) & (said != TIMEOUT))
+        again = np.flatnonzero(~(violation <= tolerance) & (status != TIMEOUT))
         if len(again) and self.objective == "projection":
-            Z[again], said[again], more = self._solve_all(nlp, start[again], nlp.propagate(start[again]), tolerance)
+            Z[again], status[again], more = self._solve_all(nlp, start[again], nlp.propagate(start[again]), tolerance)
             iterations[again] += more
             _, violation = nlp.evaluate(Z)
         left = np.flatnonzero(~(violation <= tolerance))
@@ -67,13 +67,13 @@ class Ipopt(InnerSolver):
             propagated = nlp.propagate(Z[left])
             usable = np.isfinite(nlp.evaluate(propagated)[1])
             Z[left[usable]] = propagated[usable]
-        return result(nlp, Z, start, said, iterations, tolerance)
+        return result(nlp, Z, start, status, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
         solver, lower, upper = _program(nlp, self, tolerance)
         scale, zero = nlp.scale, origin(nlp)
-        Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
+        Z, status, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
             if not np.isfinite(guess[row]).all():
@@ -82,7 +82,7 @@ class Ipopt(InnerSolver):
                 Z[row] = guess[row]
                 continue
             if stopping():
-                said[row] = TIMEOUT
+                status[row] = TIMEOUT
                 continue
             y0 = np.clip((guess[row] - zero) / scale, lower, upper)
             answer = solver(
@@ -90,9 +90,9 @@ class Ipopt(InnerSolver):
             )
             stats = solver.stats()
             Z[row] = back_in_bounds(nlp, zero + np.array(answer["x"]).ravel() * scale)
-            said[row] = SAID.get(stats["return_status"], FAILED)
+            status[row] = STATUS_OF_IPOPT.get(stats["return_status"], FAILED)
             iterations[row] = stats["iter_count"]
-        return nlp.tighten(Z), said, iterations
+        return nlp.tighten(Z), status, iterations
 
 
 @remembered
@@ -109,7 +109,7 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
 
 
 def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
-    options = quiet(settings.seconds, settings.max_iterations)
+    options = ipopt_options(settings.seconds, settings.max_iterations)
     options |= {"ipopt.tol": 0.1 * tolerance, "ipopt.constr_viol_tol": 0.1 * tolerance}
     if settings.objective == "projection":
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.

@@ -52,7 +52,7 @@ class Newton(InnerSolver):
         start = started(nlp, candidates, warm)
         Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
         going = _Going(nlp, start)
-        # Numbers that overflowed are told by what comes back, not by warnings.
+        # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore", over="ignore"):
             for iteration in range(self.max_iterations):
                 propagated = nlp.reduced.propagate(going.vectors())

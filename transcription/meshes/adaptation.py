@@ -1,4 +1,4 @@
-"""One trajectory and its mesh: is it good enough, and if not, on which mesh to try next."""
+"""One trajectory and its mesh: whether it is good enough, and if not, the next finer mesh."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ SAFETY = 0.5
 
 
 COST = 10.0
-"""How many times the tolerance objectives may be off, in ranges of the front: what they lose to controls that their polynomials describe
-badly is of second order."""
+"""Multiple of the tolerance by which objectives may be off, in ranges of the front: their loss by poorly described controls is of second
+order."""
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What an independent look at a trajectory gives.
+    """The independent assessment of a trajectory on its mesh.
 
     Attributes
     ----------
-    flight : Simulation
-        The whole of it flown.
+    simulation : Simulation
+        Of the whole trajectory.
     errors : list of PhaseErrors
         Element by element.
     tolerance, feasible : float
-        Of defects; of constraints, flown and between nodes, in their scales.
+        Of defects; of constraints, simulated and between nodes, in their scales.
     """
 
-    flight: Simulation
+    simulation: Simulation
     errors: list[PhaseErrors]
     tolerance: float
     feasible: float
 
     @property
     def excess(self) -> float:
-        """How far states and path constraints leave their limits between nodes, in their scales."""
+        """The largest amount by which states and path constraints leave their limits between nodes, in their scales."""
         return max((float(phase.excess.max()) for phase in self.errors), default=0.0)
 
     @property
@@ -57,28 +57,28 @@ class Verdict:
 
     @property
     def error(self) -> float:
-        """The largest of defect, excess and flown violation, in units of what they may be."""
-        return max(self.flight.max_defect / self.tolerance, max(self.excess, self.flight.violation) / self.feasible)
+        """The largest of defect, excess and simulated violation, in units of what they may be."""
+        return max(self.simulation.max_defect / self.tolerance, max(self.excess, self.simulation.violation) / self.feasible)
 
     def complaints(self) -> list[str]:
-        """What is not good enough, in words; controls may not leave their bounds at all. Empty if nothing is."""
+        """Messages about what is not good enough, of which controls may not leave their bounds at all; empty if all is."""
         found = []
-        if not self.flight.max_defect <= self.tolerance:
-            found.append(f"flown, it ends {self.flight.max_defect:.1e} away")
+        if not self.simulation.max_defect <= self.tolerance:
+            found.append(f"simulated, it ends {self.simulation.max_defect:.1e} away")
         if self.leaving > 0.0:
             found.append(f"a control leaves its bounds by {self.leaving:.1e} between nodes")
         if not self.excess <= self.feasible:
             found.append(f"a state or path constraint leaves its limits by {self.excess:.1e} between nodes")
-        if not found and not self.flight.violation <= self.feasible:
-            worst = max(self.flight.violations, key=lambda key: self.flight.violations[key])
-            found.append(f"flown, it violates '{worst}' by {self.flight.violation:.1e}")
+        if not found and not self.simulation.violation <= self.feasible:
+            worst = max(self.simulation.violations, key=lambda key: self.simulation.violations[key])
+            found.append(f"simulated, it violates '{worst}' by {self.simulation.violation:.1e}")
         return found
 
     def scores(self, method: Meshed, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
         """For each phase the error of each element (N,), in units of what it may be; that of integrals too, if wanted."""
         total = sum(float(phase.defect.sum()) for phase in self.errors)
-        # What an error at one element becomes at the end of the flight, at least.
-        growth = max(1.0, self.flight.max_defect / total) if 0.0 < total < np.inf and np.isfinite(self.flight.max_defect) else 1.0
+        # What an error at one element becomes at the end of the trajectory, at least.
+        growth = max(1.0, self.simulation.max_defect / total) if 0.0 < total < np.inf and np.isfinite(self.simulation.max_defect) else 1.0
         count = sum(len(phase.defect) for phase in self.errors)
         found = []
         for name, phase in zip(trajectory, self.errors, strict=True):
@@ -94,7 +94,7 @@ class Verdict:
         return found
 
     def worst_place(self, method: Meshed, trajectory: Trajectory) -> str:
-        """Where the largest error is, in words."""
+        """The place of the largest error, in words."""
         scores = self.scores(method, trajectory)
         names = list(trajectory)
         i = int(np.argmax([score.max() for score in scores]))
@@ -107,10 +107,10 @@ class Verdict:
 
 
 def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float, feasible: float) -> Verdict:
-    """Look at a trajectory with an integrator a thousand times more exact than `tolerance`; see `Verdict`."""
+    """The assessment of a trajectory by an integrator a thousand times more exact than `tolerance`; see `Verdict`."""
     rtol = float(np.clip(1e-3 * tolerance, 1e-13, 1e-9))
     return Verdict(
-        flight=simulate(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
+        simulation=simulate(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
         errors=phase_errors(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
         tolerance=tolerance,
         feasible=feasible,
@@ -154,7 +154,7 @@ SHORTEST = 1e-7
 
 
 MARGIN = 0.1
-"""How near the ends of an element, on [-1, 1], it is not cut."""
+"""Distance from the ends of an element, on [-1, 1], within which it is not cut."""
 
 
 def refine(
@@ -162,9 +162,9 @@ def refine(
 ) -> tuple[np.ndarray, int]:
     """A finer mesh of one phase.
 
-    The elements of large error are refined; if none reaches the goal, those with the largest ones. Of these, the smooth ones ask for a
-    higher order, as far as their rate promises to be enough, if that is not above the highest; the others are cut: around the place where a
-    control is steep, else in halves.
+    The elements of large error are refined; if none reaches the goal, those with the largest ones. Of these, the smooth ones ask for the
+    order that is enough at their rate of decay, if that is not above the highest; the others are cut: around the place where a control is
+    steep, else in halves.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def refine(
 
 
 def degrees(error: float, rate: float) -> float:
-    """How many degrees more bring a smooth element's error down to 1: at its ends it falls by exp(-2 rate) with each. At least one."""
+    """The further degrees, at least one, that bring a smooth element's error down to 1: at its ends it falls by exp(-2 rate) with each."""
     if error <= 1.0 or rate == np.inf:
         return 1.0 if np.isfinite(error) else np.inf
     return max(1.0, float(np.ceil(np.log(error) / (2.0 * rate)))) if rate > SLOWEST else np.inf

@@ -1,4 +1,4 @@
-"""Where each quantity of a problem lives in the vector of the NLP."""
+"""The places of a problem's quantities in the vector of the NLP."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Layout:
         return len(self.variables) + self.hidden + len(self._constants)
 
     def index(self, slots: np.ndarray) -> np.ndarray:
-        """Where in the extended vector slots are, a flat array."""
+        """Indices of slots in the extended vector, a flat array."""
         flat = slots.ravel()
         return np.where(flat >= HIDDEN, flat - HIDDEN + len(self.variables), flat % self.total)
 

@@ -18,12 +18,12 @@ from .writer import PhaseWriter
 SOLVED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
 MOST = 20_000_000
-"""Most derivatives that are held at once."""
+"""Most derivatives in memory at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Propagated:
-    """Propagated vectors `Z` (k, n), the values (k, rows) of what is left to satisfy, and F (k, m) and g (k, r) if they show on the way."""
+    """Propagated vectors `Z` (k, n), values (k, rows) of the constraints that are left, and F (k, m) and g (k, r) where known."""
 
     Z: np.ndarray
     values: np.ndarray
@@ -31,7 +31,7 @@ class Propagated:
 
 
 class Reduced:
-    """What propagation leaves to satisfy: lower <= values <= upper.
+    """The constraints that propagation leaves to satisfy: lower <= values <= upper.
 
     The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
     propagation does not satisfy.
@@ -42,11 +42,11 @@ class Reduced:
     writers : sequence of PhaseWriter
         In the order of time.
     peaks : pair of array (p,) and Function
-        Slots of the peaks, and z -> (p,), what they have to be; here and below, z are the variables and the hidden quantities.
+        Slots of the peaks, and z -> (p,), their values; here and below, z are the variables and the hidden quantities.
     rest : tuple of Function and arrays (r,)
         z -> (r,), those constraints; their lower and upper limits and scales.
     scores : Function and array (r,) of int, optional
-        z -> (F, g), to be known of whatever is propagated, and which of the rows of g are those constraints.
+        z -> (F, g), to be evaluated with each propagation, and which of the rows of g are those constraints.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a method writes: one phase. The rest of an NLP is the same for all methods (`assembly.py`)."""
+"""The contract of a method: how it writes one phase. The rest of an NLP is the same for all methods (`assembly.py`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics.periodic import wrapped
-from ..trajectories.limits import looked_at
+from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .guess import along, line
 from .layout import Layout
@@ -75,8 +75,8 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a phase gives to objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
-    and what the variables at `PhaseWriter.magnitudes` have to be at least (column)."""
+    """Quantities of a phase for objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
+    and the least values of the variables at `PhaseWriter.magnitudes` (column)."""
 
     first_control: ca.MX
     last_control: ca.MX
@@ -104,7 +104,7 @@ class PhaseWriter(ABC):
     magnitudes : array of int
         Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known.
     compilable : bool
-        Whether what `propagate` does fast, and `sensitivity`, can be written in C.
+        Whether fast propagation, and `sensitivity`, can be written in C.
     wide : bool
         Whether `propagate` takes several extended vectors side by side.
     """
@@ -185,7 +185,7 @@ class PhaseWriter(ABC):
         extended : MX (e, 1), or (e, k) if the writer is `wide`
             An extended symbol, of which the states are to be replaced. What comes back has as many columns.
         robust : bool
-            To solve the equations of states by whatever it takes; otherwise fast, if need be with a residual.
+            To solve the equations of states at any cost; otherwise fast, if need be with a residual.
 
         Returns
         -------
@@ -263,7 +263,7 @@ class PhaseWriter(ABC):
             time=time,
             states=states,
             controls=controls,
-            paths=looked_at(phase, states, controls, time, s)[0],
+            paths=paths_and_peaks(phase, states, controls, time, s)[0],
             state=state,
             control=control,
             state_variables=phase.states,

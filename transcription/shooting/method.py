@@ -28,7 +28,7 @@ from .step import Step, StepMesh
 
 @dataclass(frozen=True, kw_only=True)
 class Shooting(Transcription):
-    """What single and multiple shooting have in common.
+    """Settings and transcription that single and multiple shooting share.
 
     Parameters
     ----------
@@ -37,13 +37,13 @@ class Shooting(Transcription):
     steps : int
         Equal steps of that method on each interval.
     control : "constant", "linear" or "spline"
-        What controls are between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
-        spline through a value at each. Their bounds hold at the nodes: everywhere, but for splines.
+        Controls between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
+        spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere.
     control_nodes : int, optional
-        How many equally spaced nodes the controls have, both ends among them; by default those of the states. No step leads across one:
+        Number of equally spaced nodes of the controls, both ends among them; by default those of the states. No step leads across one:
         where they fall into a step, it is divided.
     path_points : int
-        Path constraints hold, and peaks are looked at, at the ends of all steps and at as many equally spaced points inside each, which
+        Path constraints are imposed, and peaks sampled, at the ends of all steps and at as many equally spaced points inside each, which
         are reached by a step of the same method of that part of its length.
 
     Raises
@@ -73,7 +73,7 @@ class Shooting(Transcription):
     @property
     @abstractmethod
     def _intervals(self) -> int:
-        """How many intervals there are between nodes."""
+        """Number of intervals between nodes."""
 
     @property
     @abstractmethod
@@ -122,8 +122,8 @@ class SingleShooting(Shooting):
     """Each phase is integrated in one go from its initial states; its final states are the only ones that are variables.
 
     Made for searches that propagate their candidates (`inner="propagate"`): one pass gives trajectory, objectives and all residuals.
-    Bounds of states hold at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of nodes:
-    `MultipleShooting` is made for these.
+    Bounds of states are imposed at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of
+    nodes: `MultipleShooting` is made for these.
 
     Parameters
     ----------

@@ -148,7 +148,7 @@ class ShootingPhase(PhaseWriter):
         return Batched(ca.Function("unpacked", [extended], [ca.densify(inputs[0]), ca.densify(states)]), compiled=self.compilable)
 
     def _inputs(self, extended: ca.MX, first: int = 0, last: int | None = None) -> tuple[ca.MX, ...]:
-        """What else goes into the steps, or some of them, side by side: coefficients of the controls, starts, lengths, and s."""
+        """The other inputs of the steps, or of some of them, side by side: coefficients of the controls, starts, lengths, and s."""
         s = self.layout.pick(extended, self.ends.statics)
         places = self.mesh.places[first : None if last is None else last + 1]
         C = self.law.coefficients(self.layout.pick(extended, self.U), places, self.phase)
@@ -166,7 +166,7 @@ class ShootingPhase(PhaseWriter):
         chain = self.step.forward.mapaccum("steps", n) if n > 1 else self.step.forward
         if work(chain) * min(len(self.layout.free), n * self.step.inputs) <= LONG:
             return chain
-        # Its derivatives, written out, would take all memory there is.
+        # Its derivatives, written out, would take too much memory.
         symbols = chain.mx_in()
         return ca.Function(CHAIN, symbols, chain.call(symbols))
 
@@ -177,7 +177,7 @@ class ShootingPhase(PhaseWriter):
         return y[:nx, :], y[nx:, -1], samples
 
     def _propagated_shots(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
-        """What `_propagated` gives of each shot, from its own initial states."""
+        """The results of `_propagated` for each shot, from its own initial states."""
         k, left = self.law.degree + 1, self.layout.pick(extended, self.B[:-1])
         C, *others = self._inputs(extended)
         return [
@@ -187,14 +187,14 @@ class ShootingPhase(PhaseWriter):
 
     @cached_property
     def _before(self) -> ca.Function:
-        """Extended vector -> what goes into the chain of all steps."""
+        """Extended vector -> inputs of the chain of all steps."""
         extended = ca.MX.sym("extended", self.layout.total)
         inputs = self._begun(self.layout.pick(extended, self.ends.initial)), *self._inputs(extended)
         return ca.Function("before", [extended], [ca.densify(part) for part in inputs])
 
     @cached_property
     def _after(self) -> ca.Function:
-        """(extended vector, what comes out of it) -> (the same with the states and hidden quantities, final states)."""
+        """(extended vector, outputs of that chain) -> (the same with the states and hidden quantities, final states)."""
         nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
         extended = ca.MX.sym("extended", self.layout.total)
         y, samples = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
@@ -234,7 +234,7 @@ class ShootingPhase(PhaseWriter):
 
 
 def _by_step(values: ca.MX, k: int, n: int) -> ca.MX:
-    """What k candidates, side by side, have for n steps each: one row a candidate, step after step."""
+    """Values of k candidates, side by side, for n steps each: one row a candidate, step after step."""
     order = np.arange(values.numel()).reshape(k, n, -1).transpose(1, 2, 0).ravel()
     return ca.reshape(ca.vec(values)[order.tolist()], k, len(order) // k) if len(order) else ca.MX(k, 0)
 

@@ -1,4 +1,4 @@
-"""What a user looks at: the states and controls of one flight, interpolated by the polynomials of the method that made it."""
+"""Trajectories: states and controls, interpolated by the polynomials of the method that made them."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ class PiecewisePolynomial:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhaseTrajectory:
-    """One phase of a flight, at nodes and between them.
+    """One phase of a trajectory, at nodes and between them.
 
-    `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
+    `time` (n,) increases strictly and contains the ends of the elements and the points in between at which the method imposes the dynamics;
     `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there; `state`, which is continuous, and `control`
     interpolate. A periodic control is continued beyond its bounds inside an element, so that it interpolates the short way round. All in
     the user's units.
@@ -140,7 +140,7 @@ class PhaseTrajectory:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Mapping[str, PhaseTrajectory]):
-    """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
+    """A whole trajectory: its phases by name, in the order in which they were declared, and its static parameters."""
 
     phases: tuple[PhaseTrajectory, ...]
     parameters: Mapping[str, float]
