@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from transcription.inner.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
 

@@ -9,9 +9,7 @@ import numpy as np
 
 from problems.checks import short_repr
 
-from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT, largest
-
-__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
+from ..base import CONVERGED, FAILED, NLP, TIMEOUT, largest
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,11 +11,11 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_positive
 from problems.derived import remembered
 
-from ..base import NLP
+from ..base import FAILED, NLP, TIMEOUT
 from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..numerics.batched import expanded
 from ..stopping import stopping
-from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, result, started
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import NLP
+from ..base import INFEASIBLE, NLP
 from ..phases.reduced import Propagated, Reduced
-from .base import INFEASIBLE, InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, result, started
 from .least_distance import least_distance
 
 NEAR = 0.1
