@@ -141,6 +141,10 @@ class CompiledProblem(Deriving):
         phases, goals = (", ".join(one.name for one in group) for group in (self.phases, self.goals))
         return f"CompiledProblem('{self.name}', phases=[{phases}], objectives=[{goals}])"
 
+    def compile(self) -> CompiledProblem:
+        """Itself: so that every function of a Problem takes a compiled one as well."""
+        return self
+
     @property
     def signs(self) -> np.ndarray:
         """+1 for a minimised, -1 for a maximised objective, shape (m,)."""

@@ -59,7 +59,7 @@ class Transcription(ABC):
 
     def nlp(self, problem: Problem | CompiledProblem) -> NLP:
         """The NLP that `transcribe` makes, kept with the compiled problem: all that use both share it, and what is compiled of it."""
-        return _transcribed(problem.compile() if isinstance(problem, Problem) else problem, self)
+        return _transcribed(problem.compile(), self)
 
     def to_dict(self) -> dict[str, Any]:
         """Name and settings as plain data, for files."""

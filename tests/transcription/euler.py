@@ -43,7 +43,7 @@ class Euler(Meshed):
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`."""
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        compiled = problem.compile()
         self.check_phases(compiled)
         return Assembly(compiled, lambda phase, layout, ends: EulerPhase(self.mesh_of(phase.name), phase, layout, ends)).nlp(self)
 

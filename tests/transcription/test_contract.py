@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -42,6 +43,14 @@ def test_it_converges_with_order_1_to_what_an_integrator_makes_of_its_controls()
         assert nlp.evaluate(z[None])[1] < 1e-13
         defects.append(simulate(nlp.problem, nlp.unpack(z)).max_defect)
     assert np.log2(np.divide(defects[:-1], defects[1:])) == pytest.approx(1.0, abs=0.1)
+
+
+def test_an_nlp_is_shared_by_all_that_use_one_problem():
+    problem = load("goddard").compile()
+    nlp = METHOD.nlp(problem)
+    assert METHOD.nlp(problem) is nlp and Euler(30).nlp(problem) is nlp and Euler(31).nlp(problem) is not nlp
+    copied = pickle.loads(pickle.dumps(problem))
+    assert not copied.derived and copied.fingerprint == problem.fingerprint and copied.compile() is copied
 
 
 def test_every_inner_level_makes_candidates_feasible():

@@ -127,7 +127,7 @@ def two_legs(jump: float) -> Problem:
     return problem
 
 
-def test_linked_phases_are_flown_on_from_where_the_first_ended():
+def test_linked_phases_are_simulated_from_where_the_first_ended():
     nlp = DFET(3, 6).transcribe(two_legs(2.0))
     found = solved(nlp)
     assert set(found.status) == {"converged"}
@@ -169,7 +169,7 @@ def test_a_meeting_that_does_not_take_place_is_found():
     assert check.violation == pytest.approx(nlp.evaluate(bad[None])[1][0], rel=1e-6)
 
 
-def test_a_phase_of_no_duration_is_flown_through():
+def test_a_phase_of_no_duration_is_simulated():
     problem = Problem("coast")
     burn = problem.phase("burn", t0=0, tf=(1, 3))
     burn.state("x", bounds=(-10, 10), initial=0)
@@ -214,7 +214,7 @@ def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_unstable_dynamics_are_flown_as_far_as_they_go():
+def test_unstable_dynamics_are_simulated_as_far_as_they_go():
     problem = Problem("blow up")
     phase = problem.phase("run", t0=0, tf=2)
     x = phase.state("x", bounds=(-100, 100), initial=1)
@@ -284,7 +284,7 @@ def test_periodic_controls_and_missing_controls_have_no_excursions():
     assert excursions(nlp.problem, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0])) == {}
 
 
-def test_what_was_flown_is_a_trajectory():
+def test_what_was_simulated_is_a_trajectory():
     nlp = DFET(3, 3).transcribe(oscillator())
     flight = simulated(nlp, propagated(nlp, k=1)[0]).trajectory
     phase = flight["swing"]
@@ -325,7 +325,7 @@ def planned(nlp, x0: float, tf: float) -> Trajectory:
     return nlp.unpack(nlp.propagate(nlp.first_guess(np.array(C)))[0])
 
 
-def test_several_are_flown_as_each_is_alone():
+def test_several_are_simulated_as_each_is_alone():
     nlp = DFET(4, 4).transcribe(oscillator())
     flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 6)))]
     other = DFET(3, 5).transcribe(oscillator())

@@ -96,7 +96,7 @@ class DFET(Meshed):
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`."""
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        compiled = problem.compile()
         self.check_phases(compiled)
         for phase in compiled.phases:
             _need_derivatives(phase)

@@ -102,7 +102,7 @@ class Shooting(Transcription):
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`. Raises ValueError, too, where steps are too long to be stable."""
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        compiled = problem.compile()
         scheme, law = TABLEAUX[self.scheme], ControlLaw(self.control, self.control_nodes or self._intervals + 1)
         mesh = StepMesh.of(self._intervals, self.steps, law.edges)
         count, _ = self._counted
