@@ -28,8 +28,8 @@ CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "t
 class Transcription(ABC):
     """A way to write a continuous problem with finitely many numbers.
 
-    An implementation is a frozen dataclass of its settings, in a file of its own, with the method `transcribe`. Whatever solves NLPs,
-    searches over them or looks at trajectories needs nothing else. One that has a `word` is registered: it is found in files and on the
+    An implementation is a frozen dataclass of its settings, in a file of its own, with the method `transcribe`. Solvers of NLPs,
+    searches and trajectories need nothing else. One that has a `word` is registered: it is found in files and on the
     command line.
 
     Attributes
@@ -69,14 +69,14 @@ class Transcription(ABC):
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
         """A method as it is written on the command line, after its word: dfet:4x6:bernstein has numbers (4, 6) and options ("bernstein",).
 
-        By default the numbers are the first settings, and there are no options.
+        By default the numbers are the settings that have no default value, and there are no options.
 
         Raises
         ------
         ValueError
             If it makes no sense.
         """
-        if options or len(numbers) > len(settings_of(cls)):
+        if options or len(numbers) != len(cls._needed()):
             raise ValueError(f"write it as {cls.examples}")
         return cls(*numbers)
 
@@ -85,8 +85,12 @@ class Transcription(ABC):
 
         By default the settings that have no default value.
         """
-        needed = [str(getattr(self, one.name)) for one in settings_of(self) if one.default is MISSING]
-        return f"{self.word}:{'x'.join(needed)}"
+        return f"{self.word}:{'x'.join(str(getattr(self, name)) for name in self._needed())}"
+
+    @classmethod
+    def _needed(cls) -> list[str]:
+        """Names of the settings that have no default value."""
+        return [one.name for one in settings_of(cls) if one.default is MISSING]
 
 
 @remembered
@@ -107,7 +111,7 @@ class Meshed(Transcription):
     mesh : mapping or pairs, optional
         Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
     highest_order, most_elements : int
-        What mesh refinement does not exceed in a phase; of elements, there may be twice as many as it began with, if that is more.
+        Limits of mesh refinement in each phase; of elements, there may be twice as many as it began with, if that is more.
     """
 
     elements: int
@@ -208,7 +212,7 @@ class NLP(Deriving):
     unpack : callable
         A vector (n,) -> Trajectory.
     interpolate : callable
-        A Trajectory of the same problem, by whatever method or mesh -> the vector (n,) nearest to it: its times and parameters, its states
+        A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
     """
 

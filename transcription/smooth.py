@@ -21,7 +21,7 @@ class Smooth:
     """Candidates drawn about the problem's guess (`phase.guess(...)`, `problem.guess(...)`), their controls as smooth profiles.
 
     It is what `solve(start="smooth")` of every solver begins with, as many as it needs, from the run's own generator. `draw` gives an array
-    of them, to look at or to give as `start`.
+    of them, to inspect or to give as `start`.
 
     A control is its guess, or where there is none the middle of its bounds, plus a random function of time: values of unit variance, whose
     correlation decreases with the time between them, d, in units of the phase's length, as exp(-d^2 / (2 length^2)), times `spread`, times

@@ -28,6 +28,8 @@ def test_it_is_found_by_its_word_and_in_files():
     assert from_dict(json.loads(json.dumps(meshed.to_dict()))) == meshed and word(meshed) is None
     with pytest.raises(ValueError, match=r"unknown transcription 'euler'; write it as euler:40 \(40 steps\)$"):
         parse("euler")
+    with pytest.raises(ValueError, match="transcription 'euler:3x4': write it as euler:40"):
+        parse("euler:3x4")
     with pytest.raises(ValueError, match="Euler: elements must be a whole number of at least 1, not 0"):
         parse("euler:0")
     with pytest.raises(ValueError, match="Euler: a mesh is given for phase 'swing'; the phases of 'goddard' are ascent"):

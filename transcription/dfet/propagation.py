@@ -2,7 +2,7 @@
 
 On each element the first l + 1 tests give the states at the quadrature nodes, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that
 system is small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element;
-elsewhere, and for whatever these five leave unsolved, a rootfinder iterates.
+elsewhere, and where these five do not converge, a rootfinder iterates.
 """
 
 from __future__ import annotations

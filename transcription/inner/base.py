@@ -25,13 +25,13 @@ class InnerResult:
     violation : array (k,)
         Largest scaled residual there; infinite where it is no number.
     status : array (k,) of str
-        "converged" (violation within the tolerance, whatever the solver said), "infeasible", "failed" or "timeout".
+        "converged" (violation within the tolerance, also where the solver reports a failure), "infeasible", "failed" or "timeout".
     moved : array (k,)
         Euclidean distance of the free variables from the candidate, in spans of their bounds.
     iterations : array (k,) of int
         Of the solver; a propagation counts as one.
     clocked : bool
-        Whether a clock ended any of the work, whatever came of it: then the same candidates need not give the same result again.
+        Whether a clock ended any of the work: then the same candidates need not give the same result again.
     fallbacks : int
         How many candidates a faster method left to a slower one.
     residuals : array (k, n + r), optional

@@ -120,7 +120,7 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
             "ipopt.bound_frac": 1e-8,
             "ipopt.bound_relax_factor": 0.0,
             "ipopt.nlp_scaling_method": "none",
-            # The objective tells how near the candidate a point is: without this, objectives of the problem would be off by 1e-4 of their
+            # The objective is the distance from the candidate: without this, objectives of the problem would be off by 1e-4 of their
             # ranges where the constraints are met already.
             "ipopt.tol": min(1e-10, 0.1 * tolerance),
             "ipopt.acceptable_tol": 0.1 * tolerance,

@@ -12,8 +12,8 @@ from .base import InnerResult, InnerSolver, result, started
 from .least_distance import least_distance
 
 NEAR = 0.1
-"""Largest scaled residual of the equations at which inequalities are looked at, and steps remembered: from afar both only stand in the
-way."""
+"""Largest scaled residual of the equations at which inequalities are considered, and steps remembered: from afar both only do
+harm."""
 
 
 CAP = 0.3
@@ -116,7 +116,7 @@ class _Going:
     x, center : arrays (k, d)
         Where they are, and the candidates themselves.
     watched : array (k, rows) of bool
-        The rows of the reduced problem that steps look at: equations, and what was violated on the way.
+        The rows of the reduced problem that steps consider: equations, and what was violated on the way.
     multipliers : array (k, rows)
         Those of the last step.
     inside : array (k,) of bool
@@ -148,7 +148,7 @@ class _Going:
         self.memory.keep(on)
 
     def watch(self, rows: np.ndarray) -> None:
-        """From now on look at these rows (k, rows) too."""
+        """From now on consider these rows (k, rows) too."""
         self.watched |= rows
         self.inside = (self.watched & self.reduced.inside).any(axis=1)
 

@@ -170,7 +170,7 @@ def _steepest(trajectory: PhaseTrajectory, j: int) -> float:
         return np.nan
     middle = 0.5 * (DENSE[1:] + DENSE[:-1])
     change = np.abs(np.diff(values, axis=0))
-    # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), whatever they are to describe.
+    # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), in any case.
     slopes = change / np.diff(DENSE)[:, None] * np.sqrt(1.0 - middle[:, None] ** 2)
     mean = change.sum(axis=0) / 2.0
     ratio = np.where(mean > FLAT, slopes.max(axis=0) / np.where(mean > 0, mean, 1.0), 0.0)

@@ -20,7 +20,7 @@ class Layout:
     A slot is the index of a variable, or a negative number for a constant: a quantity whose bounds coincide is no variable. Two quantities
     that are always equal (a linked boundary state) share one slot. Beside these there are *hidden* quantities, which are no variables
     either, but follow from them at some expense: states in between, integrals. Slots are those of the *extended* vector: the variables,
-    the hidden quantities, then the constants; `index` tells where.
+    the hidden quantities, then the constants; see `index`.
     """
 
     def __init__(self) -> None:

@@ -194,7 +194,7 @@ class PhaseWriter(ABC):
         MX (nx, 1)
             The final states, also where they are imposed and so no variables.
         MX (any, 1)
-            Scaled residuals of the equations of states, which have to be looked at where it is not `robust`.
+            Scaled residuals of the equations of states, which have to be checked where it is not `robust`.
         """
         return self._equations.propagate(extended, self.ends.initial)
 

@@ -28,7 +28,7 @@ FINEST = 1e4
 """Most times that a message proposes to shorten a step."""
 
 
-def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, who: str, settings: Mapping[str, int]) -> None:
+def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, prefix: str, settings: Mapping[str, int]) -> None:
     """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable.
 
     Parameters
@@ -37,7 +37,7 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, w
     scheme : Tableau
     places : array (N + 1,)
         Ends of the steps, relative to a phase.
-    who : str
+    prefix : str
         What the message begins with.
     settings : mapping
         The settings that make steps shorter: the first is the number of nodes or intervals, "steps" those between them.
@@ -58,9 +58,9 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, w
         (count, value), (_, steps) = settings.items()
         cure = f"{count}={ceil(value * enough[0]) + 1} or more, or steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
         raise ValueError(
-            f"{who}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate of "
-            f"{-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and there "
-            f"are {n}; take {cure}"
+            f"{prefix}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate "
+            f"of {-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and "
+            f"there are {n}; take {cure}"
         )
 
 

@@ -22,7 +22,7 @@ class Step:
     """A step as Functions of its inputs: the states at its beginning, the coefficients of the controls, its start and length, and s.
 
     Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
-    length, which is as accurate as the step itself whatever the method.
+    length, which is as accurate as the step itself.
 
     Parameters
     ----------
