@@ -126,10 +126,10 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         except OSError as error:
             raise Unreadable(f"checkpoint '{self.path}' cannot be read: {error.strerror or error}") from error
         except ValueError as error:
-            raise Unreadable(f"'{self.path}' {error}; {INSTEAD}") from error
+            raise Unreadable(f"'{self.path}' {' '.join(str(error).split())}; {INSTEAD}") from error
 
     def _read(self, seed: int | None) -> tuple[Any, Kept]:
-        """As `read`; the ValueErrors go on from the name of the file."""
+        """As `read`; the message of a ValueError continues after the name of the file."""
         header, arrays = checkpoint_file.read(self.path)
         if not isinstance(header, dict) or header.keys() != {*PARTS} or not isinstance(header["belongs"], dict):
             raise ValueError(f"is no valid checkpoint: its document does not consist of {', '.join(PARTS)}")

@@ -31,8 +31,8 @@ DOCUMENT = "document"
 def to_bytes(document: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes:
     """The content of a file with a document (what JSON knows, infinities and NaN included) and named arrays, none of objects."""
     buffer = io.BytesIO()
-    text = np.frombuffer(json.dumps(document).encode(), dtype=np.uint8)
-    np.savez(buffer, allow_pickle=False, **{DOCUMENT: text, **arrays})
+    members: dict[str, Any] = {DOCUMENT: np.frombuffer(json.dumps(document).encode(), dtype=np.uint8), **arrays}
+    np.savez(buffer, **members)
     archive = buffer.getvalue()
     return f"MACS checkpoint {VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode() + archive
 
@@ -53,7 +53,7 @@ def read(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
         line = file.readline(LONGEST_LINE)
         head = FIRST_LINE.fullmatch(line)
         if head is None and line.startswith(b"MACS checkpoint"):
-            raise ValueError("is damaged: its first line has other words than that of a checkpoint")
+            raise ValueError("is damaged: its first line is not that of a checkpoint")
         if head is None:
             raise ValueError(f"is no checkpoint: {'it is a file of something else, or of an older MACS' if line else 'it is empty'}")
         version, size, checksum = int(head[1]), int(head[2]), head[3].decode()
@@ -101,5 +101,5 @@ def _array(name: str, content: bytes) -> np.ndarray:
         if dtype.hasobject or not dtype.itemsize or math.prod(shape) * dtype.itemsize != len(content) - start:
             raise ValueError(f"its {len(content) - start} bytes are no array {shape} of {dtype}")
         return np.ndarray(shape, dtype, content, start, order="F" if fortran else "C").copy(order="K")
-    except (ValueError, TypeError, OverflowError) as error:
+    except Exception as error:  # as above: the parser of numpy raises errors of many classes
         raise ValueError(f"is no valid checkpoint: {name.removesuffix('.npy')} is no array ({error})") from error

@@ -176,6 +176,7 @@ FORGED = {
     "a shape of NaN": (zipped({"state.Z.npy": npy(np.zeros(3), shape="nan")}), "state.Z is no array"),
     "items without bytes": (zipped({"state.Z.npy": npy(np.zeros(0), descr="<U0", shape=(HUGE,))}), "state.Z is no array"),
     "objects": (zipped({"state.Z.npy": npy(np.zeros(3), descr="|O")}), "state.Z is no array"),
+    "a header that is no Python": (zipped({"state.Z.npy": npy(np.zeros(3), shape="((").replace(b"'(('", b"((((")}), "state.Z is no array"),
     "a type of no kind": (zipped({"state.Z.npy": npy(np.zeros(3), descr="<q9")}), "state.Z is no array"),
 }
 
