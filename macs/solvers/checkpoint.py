@@ -154,9 +154,9 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
     def keep(self, state: Any, kept: Kept) -> None:
         """Note how the run stands, for the next write. Raises TypeError for a state that is not as the contract of a solver has it."""
-        _check_points(state)
         arrays: dict[str, np.ndarray] = {}
         trees = {"run": pack(kept, Kept, arrays, "run"), "state": pack(state, self._state_class, arrays, "state")}
+        _check_points(state)
         self._waiting = trees, arrays
 
     def write_in_time(self) -> None:
