@@ -25,11 +25,12 @@ from transcription.nlp.scaling import objective_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import nearest_misses, vectors_front
-from .gradients.multistart import Descents
+from .fronts.builders import nearest_misses, vectors_points
+from .fronts.points import Point
+from .fronts.provenance import costs
+from .gradients.multistart import MultistartSolver
 from .pareto.directions import simplex_lattice
 from .pareto.dominance import nondominated
-from .point import Point
 from .solvers.start import beginning, check_run
 
 SAME = 1e-7
@@ -92,7 +93,7 @@ def optimize(
         raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
     i = 0 if objective is None else names.index(objective)
     reference = np.where(np.arange(len(names)) == i, 0.0, np.inf)
-    return job.front([job.descents.solve(reference, np.eye(len(names))[i])], None)[0]
+    return job.front([job.solver.solve(reference, np.eye(len(names))[i])], None)[0]
 
 
 def payoff(
@@ -199,12 +200,12 @@ class _Job:
         self._seed = secrets.randbits(63) if seed is None else int(seed)
         given = beginning(start, self.nlp)
         self._began = time.perf_counter()
-        self.descents = Descents(self.nlp, given, int(starts), np.random.default_rng(self._seed), float(tolerance))
+        self.solver = MultistartSolver(self.nlp, given, int(starts), np.random.default_rng(self._seed), float(tolerance))
         self._about = {"name": name, "settings": {**settings, "starts": int(starts)}}
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
-        return [self.descents.lexicographic(i) for i in range(len(self.nlp.problem.goals))]
+        return [self.solver.lexicographic(i) for i in range(len(self.nlp.problem.goals))]
 
     def along(self, tasks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Solved]:
         """One solve, or as many as there are starts, for each reference and weights; in their order.
@@ -212,17 +213,17 @@ class _Job:
         Whatever is better for another task than its own answer becomes a start for it; so does the answer next to it on the way back, if
         several starts are wanted.
         """
-        descents = self.descents
-        found = [descents.solve(*task) for task in tasks]
+        solver = self.solver
+        found = [solver.solve(*task) for task in tasks]
 
         def again(k: int, start: np.ndarray) -> None:
-            found[k] = descents.better([found[k], descents.from_vector(start, *tasks[k])], *tasks[k])
+            found[k] = solver.better([found[k], solver.from_vector(start, *tasks[k])], *tasks[k])
 
-        if descents.starts > 1:
+        if solver.starts > 1:
             for k in range(len(tasks) - 2, -1, -1):
                 again(k, found[k + 1].z)
         for _ in range(ROUNDS):
-            rivals = [descents.rival(solved, *task) for solved, task in zip(found, tasks, strict=True)]
+            rivals = [solver.rival(solved, *task) for solved, task in zip(found, tasks, strict=True)]
             for k, rival in enumerate(rivals):
                 if rival is not None:
                     again(k, rival)
@@ -263,19 +264,16 @@ class _Job:
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
         """Solves as a front, certified; objectives in `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
-        counts = self.descents.counts
         certificates = [optimality(self.nlp, z, ranges) for z in Z]
-        stats = {
-            "gradient_solves": counts.gradient_solves,
-            "inner_iterations": counts.inner_iterations,
-            "failures": dict(counts.failures),
-            "wall_time": time.perf_counter() - self._began,
-            "seed": self._seed,
-            "tolerance": self.descents.tolerance,
-            "reproducible": not counts.clocked,
-        }
+        stats = costs(
+            self.solver.counts,
+            wall_time=time.perf_counter() - self._began,
+            seed=self._seed,
+            tolerance=self.solver.tolerance,
+            reproducible=not self.solver.counts.clocked,
+        )
         status = [solved.status for solved in found]
-        return vectors_front(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more)
+        return Front.of(vectors_points(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more))
 
 
 METHODS = ("pascoletti-serafini", "epsilon")

@@ -35,7 +35,7 @@ GAIN = 0.995
 """A slide is tried if it is to lower the energy of a point to this part."""
 
 
-def polish(archive: Archive, solves: Solves, limit: int, exponent: float | None = None) -> Archive:
+def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None) -> Archive:
     """Bring every point of an archive down to the front, and spread them along it as evenly as their number, at most `limit`, allows.
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
@@ -79,7 +79,7 @@ def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
-def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tuple[Archive, Archive]:
+def _descended(archive: Archive, solves: CountedSolves, exponent: float | None) -> tuple[Archive, Archive]:
     """Guarded solves of the points; ends of the front for their own objective first, then for the others. Also returns the points
     for which there are too few solves: they are not among the others any more."""
     span = ranges(archive.F)
@@ -96,7 +96,7 @@ def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tupl
     return _front(_joined(_ends(archive, span, solves), archive), span), waiting
 
 
-def _covered(archive: Archive, solves: Solves, limit: int, exponent: float | None) -> Archive:
+def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None) -> Archive:
     """Ends of the front, and as many places between them as there may be points: always that which is farthest from what is known."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
@@ -124,7 +124,7 @@ def _divisions(m: int) -> int:
     return next(d for d in count(1) if comb(d + m, m - 1) > PLACES)
 
 
-def _ends(archive: Archive, span: np.ndarray, solves: Solves) -> Archive:
+def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     """The best of each objective, and of these the best in the others."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
@@ -141,7 +141,7 @@ def _ends(archive: Archive, span: np.ndarray, solves: Solves) -> Archive:
     return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
 
 
-def _taught(archive: Archive, solves: Solves) -> Archive:
+def _taught(archive: Archive, solves: CountedSolves) -> Archive:
     """Guarded solves of every point from its neighbours' controls, if there are enough for all; the archive itself if none was clearly
     better."""
     span = ranges(archive.F)
@@ -193,7 +193,7 @@ def _joined(one: Archive, two: Archive) -> Archive:
 
 
 @dataclass
-class Polishing:
+class PolishLog:
     """A polish that is under way, after k solves.
 
     Attributes
@@ -211,7 +211,7 @@ class Polishing:
     status: np.ndarray
 
     @classmethod
-    def of(cls, archive: Archive) -> Polishing:
+    def of(cls, archive: Archive) -> PolishLog:
         """One that begins."""
         return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
 
@@ -228,14 +228,14 @@ class Polishing:
         return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
 
 
-class Solves:
+class CountedSolves:
     """Gradient solves, as long as there are any left: none are, once the work is to end early.
 
     Parameters
     ----------
     evaluator : Evaluator
     left : int
-    polishing : Polishing, optional
+    polishing : PolishLog, optional
         The solves that it knows are not made again, all others are added to it.
 
     Attributes
@@ -245,13 +245,13 @@ class Solves:
         Whether the work was to end early, with solves left to make.
     """
 
-    def __init__(self, evaluator: Evaluator, left: int, polishing: Polishing | None = None) -> None:
+    def __init__(self, evaluator: Evaluator, left: int, polishing: PolishLog | None = None) -> None:
         self._evaluator, self._polishing = evaluator, polishing
         self._made = 0
         self.left, self.stopped = left, False
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """See `Evaluator.refine`; rows for which nothing is left have failed."""
+        """See `Evaluator.descend`; rows for which nothing is left have failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         for row in range(max(min(len(starts), self.left), 0)):
@@ -269,7 +269,7 @@ class Solves:
         made, self._made = self._made, self._made + 1
         if self._polishing is not None and made < len(self._polishing):
             return self._polishing.take(slice(made, made + 1))
-        found = self._evaluator.refine(start, reference, weights)
+        found = self._evaluator.descend(start, reference, weights)
         if self._polishing is not None:
             self._polishing.add(found)
         return found

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluator
 from ..pareto import archive as archives
 from ..pareto import directions
+from .settings import Settings
 from .state import NO_DIRECTION, SearchState
-from .trials import Attempts
-
-if TYPE_CHECKING:
-    from .macs import MACS
+from .trials import Trials
 
 
 def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
@@ -83,14 +79,14 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
     return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
 
 
-def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts, evaluator: Evaluator) -> None:
+def social_actions(state: SearchState, settings: Settings, box: Box, trials: Trials, evaluator: Evaluator) -> None:
     """One proposal for each social agent: from the points near it, of the archive or of the population, or from what has helped others."""
     agents, rng = state.agents, state.rng
     rows = np.flatnonzero(agents.direction != NO_DIRECTION)
     if not rows.size:
         return
-    X = attempts.positions(rows)
-    everyone = attempts.positions()
+    X = trials.positions(rows)
+    everyone = trials.positions()
     archive = box.to_unit(state.archive.Z[:, evaluator.free])
     trial = current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
     if len(archive) > 3:
@@ -100,12 +96,12 @@ def social_actions(state: SearchState, settings: MACS, box: Box, attempts: Attem
         pick = rng.random(len(rows)) < settings.experience
         trial = np.where(pick[:, None], follow_experience(box, X, state.experience, rng), trial)
     if settings.social_moves:
-        attempts.try_out(rows, X, trial, settings.keep_velocity)
+        trials.evaluate_and_accept(rows, X, trial, settings.keep_velocity)
     else:
-        attempts.look(agents.Z[rows], X, trial)
+        trials.evaluate(agents.Z[rows], X, trial)
 
 
-def assign(state: SearchState, settings: MACS, box: Box, evaluator: Evaluator) -> None:
+def assign(state: SearchState, settings: Settings, box: Box, evaluator: Evaluator) -> None:
     """Give the social agents their directions, and send them to the points of the archive that are best for these.
 
     While the archive has fewer points than there are objectives nobody is sent, or, as in the authors' code, the nearest of the agents

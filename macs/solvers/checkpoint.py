@@ -16,7 +16,7 @@ from dataclasses import dataclass, is_dataclass
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, cast, get_type_hints
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
@@ -24,10 +24,8 @@ from ..evaluation.evaluator import Counts
 from ..fronts.labelled import document
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
+from .method import SearchMethod
 from .packing import pack, unpack
-
-if TYPE_CHECKING:
-    from .solver import Solver
 
 FORMAT, VERSION = "MACS checkpoint", 1
 SECONDS, SHARE = 1.0, 20.0
@@ -95,7 +93,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         If the solver does not say what its state is.
     """
 
-    def __init__(self, path: str | PathLike[str], solver: Solver, belongs: Mapping[str, Any]) -> None:
+    def __init__(self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any]) -> None:
         self.path, self.failure = path, ""
         self._state_class, self._belongs = _state_class(solver), _read_json(document(dict(belongs)))
         self._versions = [versions()]
@@ -174,7 +172,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         self._took = self._written - began
 
 
-def keeps(solver: Solver) -> bool:
+def keeps(solver: SearchMethod) -> bool:
     """Whether a checkpoint can keep a run of this solver: whether it says what its state is."""
     try:
         _state_class(solver)
@@ -183,7 +181,7 @@ def keeps(solver: Solver) -> bool:
     return True
 
 
-def _state_class(solver: Solver) -> type:
+def _state_class(solver: SearchMethod) -> type:
     name = type(solver).__name__
     try:
         found = get_type_hints(solver.makes_state).get("return", Any)
