@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, is_dataclass
 from os import PathLike
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, cast, get_type_hints
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
@@ -23,10 +23,8 @@ from ..fronts.labelled import document
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
 from . import checkpoint_file
+from .method import SearchMethod
 from .packing import pack, unpack
-
-if TYPE_CHECKING:
-    from .solver import Solver
 
 SECONDS, SHARE = 1.0, 20.0
 """The time between two writes is at least so many seconds, and at least so many times what the last write took."""
@@ -79,7 +77,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
     Parameters
     ----------
     path : path
-    solver : Solver
+    solver : SearchMethod
         The class of its state is the one that its `makes_state` is annotated to return.
     belongs : mapping
         Everything but the seed that decides the results of the run, as data.
@@ -97,7 +95,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         If the class of the solver's state is not known.
     """
 
-    def __init__(self, path: str | PathLike[str], solver: Solver, belongs: Mapping[str, Any]) -> None:
+    def __init__(self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any]) -> None:
         self.path, self.failure = path, ""
         self._state_class, self._solver = _state_class(solver), type(solver).__name__
         self._belongs = _read_json(document(dict(belongs)))
@@ -186,7 +184,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         self._took = self._written - began
 
 
-def keeps(solver: Solver) -> bool:
+def keeps(solver: SearchMethod) -> bool:
     """Whether a checkpoint can keep a run of this solver: whether the class of its state is known."""
     try:
         _state_class(solver)
@@ -195,7 +193,7 @@ def keeps(solver: Solver) -> bool:
     return True
 
 
-def _state_class(solver: Solver) -> type:
+def _state_class(solver: SearchMethod) -> type:
     name = type(solver).__name__
     try:
         found = get_type_hints(solver.makes_state).get("return", Any)
