@@ -54,7 +54,7 @@ class Verified:
         flown = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
         rows = best(flown)
         places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
-        return cls(flown[rows], places, len(front), int((flown.status == CONVERGED).sum()))
+        return cls(Front.of(flown[rows]), places, len(front), int((flown.status == CONVERGED).sum()))
 
 
 def claims_table(runs: Mapping[str, Sequence[Verified]], tolerance: float, caption: str) -> Table:

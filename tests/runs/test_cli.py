@@ -184,7 +184,7 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "goddard", "--plot", "nowhere/front.png"], ["nowhere/front.png", "there is no folder"]),
         (["solve", "goddard", "--plot", "front.docx"], ["front.docx", ".png"]),
         (["solve", "goddard", "--checkpoint", "nowhere/run.ckpt"], ["nowhere/run.ckpt", "there is no folder"]),
-        (["solve", "goddard", "--checkpoint", "glide.py"], ["glide.py does not hold a checkpoint", "something else", "left as it is"]),
+        (["solve", "goddard", "--checkpoint", "glide.py"], ["'glide.py' is no checkpoint", "something else", "left as it is"]),
         (["solve", "goddard", "--checkpoint", "a.nc", "--out", "./a.nc"], ["--checkpoint a.nc would be overwritten"]),
         (["solve", "missing.py:build"], ["no file 'missing.py'"]),
         (["solve", "glide.py:missing"], ["no function 'missing'"]),
