@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import KW_ONLY, dataclass, field, replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from problems.checks import check_count, check_positive
@@ -15,7 +16,8 @@ from .batch import cells as combining
 from .batch import file as studyfile
 from .batch.cells import Cell
 from .batch.file import INNER, check_inner, sampling, written
-from .batch.store import Store, Summary
+from .batch.store import Store, StoredRun, Summary
+from .execution.task import Payload, Task
 from .measures.references import check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
@@ -24,7 +26,6 @@ from .report.published import check_against
 
 if TYPE_CHECKING:
     from .report.report import Report
-from .execution.task import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
 
@@ -191,7 +192,7 @@ class Study:
         """
         from .batch.running import execute
 
-        return execute(self, out, jobs=jobs, executor=executor, retry=retry, progress=progress)
+        return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
     def status(self, out: str | PathLike[str]) -> Summary:
         """How many runs of each cell `out` has, and why others failed. Raises ValueError if it holds another study, or none."""
@@ -259,6 +260,20 @@ class Study:
             "note": self.note,
             "cells": [cell.to_dict() for cell in self.cells],
         }
+
+    def _task(self, run: StoredRun, checkpoint: Path) -> Task:
+        """What a worker needs to make a run."""
+        return Task(
+            payload=self.payloads[run.cell.labels],
+            evaluations=run.cell.evaluations,
+            seed=run.seed,
+            inner=self.inner_of(run.cell),
+            tolerance=float(self.tolerance),
+            time_limit=self.time_limit,
+            start=self.sampling_of(run.cell),
+            verify=self.verify,
+            checkpoint=checkpoint,
+        )
 
     def _terms(self, cell: Cell) -> dict[str, Any]:
         """What a cell's runs have of their own: the problem's inner level and start where the study names none, and the solver's terms."""

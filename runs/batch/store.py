@@ -46,7 +46,7 @@ FREE = ("description", "runs", "time_limit", "reference", "paper", "goal", "nomi
 
 
 @dataclass(frozen=True)
-class Run:
+class StoredRun:
     """One run of a cell, as the folder has it.
 
     Attributes
@@ -100,13 +100,13 @@ class Summary:
     ----------
     name : str
     path : Path
-    runs : tuple of Run
+    runs : tuple of StoredRun
         All that there are to be, cell by cell.
     """
 
     name: str
     path: Path
-    runs: tuple[Run, ...] = field(repr=False)
+    runs: tuple[StoredRun, ...] = field(repr=False)
 
     def count(self, *statuses: str) -> int:
         """How many runs have one of the statuses."""
@@ -128,9 +128,9 @@ class Summary:
         return self.count(MISSING)
 
     @property
-    def cells(self) -> dict[Cell, tuple[Run, ...]]:
+    def cells(self) -> dict[Cell, tuple[StoredRun, ...]]:
         """Runs by cell."""
-        found: dict[str, list[Run]] = {}
+        found: dict[str, list[StoredRun]] = {}
         for run in self.runs:
             found.setdefault(run.cell.folder, []).append(run)
         return {runs[0].cell: tuple(runs) for runs in found.values()}
@@ -230,13 +230,13 @@ class Store:
 
     # What is in it
 
-    def runs(self, count: int | None = None) -> Iterator[Run]:
+    def runs(self, count: int | None = None) -> Iterator[StoredRun]:
         """All runs there are to be, cell by cell: finished, failed, unreadable and missing ones. By default as many as were asked for."""
         for cell in self.cells:
             for number in range(1, (self.definition["runs"] if count is None else count) + 1):
                 yield self.run(cell, number)
 
-    def run(self, cell: Cell, number: int) -> Run:
+    def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
         path, record = self.front_path(cell, number), _record(self.record_path(cell, number))
         status, message = record.get("status", MISSING), str(record.get("message", ""))
@@ -248,7 +248,7 @@ class Store:
                 status, message = UNREADABLE, str(error)
         elif status not in (CRASHED, TIMEOUT, MEMORY, KILLED):
             status, message = MISSING, ""
-        return Run(
+        return StoredRun(
             cell=cell,
             number=number,
             seed=cell.seed(self.definition["seed"], number),

@@ -18,8 +18,8 @@ def study(arguments: Namespace) -> int:
 
 def run(arguments: Namespace) -> int:
     """Make the runs that are missing."""
-    from ..batch.running import Deserted
-    from ..execution.crew import cluster
+    from ..batch.running import WorkersLost
+    from ..execution.workers import cluster
     from ..study import Study
 
     if arguments.dask and arguments.jobs:
@@ -36,7 +36,7 @@ def run(arguments: Namespace) -> int:
     except KeyboardInterrupt:
         print(f"interrupted; {again}", file=sys.stderr)
         return INTERRUPTED
-    except Deserted as error:
+    except WorkersLost as error:
         print(error, file=sys.stderr)
         return NO
     except OSError as error:

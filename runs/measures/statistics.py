@@ -51,7 +51,7 @@ class Summary:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairTest:
     """Two solvers on one indicator.
 
     Attributes
@@ -110,7 +110,7 @@ def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False, ddo
     )
 
 
-def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> list[Comparison]:
+def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> list[PairTest]:
     """Every pair of solvers: Mann-Whitney U, or with `paired` Wilcoxon's signed ranks, with Holm's correction and A12.
 
     Parameters
@@ -121,7 +121,7 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: boo
 
     Returns
     -------
-    list of Comparison
+    list of PairTest
         In the order of the names. Of samples that are all alike, p is 1. A12 takes no heed of pairs.
 
     Notes
@@ -139,7 +139,7 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: boo
     corrected = holm([p for _, _, _, p, _, _ in found])
     test = "Wilcoxon signed-rank" if paired else "Mann-Whitney U"
     return [
-        Comparison(one, other, test, statistic, p, float(p_holm), a, effect(a), note)
+        PairTest(one, other, test, statistic, p, float(p_holm), a, effect(a), note)
         for (one, other, statistic, p, a, note), p_holm in zip(found, corrected, strict=True)
     ]
 

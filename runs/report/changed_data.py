@@ -19,7 +19,7 @@ from macs.fronts.style import COLORS, better
 from problems.checks import unknown
 
 from ..batch.file import told
-from .comparison import Ground
+from .comparison import Comparison
 from .flight_plots import representatives
 from .style import COLUMN, PAGE, new_figure, style
 from .tables import Cell, Column, Table, table
@@ -157,26 +157,28 @@ def _columns(goals: Sequence[Any]) -> list[Column]:
     return [Column(goal.name, goal.unit, digits=5) for goal in goals]
 
 
-def changes(grounds: Sequence[Ground], nominal: str | None, verify: float | None = None) -> list[Changed]:
+def changes(comparisons: Sequence[Comparison], nominal: str | None, verify: float | None = None) -> list[Changed]:
     """The nominal front of each solver and transcription, flown under the data of all other problems; nothing without a nominal problem."""
     if nominal is None:
         return []
     tolerance = TOLERANCE if verify is None else verify
-    labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
+    labels = [nominal, *dict.fromkeys(comparison.problem for comparison in comparisons if comparison.problem != nominal)]
     cells = {
-        (ground.place(solver), solver): None
-        for ground in grounds
-        if ground.problem == nominal
-        for solver, runs in ground.runs.items()
+        (comparison.place(solver), solver): None
+        for comparison in comparisons
+        if comparison.problem == nominal
+        for solver, runs in comparison.runs.items()
         if runs
     }
-    found = [_change(grounds, *cell, labels, tolerance) for cell in cells]
+    found = [_change(comparisons, *cell, labels, tolerance) for cell in cells]
     return [Changed(nominal, found, tolerance)] if found else []
 
 
-def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str], tolerance: float) -> Change:
+def _change(comparisons: Sequence[Comparison], transcription: str, solver: str, labels: Sequence[str], tolerance: float) -> Change:
     here = {
-        ground.problem: ground.fronts[solver] for ground in grounds if ground.runs.get(solver) and ground.place(solver) == transcription
+        comparison.problem: comparison.fronts[solver]
+        for comparison in comparisons
+        if comparison.runs.get(solver) and comparison.place(solver) == transcription
     }
     union = {label: Front.merge(here[label]) for label in labels if label in here}
     own = union[labels[0]]
@@ -184,15 +186,21 @@ def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: 
         return Change(transcription, solver, union, note="nothing feasible was found under the nominal data, so there is nothing to fly")
     some = own[representatives(own, MANY)]
     try:
-        problems = {label: _problem(grounds, label) for label in labels}
+        problems = {label: _problem(comparisons, label) for label in labels}
     except ValueError as error:
         return Change(transcription, solver, union, note=f"nothing was flown: {error}")
     return Change(transcription, solver, union, {label: some.simulate(problem, tolerance=tolerance) for label, problem in problems.items()})
 
 
-def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:
+def _problem(comparisons: Sequence[Comparison], label: str) -> CompiledProblem:
     """A problem of the study, from the first front of it. Raises ValueError if it was stated in a script."""
-    fronts = (front for ground in grounds if ground.problem == label for solver in ground.runs for front in ground.fronts[solver])
+    fronts = (
+        front
+        for comparison in comparisons
+        if comparison.problem == label
+        for solver in comparison.runs
+        for front in comparison.fronts[solver]
+    )
     return next(fronts).compiled()
 
 

@@ -20,7 +20,7 @@ from transcription import SingleShooting, from_dict, parse, word
 
 from ..measures.indicators import pieces, truth
 from ..measures.references import Reference, room
-from .comparison import Ground
+from .comparison import Comparison
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .plots import front_figure
 from .style import style
@@ -42,7 +42,7 @@ BETTER = 1e-6
 class Flights:
     """Attributes
     ----------
-    ground : Ground
+    comparison : Comparison
     reference : Reference
     solver : str
         Whose front they are of: that of the first solver that found any, all its runs together.
@@ -58,7 +58,7 @@ class Flights:
         Why there are no ends; mostly nothing.
     """
 
-    ground: Ground
+    comparison: Comparison
     reference: Reference
     solver: str
     points: tuple[Point, ...]
@@ -69,10 +69,10 @@ class Flights:
     note: str
 
     @classmethod
-    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
-        """Those of a ground; None where nobody found any."""
-        for solver in ground.runs:
-            fronts = [front for front in ground.fronts[solver] if len(front)]
+    def of(cls, comparison: Comparison, reference: Reference) -> Flights | None:
+        """Those of a comparison; None where nobody found any."""
+        for solver in comparison.runs:
+            fronts = [front for front in comparison.fronts[solver] if len(front)]
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
@@ -81,12 +81,12 @@ class Flights:
                 place = room(source.address) if source is not None and named else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
-                return cls(ground, reference, solver, points, many, place, laws, ends, note)
+                return cls(comparison, reference, solver, points, many, place, laws, ends, note)
         return None
 
     def table(self) -> Table:
         """Their objectives; with two of them, the best of the second that is known for the first; and each objective alone."""
-        goals = self.ground.known.goals
+        goals = self.comparison.known.goals
         curve = self._curve()
         heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
         heads += (
@@ -106,13 +106,15 @@ class Flights:
             told.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."
             )
-        return table(heads, rows, f"{self.ground.name}: solutions that stand for the front.", [*told, *([self.note] if self.note else [])])
+        return table(
+            heads, rows, f"{self.comparison.name}: solutions that stand for the front.", [*told, *([self.note] if self.note else [])]
+        )
 
     def figures(self) -> dict[str, Figure]:
         """Name of a file -> figure."""
         found = {
             "representatives": front_figure(
-                {self.solver: self.ground.fronts[self.solver]},
+                {self.solver: self.comparison.fronts[self.solver]},
                 reference=self.reference.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
@@ -144,14 +146,14 @@ class Flights:
 
     def _curve(self) -> np.ndarray | None:
         """The reference, minimised, where it is one curve of two objectives."""
-        R = truth(self.reference.front, self.ground.known)
+        R = truth(self.reference.front, self.comparison.known)
         return R if len(pieces(R)) == 1 else None
 
     def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:
         """The second objective of the reference at the first of a point, and how much worse the point is, in ranges."""
         if curve is None:
             return []
-        signs = [goal.sign for goal in self.ground.known.goals]
+        signs = [goal.sign for goal in self.comparison.known.goals]
         first, second = (sign * value for sign, value in zip(signs, point.objectives.values(), strict=True))
         known = float(np.interp(first, *curve.T))
         return [signs[1] * known, (second - known) / float(np.ptp(curve[:, 1]))]

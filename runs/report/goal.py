@@ -16,9 +16,9 @@ from macs.front import Front
 from problems.checks import unknown
 
 from ..batch.file import is_number
-from ..batch.store import Run
+from ..batch.store import StoredRun
 from ..measures.convergence import Band, History, band
-from .comparison import Ground
+from .comparison import Comparison
 from .plots import convergence_figure
 from .tables import Cell, Column, Table, table
 
@@ -95,7 +95,7 @@ class Goal:
         """What part of the way values of the objective have come: 1 at the best, 0 at the worst."""
         return 1.0 - (values - self.best) / (self.worst - self.best)
 
-    def history(self, run: Run, goals: Sequence[Objective]) -> History:
+    def history(self, run: StoredRun, goals: Sequence[Objective]) -> History:
         """What a run had attained at each of its samples; NaN before it had a feasible point."""
         k = self._place(goals)
         best = [goals[k].sign * min((row[k] for row in F), default=np.nan) for F in run.history["F"]]
@@ -171,20 +171,20 @@ class Attained:
         return {f"{self.problem}-goal-attainment": figure}
 
 
-def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None, verify: float | None) -> list[Attained]:
+def attained(comparisons: Sequence[Comparison], given: Mapping[str, Any] | None, verify: float | None) -> list[Attained]:
     """The goal that a study gives on each of its problems, also as flown if it verifies; nothing if it gives none."""
     if given is None:
         return []
     goal = Goal.of(given, {})
     found = []
-    for problem in dict.fromkeys(ground.problem for ground in grounds):
-        here = [ground for ground in grounds if ground.problem == problem]
+    for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
+        here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
         cells = {
-            (ground.place(solver), solver): (runs, ground.fronts[solver], ground.failures.get(solver, 0))
-            for ground in here
-            for solver, runs in ground.runs.items()
-            if len(runs) + ground.failures.get(solver, 0)
+            (comparison.place(solver), solver): (runs, comparison.fronts[solver], comparison.failures.get(solver, 0))
+            for comparison in here
+            for solver, runs in comparison.runs.items()
+            if len(runs) + comparison.failures.get(solver, 0)
         }
         histories = {
             cell: [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]

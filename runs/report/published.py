@@ -13,7 +13,7 @@ from macs.baselines.population import PopulationSolver
 from problems.checks import unknown
 
 from ..batch.file import is_number, told
-from .comparison import Ground
+from .comparison import Comparison
 from .published_kinds import KINDS, STATISTICS, Kind
 from .tables import Cell, Column, Table, table
 
@@ -60,11 +60,11 @@ def check_against(papers: Sequence[Mapping[str, Any]], problems: Mapping[str, Co
                     kind.fits(paper, problems[label])
 
 
-def published_tables(grounds: Sequence[Ground], papers: Sequence[Mapping[str, Any]]) -> dict[str, Table]:
+def published_tables(comparisons: Sequence[Comparison], papers: Sequence[Mapping[str, Any]]) -> dict[str, Table]:
     """Name of a file -> table: the paper's rows and ours, problem by problem. Those of problems that there are no runs of are left out."""
     found: dict[str, Table] = {}
     for number, paper in enumerate(papers, 1):
-        together = _beside(grounds, paper, KINDS[paper["of"]])
+        together = _beside(comparisons, paper, KINDS[paper["of"]])
         if together is not None:
             found["published" if len(papers) == 1 else f"published-{number}"] = together
     return found
@@ -131,28 +131,28 @@ def _figures(row: Mapping[str, Any]) -> list[str]:
     return [key for key in row if key not in (*ROW, STATISTIC)]
 
 
-def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> Table | None:
+def _beside(comparisons: Sequence[Comparison], paper: Mapping[str, Any], kind: Kind) -> Table | None:
     """One published table and ours; None if there are no runs of its problems."""
     columns = kind.columns(paper)
     keys = list(columns or dict.fromkeys(key for row in paper["rows"] for key in _figures(row)))
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for problem in dict.fromkeys(row["problem"] for row in paper["rows"]):
-        here = [ground for ground in grounds if ground.problem == problem]
+        here = [comparison for comparison in comparisons if comparison.problem == problem]
         theirs = [row for row in paper["rows"] if row["problem"] == problem]
         if not here:
             continue
         seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
         rows += [[problem, row["by"], None, *_cells(row, keys, kind, None)] for row in theirs]
         seen = set[tuple[str, str]]()
-        for ground in here:
-            for solver, figures in kind.ours(ground, paper).items():
-                if (solver, ground.place(solver)) in seen:
-                    continue  # it works apart, and is on each of the others' grounds
-                seen.add((solver, ground.place(solver)))
-                runs = len(ground.fronts[solver]) + ground.failures.get(solver, 0)
-                rows += [[problem, f"{solver}, {ground.place(solver)}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
-        said = {ground.transcription: kind.note(ground, paper) for ground in here}
+        for comparison in here:
+            for solver, figures in kind.ours(comparison, paper).items():
+                if (solver, comparison.place(solver)) in seen:
+                    continue  # it works apart, and is on each of the others' comparisons
+                seen.add((solver, comparison.place(solver)))
+                runs = len(comparison.fronts[solver]) + comparison.failures.get(solver, 0)
+                rows += [[problem, f"{solver}, {comparison.place(solver)}", runs, *_cells(one, keys, kind, seconds)] for one in figures]
+        said = {comparison.transcription: kind.note(comparison, paper) for comparison in here}
         if len(set(said.values())) == 1:
             notes.append(f"{problem}: {said[here[0].transcription]}")
         else:
@@ -165,7 +165,7 @@ def _beside(grounds: Sequence[Ground], paper: Mapping[str, Any], kind: Kind) -> 
         Column("runs", grouped=kind.statistics),
     ]
     heads += [STATISTIC] if kind.statistics else []
-    units = {goal.name: goal.unit for ground in grounds for goal in ground.known.goals}
+    units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper['source']}" if "source" in paper else "Beside published figures"

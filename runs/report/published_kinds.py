@@ -1,4 +1,4 @@
-"""What a published table may be of: which figures it has, and how ours are made from the fronts of a ground."""
+"""What a published table may be of: which figures it has, and how ours are made from the fronts of a comparison."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.simulation_record import Ends
 from ..measures.statistics import summarise
-from .comparison import Ground
+from .comparison import Comparison
 from .run_measures import samples, spent
 from .tables import Cell, Column
 
@@ -41,9 +41,9 @@ class Kind:
     columns : callable
         the published table -> {key of a figure: head of its column}; None where the keys are names of objectives.
     ours : callable
-        (ground, the published table) -> solver -> rows of figures.
+        (comparison, the published table) -> solver -> rows of figures.
     note : callable
-        (ground, the published table) -> what there is to say of ours.
+        (comparison, the published table) -> what there is to say of ours.
     statistics : bool
         Whether each row is one of `STATISTICS`, named by its key "statistic".
     needs : mapping
@@ -55,20 +55,20 @@ class Kind:
     """
 
     columns: Callable[[Mapping[str, Any]], Mapping[str, Column] | None]
-    ours: Callable[[Ground, Mapping[str, Any]], Mapping[str, Sequence[Figures]]]
-    note: Callable[[Ground, Mapping[str, Any]], str]
+    ours: Callable[[Comparison, Mapping[str, Any]], Mapping[str, Sequence[Figures]]]
+    note: Callable[[Comparison, Mapping[str, Any]], str]
     statistics: bool = False
     needs: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)
     fits: Callable[[Mapping[str, Any], CompiledProblem], None] = lambda paper, problem: None
     population: bool = False
 
 
-def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def _indicators(comparison: Comparison, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """GD and IGD to the points of the union of all runs, and the time of a run."""
-    union, times = ground.union(), spent(ground)["time [s]"]
-    found = samples(ground, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
+    union, times = comparison.union(), spent(comparison)["time [s]"]
+    found = samples(comparison, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
     rows: dict[str, list[Figures]] = {}
-    for solver in ground.runs:
+    for solver in comparison.runs:
         if solver in found["GD"]:
             gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
             figures = {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
@@ -77,45 +77,45 @@ def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figu
     return rows
 
 
-def _against_union(ground: Ground, paper: Mapping[str, Any]) -> str:
-    union = ground.union()
+def _against_union(comparison: Comparison, paper: Mapping[str, Any]) -> str:
+    union = comparison.union()
     if not len(union.front):
         return "no run found a point."
-    scale = Scale.of(union.front, like=ground.known, what=union.what).describe().split(". Hypervolume")[0]
+    scale = Scale.of(union.front, like=comparison.known, what=union.what).describe().split(". Hypervolume")[0]
     return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
 
 
-def _hypervolume(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def _hypervolume(comparison: Comparison, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """The volume up to a point in the users' units: best, median and worst of all runs; a failed one has none."""
     rows: dict[str, list[Figures]] = {}
-    for solver, fronts in ground.fronts.items():
-        values = [hypervolume_at(front, paper["point"]) for front in fronts] + [0.0] * ground.failures.get(solver, 0)
+    for solver, fronts in comparison.fronts.items():
+        values = [hypervolume_at(front, paper["point"]) for front in fronts] + [0.0] * comparison.failures.get(solver, 0)
         if values:
             rows[solver] = [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}]
     return rows
 
 
-def _point(ground: Ground, paper: Mapping[str, Any]) -> str:
-    goals = ground.known.goals
+def _point(comparison: Comparison, paper: Mapping[str, Any]) -> str:
+    goals = comparison.known.goals
     words = ", ".join(
         f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, paper["point"], strict=True)
     )
-    best = ground.reference(None)
+    best = comparison.reference(None)
     return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, paper['point']):.5g}."
 
 
-def _over_all(ground: Ground, paper: Mapping[str, Any]) -> str:
+def _over_all(comparison: Comparison, paper: Mapping[str, Any]) -> str:
     """What statistics are over, and of which solvers there are none."""
-    without = [solver for solver, fronts in ground.fronts.items() if fronts and not any(map(len, fronts))]
+    without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
     none = f" No run of {', '.join(without)} has a point that counts." if without else ""
     return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
 
 
-def _objectives(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def _objectives(comparison: Comparison, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """Statistics of each objective over the points of all runs."""
     return {
-        solver: _statistics({goal.name: column for goal, column in zip(ground.known.goals, values.T, strict=True)})
-        for solver, fronts in ground.fronts.items()
+        solver: _statistics({goal.name: column for goal, column in zip(comparison.known.goals, values.T, strict=True)})
+        for solver, fronts in comparison.fronts.items()
         if len(values := _together(fronts))
     }
 
@@ -130,10 +130,10 @@ def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
     return [{"statistic": name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
 
 
-def _ends(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def _ends(comparison: Comparison, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """Statistics, over the points of all runs, of how far states are at the end from where they were to be."""
     rows: dict[str, list[Figures]] = {}
-    for solver, runs in ground.verified.items():
+    for solver, runs in comparison.verified.items():
         found = [one for one in runs if len(one.front)]
         if found:
             errors = {}
@@ -197,15 +197,15 @@ def _fit_point(paper: Mapping[str, Any], problem: CompiledProblem) -> None:
         raise ValueError(f"point: {len(paper['point'])} numbers, but {len(problem.goals)} objectives: {names}")
 
 
-def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def _feasibility(comparison: Comparison, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
     """In which generation one, and all of a population were feasible, and how many points were found; of solvers with a population."""
     rows: dict[str, list[Figures]] = {}
-    for solver, runs in ground.runs.items():
+    for solver, runs in comparison.runs.items():
         told = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
         if not told:
             continue
         figures: dict[str, Cell] = {}
-        runs_in_all = len(told) + ground.failures.get(solver, 0)
+        runs_in_all = len(told) + comparison.failures.get(solver, 0)
         for key in ("first_feasible", "all_feasible"):
             reached = [one[key] for one in told if one[key] is not None]
             figures[key] = float(np.mean(reached)) if reached else None
@@ -214,7 +214,7 @@ def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Fig
             figures[f"{key}_median"] = middle if np.isfinite(middle) else None
             figures[f"{key}_never"] = runs_in_all - len(reached)
         figures["points"] = float(np.mean([one["nondominated"] for one in told]))
-        figures["held"] = float(np.mean([len(one.front) for one in ground.verified[solver]]))
+        figures["held"] = float(np.mean([len(one.front) for one in comparison.verified[solver]]))
         rows[solver] = [figures]
     return rows
 
@@ -259,7 +259,7 @@ KINDS: Mapping[str, Kind] = {
             "held": Column("points of a front that count", digits=4),
         },
         _feasibility,
-        lambda ground, paper: "generations from 1, the first population; means of the runs that got there; points are means of a run.",
+        lambda comparison, paper: "generations from 1, the first population; means of the runs that got there; points are means of a run.",
         population=True,
     ),
 }

@@ -22,7 +22,7 @@ from ..measures.references import Reference, read
 from ..measures.scale import Scale
 from ..measures.statistics import summarise
 from .changed_data import Changed, changes
-from .comparison import Ground, grounds
+from .comparison import Comparison, comparisons
 from .flights import Flights
 from .goal import Attained, attained
 from .plots import attainment_figure, convergence_figure, front_figure
@@ -91,14 +91,14 @@ def report(
     papers = store.definition.get("paper") or []
     with studyfile.told(f"'{out}' holds a study of an earlier MACS, or a damaged one; run the study again, which keeps what is finished"):
         check(papers)
-    found = grounds(store, {})
+    found = comparisons(store, {})
     others = {name: [_foreign(path, found) for path in paths] for name, paths in (foreign or {}).items()}
     if others:
-        found = grounds(store, others)
+        found = comparisons(store, others)
     writer = _Writer(Path(out) / FOLDER)
     sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
-    for ground in _told(found) if progress else found:
-        sections += _section(ground, store.definition, writer, figures)
+    for comparison in _told(found) if progress else found:
+        sections += _section(comparison, store.definition, writer, figures)
     across: list[Attained | Changed] = [
         *attained(found, store.definition.get("goal"), store.definition.get("verify")),
         *changes(found, store.definition.get("nominal"), store.definition.get("verify")),
@@ -113,42 +113,42 @@ def report(
     return Report(text, tuple(writer.files))
 
 
-def _told(found: Sequence[Ground]) -> Iterator[Ground]:
+def _told(found: Sequence[Comparison]) -> Iterator[Comparison]:
     """One after the other, telling on the terminal which."""
     with Steps("report", len(found)) as steps:
-        for ground in found:
-            steps.begin(ground.name)
-            yield ground
+        for comparison in found:
+            steps.begin(comparison.name)
+            yield comparison
 
 
-def _section(ground: Ground, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
-    """Write what there is of a ground of a study with this definition; returns its tables as text."""
-    reference, verify = ground.reference(study.get("reference")), study.get("verify")
-    told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
-    tables, figures = _tables(ground, reference, verify), _figures(ground, reference) if drawn else {}
-    flights = Flights.of(ground, reference) if study.get("flights", True) else None
+def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
+    """Write what there is of a comparison of a study with this definition; returns its tables as text."""
+    reference, verify = comparison.reference(study.get("reference")), study.get("verify")
+    told = [f"{comparison.name}\n{'=' * len(comparison.name)}", *_left_out(comparison)]
+    tables, figures = _tables(comparison, reference, verify), _figures(comparison, reference) if drawn else {}
+    flights = Flights.of(comparison, reference) if study.get("flights", True) else None
     if flights is not None:
         tables["representatives"] = flights.table()
         figures |= flights.figures() if drawn else {}
-    told += [writer.table(f"{_stem(ground)}-{name}", one) for name, one in tables.items()]
+    told += [writer.table(f"{_stem(comparison)}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():
-        writer.figure(f"{_stem(ground)}-{name}", figure)
+        writer.figure(f"{_stem(comparison)}-{name}", figure)
     return told
 
 
-def _foreign(path: str | PathLike[str], found: Sequence[Ground]) -> Front:
+def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:
     """A front of another program, of the first problem whose objectives it has."""
     reasons = []
-    for ground in found:
+    for comparison in found:
         try:
-            return read(path, ground.known.goals)
+            return read(path, comparison.known.goals)
         except ValueError as error:
             reasons.append(str(error))
     raise ValueError("; ".join(dict.fromkeys(reasons)))
 
 
-def _stem(ground: Ground) -> str:
-    return _plain(f"{ground.problem}-{ground.transcription}")
+def _stem(comparison: Comparison) -> str:
+    return _plain(f"{comparison.problem}-{comparison.transcription}")
 
 
 def _plain(name: str) -> str:
@@ -156,24 +156,26 @@ def _plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
 
 
-def _left_out(ground: Ground) -> list[str]:
-    told = [f"{solver}: {count} failed, which count as worse than any" for solver, count in ground.failures.items() if count]
-    told += [f"{solver}: {count} missing, killed or unreadable, which are left out" for solver, count in ground.left_out.items() if count]
-    told += [] if any(map(len, ground.every)) else ["no run found a point that counts"]
+def _left_out(comparison: Comparison) -> list[str]:
+    told = [f"{solver}: {count} failed, which count as worse than any" for solver, count in comparison.failures.items() if count]
+    told += [
+        f"{solver}: {count} missing, killed or unreadable, which are left out" for solver, count in comparison.left_out.items() if count
+    ]
+    told += [] if any(map(len, comparison.every)) else ["no run found a point that counts"]
     return ["\n".join(told)] if told else []
 
 
-def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[str, Table]:
+def _tables(comparison: Comparison, reference: Reference, verify: float | None) -> dict[str, Table]:
     """Name of a file -> table."""
     found: dict[str, Table] = {}
     if verify is not None:
-        found["claims"] = claims_table(ground.verified, verify, f"{ground.name}: what was claimed, and what holds.")
-    for name, against in {"indicators": reference, "indicators-union": ground.union()}.items():
+        found["claims"] = claims_table(comparison.verified, verify, f"{comparison.name}: what was claimed, and what holds.")
+    for name, against in {"indicators": reference, "indicators-union": comparison.union()}.items():
         if not len(against.front) or (name != "indicators" and not reference.true):
             continue
-        measured = samples(ground, against)
-        scale = Scale.of(against.front, like=ground.known, what=against.what).describe()
-        title = f"{ground.name}: against {against.what}"
+        measured = samples(comparison, against)
+        scale = Scale.of(against.front, like=comparison.known, what=against.what).describe()
+        title = f"{comparison.name}: against {against.what}"
         found[name] = summary_table(measured, caption=f"{title}.", notes=[scale])
         if against is reference and len(measured["GD"]) > 1:
             found["comparisons"] = comparison_table(measured, caption=f"{title}: solvers in pairs.")
@@ -181,7 +183,7 @@ def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[
                 found["overall"] = overall_table(measured, caption=f"{title}: all solvers.")
     costs: list[list[Cell]] = [
         [cost, solver, summary.count, summary.mean, summary.median, summary.best, summary.worst]
-        for cost, solvers in spent(ground).items()
+        for cost, solvers in spent(comparison).items()
         for solver, values in solvers.items()
         for summary in [summarise(values)]
     ]
@@ -191,28 +193,28 @@ def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[
         "runs",
         *(Column(name, digits=4) for name in ("mean", "median", "least", "most")),
     ]
-    found["spent"] = table(heads, costs, f"{ground.name}: what a run spent.")
+    found["spent"] = table(heads, costs, f"{comparison.name}: what a run spent.")
     return found
 
 
-def _figures(ground: Ground, reference: Reference) -> dict[str, Figure]:
+def _figures(comparison: Comparison, reference: Reference) -> dict[str, Figure]:
     """Name of a file -> figure."""
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = {}
     if not len(reference.front):
         return found
-    if len(ground.known.goals) > 1:
-        found["fronts"] = front_figure(ground.fronts, reference=reference.front, truth_name=name)
+    if len(comparison.known.goals) > 1:
+        found["fronts"] = front_figure(comparison.fronts, reference=reference.front, truth_name=name)
     # A failed run attains nothing, as an empty front does.
-    nothing = ground.known[:0]
-    runs = {solver: [*fronts, *[nothing] * ground.failures.get(solver, 0)] for solver, fronts in ground.fronts.items()}
-    if len(ground.known.goals) == 2:
+    nothing = comparison.known[:0]
+    runs = {solver: [*fronts, *[nothing] * comparison.failures.get(solver, 0)] for solver, fronts in comparison.fronts.items()}
+    if len(comparison.known.goals) == 2:
         surfaces = {solver: attainment(fronts) for solver, fronts in runs.items() if any(map(len, fronts))}
         if surfaces:
-            found["attainment"] = attainment_figure(surfaces, goals=ground.known.goals, reference=reference.front, truth_name=name)
+            found["attainment"] = attainment_figure(surfaces, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     for indicator, larger in (("IGD", False), ("hypervolume", True)):
         for axis, (_, label) in AXES.items():
-            told = histories(ground, reference, indicator, axis)
+            told = histories(comparison, reference, indicator, axis)
             if told:
                 stem = f"{indicator.lower()}-over-{axis.replace(' ', '-')}"
                 found[stem] = convergence_figure(told, xlabel=label, ylabel=f"{indicator} (normalised)", larger=larger, log=not larger)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from ..measures.statistics import Comparison, overall, pairwise, summarise
+from ..measures.statistics import PairTest, overall, pairwise, summarise
 from .tables import Cell, Column, Table, table
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]
@@ -40,7 +40,7 @@ def comparison_table(
 ) -> Table:
     """A row for each indicator and pair of solvers: p, p after Holm's correction, effect, and which of the two is better if any."""
     rows: list[list[Cell]] = []
-    found: list[Comparison] = []
+    found: list[PairTest] = []
     for indicator, solvers in samples.items():
         for c in pairwise(solvers, paired=paired, larger=indicator in larger):
             found.append(c)
@@ -68,5 +68,5 @@ def overall_table(
     return table(["indicator", "statistic", "p", *(f"rank of {name}" for name in names)], rows, caption, [told, *notes])
 
 
-def _better(c: Comparison, alpha: float = 0.05) -> str:
+def _better(c: PairTest, alpha: float = 0.05) -> str:
     return "neither" if c.p_holm > alpha else c.first if c.a12 > 0.5 else c.second

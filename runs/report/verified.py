@@ -13,7 +13,7 @@ from macs.front import Front
 from macs.fronts.simulated import best, judged
 
 from ..batch.file import told
-from ..batch.store import Run
+from ..batch.store import StoredRun
 from ..measures.simulation_record import Ends, ends, record
 from ..measures.statistics import summarise
 from .tables import Cell, Table, table
@@ -39,7 +39,7 @@ class Verified:
     held: int
 
     @classmethod
-    def of(cls, run: Run, tolerance: float | None) -> Verified:
+    def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
         """Of a finished run, of a study that verifies within a tolerance or not at all.
 
         Points whose flights are not in the run's record are flown now. Raises ValueError if they cannot be, as their problem is not found.

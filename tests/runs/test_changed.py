@@ -14,7 +14,7 @@ from problems import Problem
 from runs import Study
 from runs.batch.store import Store
 from runs.report.changed_data import FLOWN, MANY, Changed, changed_figure, changes
-from runs.report.comparison import grounds
+from runs.report.comparison import comparisons
 from runs.report.report import report
 
 CART = '''
@@ -68,7 +68,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def changed(folder) -> Changed:
-    (found,) = changes(grounds(Store.open(folder), {}), "light")
+    (found,) = changes(comparisons(Store.open(folder), {}), "light")
     return found
 
 
@@ -144,10 +144,10 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
         nominal="2",
     )
     study.run(tmp_path / "out")
-    (found,) = changes(grounds(Store.open(tmp_path / "out"), {}), "2")
+    (found,) = changes(comparisons(Store.open(tmp_path / "out"), {}), "2")
     figure = changed_figure(found.changes[0])
     assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
-    alone = [ground for ground in grounds(Store.open(tmp_path / "out"), {}) if ground.problem == "2"]
+    alone = [comparison for comparison in comparisons(Store.open(tmp_path / "out"), {}) if comparison.problem == "2"]
     assert [one.figures() for one in changes(alone, "2")] == [{}], "nothing to draw as long as there is only the nominal front"
     marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == FLOWN["mfc"]]
     assert len(marks) == 1 and len(marks[0].get_xdata()) == len(found.changes[0].nominal)
@@ -172,7 +172,7 @@ def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_p
         study = Study("gliders", problems=problems, solvers=Plain(), evaluations=20, runs=1, seed=1, nominal="one")
         out = tmp_path / "-".join(problems)
         study.run(out)
-        (found,) = changes(grounds(Store.open(out), {}), "one")
+        (found,) = changes(comparisons(Store.open(out), {}), "one")
         assert found.figures() == {} and "changed-data-points" not in found.tables()
         return found.tables()["changed-data"].text()
 
@@ -181,7 +181,7 @@ def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_p
 
 
 def test_nothing_without_a_nominal_problem(folder):
-    assert changes(grounds(Store.open(folder), {}), None) == []
+    assert changes(comparisons(Store.open(folder), {}), None) == []
 
 
 @pytest.mark.parametrize(

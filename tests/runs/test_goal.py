@@ -13,9 +13,9 @@ from macs import Front
 from problems.compiled import Objective
 from runs import Study
 from runs.batch.cells import Cell
-from runs.batch.store import Run
+from runs.batch.store import StoredRun
 from runs.cli import main
-from runs.report.comparison import Ground
+from runs.report.comparison import Comparison
 from runs.report.goal import Attained, Goal, attained
 from runs.report.report import report
 
@@ -25,18 +25,18 @@ RANGE = {"objective": "range", "best": 50.0, "worst": 0.0, "shares": [0.5, 1.0]}
 COUNTS = [10, 20, 30]
 
 
-def run(number: int, *F, transcription: str = "coarse", seconds: float = 1.0) -> Run:
+def run(number: int, *F, transcription: str = "coarse", seconds: float = 1.0) -> StoredRun:
     """One whose archive was F at `COUNTS`."""
     cell = Cell("p", transcription, "s", 30, {})
     history = {"evaluations": COUNTS[: len(F)], "F": [list(map(list, rows)) for rows in F]}
-    return Run(
+    return StoredRun(
         cell, number, 0, "finished", message="", traceback="", wall_time=seconds, history=history, flown={}, path=Path(f"{number}.nc")
     )
 
 
-def ground(*runs: Run, failed: int = 0, transcription: str = "coarse") -> Ground:
+def comparison(*runs: StoredRun, failed: int = 0, transcription: str = "coarse") -> Comparison:
     front = Front(F=[], decision=[], violation=[], status=[], goals=GOALS)
-    return Ground("p", transcription, {"s": runs}, {"s": [front] * len(runs)}, {}, {"s": failed}, {"s": 0})
+    return Comparison("p", transcription, {"s": runs}, {"s": [front] * len(runs)}, {}, {"s": failed}, {"s": 0})
 
 
 RUNS = (
@@ -68,24 +68,24 @@ def test_of_the_best_so_far_from_the_first_feasible_point_on():
 
 
 def test_the_table_says_what_the_median_run_attained_and_when():
-    (found,) = attained([ground(*RUNS)], COST, None)
+    (found,) = attained([comparison(*RUNS)], COST, None)
     (row,) = rows(found)
     assert (row["transcription"], row["solver"], row["runs"]) == ("coarse", "s", "3")
     # In the end 0.75, 0.875 and 1; quartiles are linear between them. Medians are 0, 0.75 and 0.875.
     assert [float(row[key]) for key in ("median attained", "lower quartile", "upper quartile")] == [0.875, 0.8125, 0.9375]
     assert (row["evaluations to 0.9"], row["evaluations to 0.95"], row["time of a run [s]"]) == ("", "", "2.0")
-    (found,) = attained([ground(*RUNS)], COST | {"shares": [0.0001, 0.75, 0.8]}, None)
+    (found,) = attained([comparison(*RUNS)], COST | {"shares": [0.0001, 0.75, 0.8]}, None)
     (row,) = rows(found)
     assert [row[f"evaluations to {share}"] for share in ("0.0001", "0.75", "0.8")] == ["20", "20", "30"]
 
 
 def test_failed_runs_attain_nothing():
-    (found,) = attained([ground(*RUNS, failed=3)], COST, None)
+    (found,) = attained([comparison(*RUNS, failed=3)], COST, None)
     (row,) = rows(found)
     assert row["runs"] == "6" and row["median attained"] == "" and row["upper quartile"] != "" and row["lower quartile"] == ""
-    (found,) = attained([ground(*RUNS, failed=2)], COST, None)
+    (found,) = attained([comparison(*RUNS, failed=2)], COST, None)
     assert float(rows(found)[0]["median attained"]) == 0.75
-    beside = Ground("p", "coarse", {"t": (), "s": RUNS}, {"t": [], "s": ground(*RUNS).every}, {}, {"t": 2}, {})
+    beside = Comparison("p", "coarse", {"t": (), "s": RUNS}, {"t": [], "s": comparison(*RUNS).every}, {}, {"t": 2}, {})
     (found,) = attained([beside], COST, None)
     assert [(row["runs"], row["median attained"], row["time of a run [s]"]) for row in rows(found)] == [
         ("2", "", ""),
@@ -100,7 +100,7 @@ def test_what_holds_as_flown_stands_beside_in_studies_that_verify():
         return Front(F=F, decision=[np.empty(0)] * n, violation=[0.0] * n, status=["converged"] * n, goals=GOALS)
 
     for fronts, median in (([held(8.0, 6.0), held(), held(10.0)], "0.0"), ([held(8.0), held(), held()], "")):
-        here = Ground("p", "coarse", {"s": RUNS}, {"s": fronts}, {}, {"s": 0}, {"s": 0})
+        here = Comparison("p", "coarse", {"s": RUNS}, {"s": fronts}, {}, {"s": 0}, {"s": 0})
         (found,) = attained([here], COST, 0.01)
         assert [row["median as flown"] for row in rows(found)] == [median]
         assert "that hold" in str(found.tables())
@@ -110,7 +110,7 @@ def test_what_holds_as_flown_stands_beside_in_studies_that_verify():
 
 def test_a_line_for_each_transcription_from_where_the_median_run_has_something():
     late = [run(k, [], [(6, 0)], [(4, 0)], transcription="fine") for k in (1, 2, 3)]
-    (found,) = attained([ground(*RUNS), ground(*late, transcription="fine")], COST, None)
+    (found,) = attained([comparison(*RUNS), comparison(*late, transcription="fine")], COST, None)
     ((name, figure),) = found.figures().items()
     (ax,) = figure.axes
     assert name == "p-goal-attainment" and ax.get_xlabel() == "evaluations" and "goal attainment of cost" in ax.get_ylabel()
@@ -121,11 +121,11 @@ def test_a_line_for_each_transcription_from_where_the_median_run_has_something()
 
 
 def test_each_problem_for_itself_and_nothing_without_a_goal():
-    other = Ground("q", "coarse", {"s": RUNS[:1]}, {"s": [ground(*RUNS).known]}, {}, {}, {"s": 0})
-    found = attained([ground(*RUNS), other], COST, None)
+    other = Comparison("q", "coarse", {"s": RUNS[:1]}, {"s": [comparison(*RUNS).known]}, {}, {}, {"s": 0})
+    found = attained([comparison(*RUNS), other], COST, None)
     assert [one.problem for one in found] == ["p", "q"]
-    assert attained([ground(*RUNS)], None, None) == []
-    assert attained([ground(run(1))], COST, None) == []
+    assert attained([comparison(*RUNS)], None, None) == []
+    assert attained([comparison(run(1))], COST, None) == []
 
 
 GLIDERS = """

@@ -17,7 +17,7 @@ from runs.batch.store import Store
 from runs.cli import main
 from runs.execution.task import Outcome
 from runs.measures.references import look_up
-from runs.report.comparison import grounds
+from runs.report.comparison import comparisons
 from runs.report.published import check, published_tables
 from runs.report.report import _plain, _Writer, report
 from runs.report.tables import table
@@ -109,10 +109,10 @@ def test_volumes_and_objectives_beside_published_ones(folder, told):
 
 
 def test_solvers_without_a_point_are_named_where_they_have_no_statistics(folder):
-    (ground,) = grounds(Store.open(folder), {})
-    fronts = {"one": ground.fronts["one"], "lost": [ground.known[:0]] * 2, "worse": [ground.known[:0]], "crashed": []}
+    (comparison,) = comparisons(Store.open(folder), {})
+    fronts = {"one": comparison.fronts["one"], "lost": [comparison.known[:0]] * 2, "worse": [comparison.known[:0]], "crashed": []}
     paper = {"of": "objectives", "rows": [{**ROW, "statistic": "mean", "distance": 7.0}]}
-    text = published_tables([replace(ground, fronts=fronts, failures={})], [paper])["published"].text()
+    text = published_tables([replace(comparison, fronts=fronts, failures={})], [paper])["published"].text()
     assert "divisor n - 1. No run of lost, worse has a point that counts." in text
 
 
@@ -123,18 +123,18 @@ def staircase(points: np.ndarray) -> float:
 
 
 def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
-    ground = grounds(Store.open(folder), {})[0]
-    assert ground.reference(None).what == ground.reference("union").what == "the union of 4 runs"
+    comparison = comparisons(Store.open(folder), {})[0]
+    assert comparison.reference(None).what == comparison.reference("union").what == "the union of 4 runs"
     file = tmp_path / "truth.csv"
     file.write_text("time [s],distance [km]\n1,3\n5,15\n")
-    assert ground.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
-    assert ground.reference({"glide": str(file)}).what == str(file)
+    assert comparison.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
+    assert comparison.reference({"glide": str(file)}).what == str(file)
     assert look_up("goddard", "glide", "", {}, load("goddard").compile().goals).true
     assert not look_up("reentry_case1", "glide", "", {}, load("reentry_case1").compile().goals).true, "gradients found it, locally"
     with pytest.raises(ValueError, match="a problem that a script states"):
-        ground.reference("truth")
+        comparison.reference("truth")
     with pytest.raises(FileNotFoundError):
-        ground.reference("nowhere.csv")
+        comparison.reference("nowhere.csv")
 
 
 def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
@@ -239,7 +239,7 @@ def test_every_problem_of_a_published_table_is_looked_at():
 
 def test_problems_without_finished_runs_are_left_out_of_published_tables(folder):
     rows = [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]
-    found = published_tables(grounds(Store.open(folder), {}), [{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}])
+    found = published_tables(comparisons(Store.open(folder), {}), [{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}])
     assert "dive" not in found["published"].text() and "glide" in found["published"].text()
 
 

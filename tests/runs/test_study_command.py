@@ -13,8 +13,8 @@ from problems.cases.reentry import case1
 from problems.cases.reentry.vehicle import MASS
 from runs import Study
 from runs.batch import file as studyfile
+from runs.batch.display import StudyDisplay
 from runs.batch.store import Store
-from runs.batch.watching import Watch
 from runs.cli import main
 from runs.execution.task import Outcome
 from transcription import SingleShooting, parse
@@ -212,7 +212,7 @@ def test_a_terminal_sees_the_runs_that_are_going_on(here):
     with Store.claim("out", study.definition()) as store:
         runs = list(store.runs())
     stream = Terminal()
-    with Watch("gliders", runs, runs, shown=True, stream=stream) as watch:
+    with StudyDisplay("gliders", runs, runs, shown=True, stream=stream) as watch:
         watch.reporter(runs[1])(40, 1.0)
         watch.ended(runs[0], Outcome("crashed", "ValueError: no [such] thing"))
     said = stream.getvalue()

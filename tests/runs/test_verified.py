@@ -15,7 +15,7 @@ from macs import MACS, NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.comparison import grounds
+from runs.report.comparison import comparisons
 from runs.report.published import check, published_tables
 
 ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
@@ -56,11 +56,11 @@ def folder(tmp_path_factory) -> Path:
 
 
 def test_only_what_holds_counts_and_as_it_is_flown(folder):
-    ground = grounds(Store.open(folder), {})[0]
+    comparison = comparisons(Store.open(folder), {})[0]
     problem = braking()
     claimed = held = 0
-    for solver, runs in ground.runs.items():
-        for run, front, verified in zip(runs, ground.fronts[solver], ground.verified[solver], strict=True):
+    for solver, runs in comparison.runs.items():
+        for run, front, verified in zip(runs, comparison.fronts[solver], comparison.verified[solver], strict=True):
             flown = Front.load(run.path, problem).simulate(tolerance=0.01)
             best = Front.merge([flown])
             np.testing.assert_allclose(front.F, best.F, rtol=1e-9)
@@ -75,18 +75,18 @@ def test_only_what_holds_counts_and_as_it_is_flown(folder):
 def test_the_report_says_how_many_were_claimed(folder):
     text = str(study().report(folder, figures=False))
     assert "what was claimed, and what holds" in text and "flown by DOP853" in text
-    ground = grounds(Store.open(folder), {})[0]
+    comparison = comparisons(Store.open(folder), {})[0]
     with (folder / "report" / "braking-dfet-1x2-claims.csv").open() as file:
         rows = {row["solver"]: row for row in csv.DictReader(file)}
-    for solver, runs in ground.verified.items():
+    for solver, runs in comparison.verified.items():
         assert int(rows[solver]["points claimed"]) == sum(one.claimed for one in runs)
         assert int(rows[solver]["hold as flown"]) == sum(one.held for one in runs)
 
 
 def test_published_ends_and_feasibility_beside_ours(folder):
     study().report(folder, figures=False)
-    ground = grounds(Store.open(folder), {})[0]
-    x = np.concatenate([one.ends["run"]["x"] for one in ground.verified["nsga2"]])
+    comparison = comparisons(Store.open(folder), {})[0]
+    x = np.concatenate([one.ends["run"]["x"] for one in comparison.verified["nsga2"]])
     with (folder / "report" / "published-1.csv").open() as file:
         rows = {(row["by"], row["statistic"]): row for row in csv.DictReader(file)}
     assert rows["the paper", "mean"]["miss [cm]"] == "5.0"
@@ -94,19 +94,19 @@ def test_published_ends_and_feasibility_beside_ours(folder):
         assert float(rows["nsga2, dfet:1x2", statistic]["miss [cm]"]) == pytest.approx(value(100 * np.abs(x - 2.0)), rel=1e-9)
     with (folder / "report" / "published-2.csv").open() as file:
         rows = {row["by"]: list(row.values()) for row in csv.DictReader(file)}
-    told = [run.front.stats["population"] for run in ground.runs["nsga2"]]
+    told = [run.front.stats["population"] for run in comparison.runs["nsga2"]]
     ours = rows["nsga2, dfet:1x2"]
     assert float(ours[3]) == np.mean([one["first_feasible"] for one in told]) and ours[5] == "0"
     assert float(ours[-2]) == np.mean([one["nondominated"] for one in told])
-    assert float(ours[-1]) == np.mean([len(front) for front in ground.fronts["nsga2"]])
+    assert float(ours[-1]) == np.mean([len(front) for front in comparison.fronts["nsga2"]])
     assert "macs, dfet:1x2" not in rows, "it has no population"
 
 
 def test_without_flights_points_are_what_the_solver_says(tmp_path):
     given = study(verify=None)
     given.run(tmp_path / "out", executor=Inline())
-    ground = grounds(Store.open(tmp_path / "out"), {})[0]
-    for run, verified in zip(ground.runs["macs"], ground.verified["macs"], strict=True):
+    comparison = comparisons(Store.open(tmp_path / "out"), {})[0]
+    for run, verified in zip(comparison.runs["macs"], comparison.verified["macs"], strict=True):
         np.testing.assert_array_equal(verified.front.F, run.front.F)
         np.testing.assert_array_equal(verified.ends["run"]["x"], [p.trajectory["run"].edge_states[-1, 0] for p in run.front])
     assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")
@@ -166,7 +166,7 @@ def test_ends_that_make_no_sense_are_refused(ends, message):
 def test_a_state_that_does_not_exist_is_named(folder):
     paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean"}]}
     with pytest.raises(ValueError, match="unknown state 'y'; there are x, v"):
-        published_tables(grounds(Store.open(folder), {}), [paper])
+        published_tables(comparisons(Store.open(folder), {}), [paper])
 
 
 def test_where_nothing_is_found_the_report_says_so(tmp_path):
