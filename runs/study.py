@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from problems.checks import check_count, check_positive
 from transcription import Smooth
 
 from .batch import cells as combining
 from .batch import file as studyfile
 from .batch.cells import Cell
-from .batch.file import INNER, check_inner, sampling, written
 from .batch.store import Store, StoredRun, Summary
+from .batch.terms import INNER, check_inner, sampling, written
+from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .execution.task import Payload, Task
-from .measures.references import check_reference
+from .measures.references import ReferenceKey, check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
-from .report.published import check as check_paper
-from .report.published import check_against
+from .report.published import check_against, papers
 
 if TYPE_CHECKING:
     from .report.report import Report
 
 QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
+
+
+def _key(kind: Any = Any, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
+    """The metadata of a field of `Study` that is a key of study files.
+
+    Parameters
+    ----------
+    kind : type
+        Of its values, see `checked`. `Any` if another check follows.
+    decides : bool
+        Whether it decides the runs' numbers, so that it must not change between two calls on one folder.
+    record : callable or None
+        Makes its value plain data for the study's record; None if the cells contain it.
+    """
+    return {"kind": kind, "decides": decides, "record": record}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +98,9 @@ class Study:
         Whether reports show the flights that stand for each front.
     note : str
         What readers of the report should know beforehand.
+    trust : bool
+        Whether a report loads addresses that the study's folder names and that are not in the catalogue; see `load`. A study stated in
+        Python is the user's own words, so it does.
 
     Raises
     ------
@@ -91,27 +108,28 @@ class Study:
         Whatever does not make sense, before any work; the message names it.
     """
 
-    name: str
+    name: str = field(metadata=_key(Text, decides=True))
     _: KW_ONLY
-    problems: Any
-    transcriptions: Any = None
-    solvers: Any
-    terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    evaluations: Any = None
-    runs: int
-    seed: int
-    reference: Any = None
-    inner: str | None = None
-    tolerance: float = 1e-6
-    start: Any = None
-    verify: float | None = None
-    time_limit: float | None = None
-    description: str = ""
-    paper: Sequence[Mapping[str, Any]] = ()
-    goal: Mapping[str, Any] | None = None
-    nominal: str | None = None
-    flights: bool = True
-    note: str = ""
+    problems: Any = field(metadata=_key(record=None))
+    transcriptions: Any = field(metadata=_key(record=None), default=None)
+    solvers: Any = field(metadata=_key(record=None))
+    terms: Mapping[str, Mapping[str, Any]] = field(metadata=_key(record=None), default_factory=dict)
+    evaluations: Any = field(metadata=_key(record=None), default=None)
+    runs: int = field(metadata=_key(Count))
+    seed: int = field(metadata=_key(Natural, decides=True))
+    reference: Any = field(metadata=_key(ReferenceKey), default=None)
+    inner: str | None = field(metadata=_key(decides=True, record=lambda inner: inner or INNER), default=None)
+    tolerance: float = field(metadata=_key(Positive, decides=True), default=1e-6)
+    start: Any = field(metadata=_key(decides=True, record=written), default=None)
+    verify: float | None = field(metadata=_key(Positive | None, decides=True), default=None)
+    time_limit: float | None = field(metadata=_key(Positive | None), default=None)
+    description: str = field(metadata=_key(Text), default="")
+    paper: Sequence[Mapping[str, Any]] = field(metadata=_key(), default=())
+    goal: Mapping[str, Any] | None = field(metadata=_key(), default=None)
+    nominal: str | None = field(metadata=_key(), default=None)
+    flights: bool = field(metadata=_key(Flag), default=True)
+    note: str = field(metadata=_key(Text), default="")
+    trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
@@ -120,7 +138,7 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(f"study: name must be a word, not {self.name!r}")
-        with studyfile.told(f"study '{self.name}'"):
+        with errors_begin_with(f"study '{self.name}'"):
             self._check_values()
             combined = combining.combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
@@ -139,17 +157,27 @@ class Study:
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
     @classmethod
-    def load(cls, source: str | PathLike[str]) -> Study:
+    def load(cls, source: str | PathLike[str], trust: bool = False) -> Study:
         """The study in a TOML file, or one that comes with the project, by name.
+
+        Parameters
+        ----------
+        source : path or str
+        trust : bool
+            Whether addresses of code in the file, and in its folder, may be loaded that are not in the catalogue: that runs the code.
 
         Raises
         ------
         ValueError
-            There is no such study, the file is not TOML, or a key or value in it makes no sense; the message names it.
+            There is no such study, the file is not TOML, a key or value in it is wrong, or an address in it is not trusted; the message
+            names it.
         """
-        given = studyfile.read(source)
-        with studyfile.told(str(source)):
-            return cls(**given)
+        stated = studyfile.read(source, [key.name for key in _KEYS], trust)
+        with errors_begin_with(str(source)):
+            for key in _KEYS:
+                if key.name not in stated and key.default is MISSING and key.default_factory is MISSING:
+                    raise ValueError(f"{key.name} is missing")
+            return cls(**stated, trust=trust)
 
     def run(
         self,
@@ -213,7 +241,7 @@ class Study:
         from .report.report import report
 
         Store.open(out).check(self.definition())
-        return report(out, foreign=foreign, figures=figures, progress=progress)
+        return report(out, foreign=foreign, figures=figures, progress=progress, trust=self.trust)
 
     def inner_of(self, cell: Cell) -> str:
         """The inner level of a cell's runs, by name."""
@@ -241,23 +269,11 @@ class Study:
         return replace(self, name=f"{self.name}-quick", runs=runs, evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:
-        """All that decides the numbers, and what reports print, as plain data."""
+        """The study as plain data: the value of each key, the cells, and under "decides" the keys that decide the numbers."""
+        recorded = {one.name: one.metadata for one in _KEYS if one.metadata["record"] is not None}
         return {
-            "name": self.name,
-            "description": self.description,
-            "seed": int(self.seed),
-            "runs": int(self.runs),
-            "inner": self.inner or INNER,
-            "tolerance": float(self.tolerance),
-            "start": written(self.start),
-            "verify": self.verify,
-            "time_limit": self.time_limit,
-            "reference": studyfile.plain(self.reference),
-            "paper": studyfile.plain(self.paper),
-            "goal": studyfile.plain(self.goal),
-            "nominal": self.nominal,
-            "flights": self.flights,
-            "note": self.note,
+            **{name: key["record"](getattr(self, name)) for name, key in recorded.items()},
+            "decides": [name for name, key in recorded.items() if key["decides"]],
             "cells": [cell.to_dict() for cell in self.cells],
         }
 
@@ -280,18 +296,12 @@ class Study:
         return {**cell.terms, **self.terms.get(cell.solver, {})}
 
     def _check_values(self) -> None:
-        check_count("runs", self.runs, 1)
-        check_count("seed", self.seed, 0)
-        check_positive("tolerance", self.tolerance)
-        for name in ("time_limit", "verify"):
-            if getattr(self, name) is not None:
-                check_positive(name, getattr(self, name))
+        for key in _KEYS:
+            checked(getattr(self, key.name), key.metadata["kind"], key.name)
         sampling(self.start)
         if self.inner is not None:
             check_inner(self.inner)
-        check_paper(self.paper)
-        if not isinstance(self.flights, bool):
-            raise ValueError(f"flights must be True or False, not {self.flights!r}")
-        for name in ("description", "note"):
-            if not isinstance(getattr(self, name), str):
-                raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")
+        papers(self.paper)
+
+
+_KEYS = tuple(one for one in fields(Study) if one.metadata)

@@ -20,9 +20,9 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from transcription import Transcription, parse, word
 
+from ..data.schema import errors_begin_with, plain
 from ..execution.task import Payload
-from .file import check as check_terms
-from .file import of_problem, plain, told
+from .terms import check_terms, terms_of_problem
 
 
 def combine(
@@ -46,13 +46,13 @@ def combine(
     own_budgets = {}
     for label, given in terms.items():
         if "evaluations" in given:
-            with told(f"terms of '{label}'"):
+            with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
     combined = []
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
-        with told(f"problems: '{label}'"):
-            theirs = of_problem(problem, inner, start)
+        with errors_begin_with(f"problems: '{label}'"):
+            theirs = terms_of_problem(problem, inner, start)
         common = [one for one in methods if "transcription" not in terms.get(one, {})]
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         offered += [
@@ -68,7 +68,7 @@ def combine(
                 budget = own_budgets.get(method_label, budgets)[label]
                 own |= {"evaluations": budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
-                with told(place):
+                with errors_begin_with(place):
                     method.check_objectives(len(compiled.goals))
                     method.check_transcription(scheme, compiled)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
@@ -131,12 +131,12 @@ def _problem(label: str, given: Any) -> Problem | CompiledProblem:
         return name
     if not isinstance(name, str):
         raise ValueError(f"problems: '{label}' must be a name, a Problem, or a table with its name as problem = ..., not {given!r}")
-    with told("problems", anything=f"'{name}' does not load"):
+    with errors_begin_with("problems", anything=f"'{name}' does not load"):
         return load(name, **data)
 
 
 def _compiled(label: str, problem: Problem | CompiledProblem) -> CompiledProblem:
-    with told("problems", anything=f"'{label}' is stated wrongly"):
+    with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
         return problem.compile() if isinstance(problem, Problem) else problem
 
 
@@ -161,7 +161,7 @@ def _named_schemes(given: Any) -> dict[str, Transcription]:
 
 def _scheme(label: str, given: Any) -> Transcription:
     if isinstance(given, str):
-        with told("transcriptions"):
+        with errors_begin_with("transcriptions"):
             return parse(given)
     if not isinstance(given, Transcription):
         raise ValueError(f"transcriptions: '{label}' must be a word such as dfet:4x6 or a Transcription, not {given!r}")
@@ -175,7 +175,7 @@ def _solver(label: str, given: Any) -> Solver:
     name = settings.pop("solver", None)
     if not isinstance(name, str):
         raise ValueError(f"solvers: '{label}' must be a name, a Solver, or a table with its name as solver = \"macs\", not {given!r}")
-    with told("solvers"):
+    with errors_begin_with("solvers"):
         return catalogue.solver(name, **settings)
 
 
@@ -282,11 +282,6 @@ class Cell:
         """As plain data, for the study's record."""
         names = {"problem": self.problem, "transcription": self.transcription, "solver": self.solver, "folder": self.folder}
         return names | {"evaluations": self.evaluations, "details": dict(self.details)}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Cell:
-        """From what `to_dict` gave."""
-        return cls(data["problem"], data["transcription"], data["solver"], data["evaluations"], data["details"])
 
     def _digest(self) -> bytes:
         return hashlib.sha256(json.dumps(self.labels).encode()).digest()

@@ -60,6 +60,9 @@ TRANSCRIPTION = (
 )
 
 
+TRUST = "load problems and references that the files name by address, outside the catalogue: this runs their code"
+
+
 class Parser(argparse.ArgumentParser):
     """One line for a wrong call, not a page of usage."""
 
@@ -194,10 +197,12 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
     run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
+    run.add_argument("--trust", action="store_true", help=TRUST)
     status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
     status.add_argument("folder", metavar="DIR")
     report = _add(actions, "report", "tables, statistics and figures of what there is, in DIR/report")
     report.add_argument("folder", metavar="DIR")
+    report.add_argument("--trust", action="store_true", help=TRUST)
     report.add_argument("--no-figures", action="store_true", help="tables only, which is quicker")
     report.add_argument(
         "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"

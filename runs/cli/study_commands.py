@@ -25,7 +25,7 @@ def run(arguments: Namespace) -> int:
     if arguments.dask and arguments.jobs:
         raise WrongCall("--jobs is for this machine, --dask for a cluster: give one of them")
     with refused():
-        batch = Study.load(arguments.study)
+        batch = Study.load(arguments.study, trust=arguments.trust)
         batch = batch if arguments.runs is None else replace(batch, runs=arguments.runs)
         batch = batch.quick() if arguments.quick else batch
     out = Path(arguments.out or Path("out") / batch.name)
@@ -70,7 +70,7 @@ def report(arguments: Namespace) -> int:
         foreign.setdefault(name, []).append(path)
     try:
         with refused():
-            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True)
+            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True, trust=arguments.trust)
     except Stopped:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED

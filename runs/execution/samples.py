@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from macs.io.atomic import write_whole
+
+from ..data import records
+from ..data.schema import checked
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30
@@ -20,6 +22,19 @@ log = logging.getLogger(__name__)
 
 Report = Callable[[int, float], Any]
 """Called now and then with evaluations and seconds spent so far."""
+
+
+class History(TypedDict, total=False):
+    """How a run converged, by columns with an entry for each sample; empty if it is not known.
+
+    Keys are its costs so far, "elapsed" seconds, and "F": the objectives (k, m) of its archive, all minimised.
+    """
+
+    evaluations: list[int]
+    inner_iterations: list[int]
+    gradient_solves: list[int]
+    elapsed: list[float]
+    F: list[list[list[float]]]
 
 
 class Samples:
@@ -36,12 +51,12 @@ class Samples:
     Attributes
     ----------
     columns : dict
-        "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample; see `work.Outcome`.
+        The columns of its `History`.
     """
 
     def __init__(self, budget: int, report: Report | None = None, path: Path | None = None) -> None:
         self._step, self._next, self._report, self._told, self._path = max(1, budget // NUMBER), 0, report, 0.0, path
-        self.columns: dict[str, list[Any]] = {key: [] for key in (*COUNTS, "elapsed", "F")}
+        self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
         self._before, self._behind = _read(path), False
 
     def note(self, progress: Any) -> None:
@@ -65,6 +80,11 @@ class Samples:
         self.columns["elapsed"].append(float(elapsed))
         self.columns["F"].append(F.tolist())
 
+    @property
+    def history(self) -> History:
+        """The columns."""
+        return History(**self.columns)  # type: ignore[typeddict-item]
+
     def _take_up(self, evaluations: int) -> None:
         """At first: what was noted before this count."""
         if self._before is None:
@@ -77,16 +97,21 @@ class Samples:
     def _write(self) -> None:
         assert self._path is not None
         try:
-            write_whole(self._path, json.dumps(self.columns).encode())
+            write_whole(self._path, records.to_bytes(self.columns))
             self._behind = False
         except OSError as error:  # as for a checkpoint: no reason to stop, and the next time it may be possible
             log.warning("%s", error)
 
 
 def _read(path: Path | None) -> dict[str, list[Any]] | None:
-    """What a file holds; None if there is none, or it is damaged: then the history begins where the run goes on."""
-    try:
-        columns = None if path is None else json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    """The columns in a file; None if there is none, or it is damaged: then the history begins where the run is resumed."""
+    if path is None or not path.exists():
         return None
-    return columns if isinstance(columns, dict) and columns.keys() == {*COUNTS, "elapsed", "F"} else None
+    try:
+        columns = checked(records.from_bytes(path.read_bytes()), History)
+        if columns.keys() != History.__annotations__.keys():
+            raise ValueError(f"it has {', '.join(columns)}")
+    except (OSError, ValueError) as error:
+        log.warning("'%s' is damaged, so the history of its run is not complete: %s", path, error)
+        return None
+    return columns

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from macs.solvers.checkpoint import Unreadable, keeps
 
-from ..measures.simulation_record import record
-from .samples import Report, Samples
+from ..measures.simulation_record import SimulationRecord, record
+from .samples import History, Report, Samples
 
 if TYPE_CHECKING:
     from macs.front import Front
@@ -65,8 +65,8 @@ class Outcome:
     history : dict
         "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
         minimised. The last sample is the front itself.
-    flown : dict
-        If the points of the front were to be flown: see `flown.record`.
+    simulated : dict
+        If the points of the front were to be simulated: see `simulation_record.record`.
     """
 
     status: str
@@ -74,8 +74,8 @@ class Outcome:
     traceback: str = field(default="", repr=False)
     front: bytes = field(default=b"", repr=False)
     wall_time: float = 0.0
-    history: dict[str, list[Any]] = field(default_factory=dict, repr=False)
-    flown: dict[str, Any] = field(default_factory=dict, repr=False)
+    history: History = field(default_factory=History, repr=False)
+    simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 
 def perform(task: Task, report: Report | None = None) -> Outcome:
@@ -94,8 +94,8 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         samples.add(front.stats, front.stats["wall_time"], front.F)
         # What was spent before it was taken up again is known to the front alone.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
-        flights = _flown(task, front)
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=flights)
+        found = _simulated(task, front)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.history, simulated=found)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
@@ -131,14 +131,14 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
             return front, samples
 
 
-def _flown(task: Task, front: Front) -> dict[str, Any]:
-    """What the points turn out to be in the air, if that is wanted. If it cannot be found out, the run is none the worse for it."""
+def _simulated(task: Task, front: Front) -> SimulationRecord:
+    """The points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not lost by it."""
     if task.verify is None:
         return {}
     try:
         return record(front, task.verify)
     except Exception:
-        log.warning("the points of a front could not be flown; the report will try again", exc_info=True)
+        log.warning("the points of a front could not be simulated; the report tries again", exc_info=True)
         return {}
 
 

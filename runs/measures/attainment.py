@@ -14,7 +14,7 @@ import numpy as np
 
 from macs.front import Front
 
-from .indicators import Points, extent, minimised, truth
+from .indicators import Points, minimised
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +66,6 @@ class Attainment:
     def worst(self) -> np.ndarray:
         """What all runs attain."""
         return self.of(self.runs)
-
-    def volumes(self, reference: Points, *, known: Front | None = None, point: float = 1.1) -> np.ndarray:
-        """Hypervolume (n,) of each surface, from 1 to n runs, normalised as `runs.hypervolume` has it; 0 of an empty one.
-
-        `known` says the senses of a reference that is an array; without it all columns are minimised.
-        """
-        ideal, unit = extent(truth(reference, known))
-        corner = np.full(len(unit), point)
-        surfaces = [np.ascontiguousarray((self.levels[k] - ideal) / unit) for k in range(1, self.runs + 1)]
-        return np.array([moocore.hypervolume(surface, ref=corner) if len(surface) else 0.0 for surface in surfaces])
 
 
 def attainment(fronts: Sequence[Points]) -> Attainment:

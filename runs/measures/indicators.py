@@ -87,9 +87,6 @@ def hypervolume_at(front: Points, point: Sequence[float]) -> float:
     return float(moocore.hypervolume(np.ascontiguousarray(F), ref=np.multiply(point, signs))) if len(F) else 0.0
 
 
-# Plain distances, for arrays whose senses do not matter
-
-
 def extent(R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ideal (m,) of the rows of R (k, m), minimised, and how far it is from there to their nadir; 1 where all are the same."""
     range_ = np.ptp(R, axis=0)
@@ -100,23 +97,6 @@ def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.nda
     """Points and reference in units of the reference's range."""
     lower, unit = extent(reference)
     return (F - lower) / unit, (reference - lower) / unit
-
-
-def distance_to_curve(F: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Distance of each point (n, 2) to the polygon through the reference (k, 2), in the order given, in units of its range."""
-    points, curve = normalised(F, reference)
-    return _to_segments(points, curve[:-1], np.diff(curve, axis=0))
-
-
-def inverted_distance(F: np.ndarray, reference: np.ndarray, samples: int = SAMPLES) -> float:
-    """Mean distance of the polygon through the reference, sampled evenly along its length, from the nearest point."""
-    points, curve = normalised(F, reference)
-    return mean_distance(_along(curve, samples), points)
-
-
-def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:
-    """Mean distance of the points of the reference (k, m) from the nearest of F (n, m), in the units that they have."""
-    return float(np.linalg.norm(reference[:, None] - F, axis=2).min(axis=1).mean())
 
 
 def minimised(points: Points, known: Front | None, what: str = "the front") -> np.ndarray:

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
@@ -25,6 +26,12 @@ from .indicators import Points, minimised
 
 if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
+
+
+ReferenceKey = Annotated[
+    str | dict[str, str] | None,
+    Meta(description="'union', 'truth', the name of a case, a file, or one of these by problem"),
+]
 
 
 def union(fronts: Sequence[Points]) -> Points:
@@ -246,13 +253,17 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
     return Reference(foreign(closed_form(given), goals, "truth"), f"{what} of {given}", true)
 
 
+def reference_addresses(given: Any) -> list[str]:
+    """The addresses of code in a study's reference."""
+    stated = given.values() if isinstance(given, Mapping) else [given]
+    return [one for one in stated if isinstance(one, str) and one not in ("union", "truth") and Path(one).suffix not in (".nc", ".csv")]
+
+
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
-    for name, one in (given if isinstance(given, Mapping) else dict.fromkeys(stated, given)).items():
+    for name in given if isinstance(given, Mapping) else stated:
         if name not in stated:
             raise ValueError(f"reference: {unknown('problem', name, stated)}")
-        if one is not None and not isinstance(one, str):
-            raise ValueError(f"reference must be 'union', 'truth', the name of a case, a file, or one of these by problem, not {one!r}")
     for name, problem in stated.items():
         try:
             look_up(given, name, problem.address, problem.data, problem.goals)

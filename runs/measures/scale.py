@@ -29,8 +29,6 @@ class Scale:
         What the reference is: "the closed form", "the union of 60 runs".
     count : int
         How many points it has.
-    normalise : bool
-        Whether indicators are in these ranges, or in the objectives' own units.
     curve : bool
         Whether the points of the reference are taken as the curve through them; see `runs.measures.indicators.gd`.
     """
@@ -43,7 +41,6 @@ class Scale:
     units: tuple[str, ...]
     what: str
     count: int
-    normalise: bool = True
     curve: bool = False
 
     @staticmethod
@@ -53,7 +50,6 @@ class Scale:
         like: Front | None = None,
         what: str = "the reference",
         point: float = 1.1,
-        normalise: bool = True,
         curve: bool = True,
     ) -> Scale:
         """What the indicators of `runs.measures.indicators` do with a reference.
@@ -66,7 +62,7 @@ class Scale:
             columns are minimised.
         what : str
             What the reference is, for captions.
-        point, normalise, curve
+        point, curve
             As the indicators were given them.
         """
         known = reference if isinstance(reference, Front) else like
@@ -87,7 +83,6 @@ class Scale:
             units=known.units if known is not None else ("",) * m,
             what=what,
             count=len(R),
-            normalise=normalise,
             curve=curve and bool(pieces(R)),
         )
 
@@ -95,11 +90,9 @@ class Scale:
         """Two sentences for a caption."""
         how = ", the curve through them" if self.curve else ""
         points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
-        if self.normalise:
-            ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
-            volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
-            return f"Objectives normalised to {ends} of {points}. {volume}"
-        return f"Objectives in their own units, against {points}. Hypervolume up to {self._all(self.corner)}."
+        ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
+        volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
+        return f"Objectives normalised to {ends} of {points}. {volume}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, for a file beside the numbers."""

@@ -4,20 +4,65 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+
+from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.fronts.simulated import best, judged
 
 from ..batch.store import Store, StoredRun
+from ..data.schema import errors_begin_with
 from ..execution.task import CRASHED, MEMORY, TIMEOUT
 from ..measures.references import Reference, look_up, union
-from .verified import Verified
+from ..measures.simulation_record import Ends, ends, record
 
 EACH = "each on its own"
 """Name of the transcription where each solver has its own."""
 FAILED = (CRASHED, TIMEOUT, MEMORY)
 """Statuses that count as a failure of the solver. Killed, missing and unreadable runs are no evidence against it: they are left out, and
 the report says how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated, as simulated.
+
+    Attributes
+    ----------
+    front : Front
+        The n points that count.
+    ends : Ends
+        Their states at the end of each phase.
+    claimed, feasible : int
+        Number of points that the solver returned, and of those feasible when simulated, dominated ones included.
+    """
+
+    front: Front
+    ends: Ends
+    claimed: int
+    feasible: int
+
+    @classmethod
+    def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
+        """The points of a finished run of a study that verifies within a tolerance, or with None not at all.
+
+        Points whose simulation is not in the run's record are simulated now. Raises ValueError if they cannot be, as their problem is not
+        found.
+        """
+        front = run.front
+        if tolerance is None or not len(front):
+            return cls(front, ends(front), len(front), len(front))
+        found = run.simulated
+        if np.shape(found.get("F", ())) != front.F.shape or np.shape(found.get("violation", ())) != front.violation.shape:
+            with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
+                found = record(front, tolerance)
+        simulated = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
+        rows = best(simulated)
+        places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
+        return cls(simulated[rows], places, len(front), int((simulated.status == CONVERGED).sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +83,8 @@ class Comparison:
         How many of its runs failed.
     left_out : {solver: int}
         How many other runs have no front.
+    stated : None, str or mapping
+        The reference as the study states it.
     """
 
     problem: str
@@ -47,6 +94,12 @@ class Comparison:
     verified: Mapping[str, Sequence[Verified]]
     failures: Mapping[str, int]
     left_out: Mapping[str, int]
+    stated: Any = None
+
+    @cached_property
+    def against(self) -> Reference:
+        """The reference that the study states, see `reference`."""
+        return self.reference(self.stated)
 
     @property
     def name(self) -> str:
@@ -117,5 +170,5 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
         fronts |= {name: given for name, given in others.items() if all(front.goals == goals for front in given)}
         failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
         left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
-        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out))
+        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out, store.definition.get("reference")))
     return found

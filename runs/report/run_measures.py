@@ -1,4 +1,4 @@
-"""Every run of a comparison in numbers: its indicators in the end and along the way, and what it spent."""
+"""Measures of every run of a comparison: its indicators in the end and over its samples, and its costs."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ INDICATORS: Mapping[str, Callable[..., float]] = {
     "additive epsilon": additive_epsilon,
 }
 CURVED = ("GD", "IGD", "IGD+")
-"""Those that take a dense reference for a curve, unless told not to."""
+"""Indicators that take a dense reference for a curve, unless `curve` is False."""
 AXES: Mapping[str, tuple[str, str]] = {
     "evaluations": ("evaluations", "evaluations"),
     "inner iterations": ("inner_iterations", "inner iterations"),
     "time": ("elapsed", "time [s]"),
 }
-"""What a run spends: where its history has it, and the label of an axis."""
+"""{cost: its column in a history, and the label of its axis}."""
 
 
 def indicator(name: str, points: Front | np.ndarray, reference: Reference, *, curve: bool = True) -> float:
@@ -38,7 +38,7 @@ def indicator(name: str, points: Front | np.ndarray, reference: Reference, *, cu
 
 
 def samples(comparison: Comparison, reference: Reference, *, curve: bool = True) -> dict[str, dict[str, list[float]]]:
-    """Indicator -> solver -> a value for each run, NaN for one that failed."""
+    """{indicator: {solver: a value for each run}}, NaN for a run that failed."""
     return {
         name: {
             solver: [indicator(name, front, reference, curve=curve) for front in fronts] + [np.nan] * comparison.failures.get(solver, 0)
@@ -50,7 +50,7 @@ def samples(comparison: Comparison, reference: Reference, *, curve: bool = True)
 
 
 def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
-    """Cost -> solver -> a value for each finished run."""
+    """{cost: {solver: a value for each finished run}}."""
     keys = {
         "evaluations": "evaluations",
         "inner iterations": "inner_iterations",
@@ -64,12 +64,12 @@ def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
 
 
 def histories(comparison: Comparison, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:
-    """Solver -> of each run whose history is known, what it had spent and the indicator then."""
+    """{solver: histories} of an indicator over a cost, of the runs whose history is known."""
     key, _ = AXES[axis]
     return {
-        solver: told
+        solver: known
         for solver, runs in comparison.runs.items()
-        if (told := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
+        if (known := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
     }
 
 

@@ -79,7 +79,7 @@ def test_quick_studies_keep_the_terms():
     [
         ([], "terms must be a table of tables"),
         ({"mac": {"inner": "ipopt"}}, "terms: there is no solver 'mac'; there are macs, nsga2"),
-        ({"macs": {}}, "terms of 'macs': there must be a table of transcription, evaluations, inner, start"),
+        ({"macs": {}}, "terms of 'macs': it must be a table with transcription, evaluations, inner, start"),
         ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'"),
         ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be"),
         ({"macs": {"evaluations": {"glyde": 40}}}, "terms of 'macs': evaluations: there is no problem 'glyde'"),
