@@ -7,7 +7,7 @@ import math
 import re
 import sys
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -16,6 +16,8 @@ from msgspec import Meta
 
 from problems.checks import unknown
 
+LONGEST = 80
+"""Characters of a value in a message."""
 LARGEST = sys.float_info.max
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST, description="a finite number")]
 Positive = Annotated[float, Meta(gt=0, le=LARGEST, description="a positive number")]
@@ -50,43 +52,31 @@ def checked(value: Any, kind: Any, name: str = "it") -> Any:
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        text, _, path = str(error).partition(" - at `$")
-        raise ValueError(_in_words(text, path.rstrip("`"), data, value, kind, name)) from None
+        raise ValueError(_in_words(str(error), data, kind, name)) from None
 
 
-def _in_words(text: str, path: str, data: Any, value: Any, kind: Any, name: str) -> str:
-    """One line for an error of msgspec at a path such as `.paper[0].point`."""
-    steps = [key or int(index) for key, index in re.findall(r"\.(\w+)|\[(\d+)\]", path)]
-    *_, last = [("", kind, data), *_along(steps, kind, data)]
-    place, kind, data = last
-    known, field = _keys(kind, data), re.search(r"`(\w.*)`$", text)
-    before = f"{place}: " if place else ""
-    if text.startswith("Object contains unknown field") and field:
-        return f"{before}{unknown('key', field[1], known)}"
-    if text.startswith("Object missing required field") and field:
-        tags = _tags(kind)
-        return (
-            f"{before}{field[1]} must be one of {', '.join(tags)}" if field[1] not in known and tags else f"{before}{field[1]} is missing"
-        )
-    if not text.startswith(("Expected", "Invalid")):  # from a `__post_init__`, in words already
-        return f"{before}{text}"
-    whole, _, key = place.rpartition(": ")
-    shown = data if steps else value
-    return f"{whole}{': ' if whole else ''}{key or name} must be {_description(kind)}, not {shown!r}"
-
-
-def _along(steps: Sequence[str | int], kind: Any, data: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Place in words, type and value after each step of a path."""
+def _in_words(error: str, data: Any, kind: Any, name: str) -> str:
+    """One line for an error of msgspec, whose place is a path such as `$.paper[0].point`."""
+    text, _, path = error.partition(" - at `$")
     place = ""
-    for step in steps:
-        if isinstance(step, int):
-            place, kind, data = f"{place} {step + 1}", (get_args(_bare(kind)) or (Any,))[0], data[step]
+    for key, index in re.findall(r"\.(\w+)|\[(\d+|\.\.\.)\]", path):
+        if index == "...":  # the entry of a mapping, whose key msgspec does not name
+            break
+        if index:
+            place, kind, data = f"{place or name} {int(index) + 1}", get_args(_bare(kind))[0], data[int(index)]
         else:
-            member = _member(kind, data)
+            member, tags = _member(kind, data), _tags(kind)
             known = get_type_hints(member, include_extras=True) if isinstance(member, type) else {}
-            kind = known.get(step, Literal[tuple(_tags(kind))] if _tags(kind) else Any)
-            place, data = f"{place}: {step}" if place else step, data.get(step)
-        yield place, kind, data
+            place, kind, data = f"{place}: {key}" if place else key, known.get(key, Literal[tuple(tags)] if tags else Any), data.get(key)
+    before, field = f"{place}: " if place else "", re.search(r"field `(.*)`$", text)
+    if field and "unknown" in text:
+        return f"{before}{unknown('key', field[1], _member(kind, data).__struct_fields__)}"
+    if field:
+        tags = {} if isinstance(_member(kind, data), type) else _tags(kind)
+        return f"{before}{field[1]} {'must be one of ' if tags else 'is missing'}{', '.join(tags)}"
+    if text.startswith(("Expected", "Invalid")):
+        return f"{place or name} must be {_description(kind)}, not {repr(data)[:LONGEST]}"
+    return f"{before}{text}"  # from a `__post_init__`, in words already
 
 
 def _bare(kind: Any) -> Any:
@@ -94,28 +84,22 @@ def _bare(kind: Any) -> Any:
     if get_origin(kind) is Annotated:
         return _bare(get_args(kind)[0])
     if get_origin(kind) in (Union, types.UnionType):
-        left = [one for one in get_args(kind) if one is not type(None)]
-        return _bare(left[0]) if len(left) == 1 else Union[tuple(left)]  # noqa: UP007 - of a tuple
+        members = [one for one in get_args(kind) if one is not type(None)]
+        return _bare(members[0]) if len(members) == 1 else Union[tuple(members)]  # noqa: UP007 - of a list
     return kind
 
 
 def _tags(kind: Any) -> dict[str, Any]:
-    """{tag: table} of a union of tagged tables."""
-    members = [one for one in get_args(_bare(kind)) if isinstance(one, type) and issubclass(one, msgspec.Struct)]
-    return {str(one.__struct_config__.tag): one for one in members}
+    """{tag: section} of a union of tagged sections."""
+    return {str(one.__struct_config__.tag): one for one in get_args(_bare(kind)) if hasattr(one, "__struct_config__")}
 
 
 def _member(kind: Any, data: Any) -> Any:
-    """The table that data is to be, of a union the one that its tag names."""
+    """The section that data is to be: of a union the one that its tag names, if it has one."""
     for tag, member in _tags(kind).items():
         if isinstance(data, Mapping) and data.get(member.__struct_config__.tag_field) == tag:
             return member
     return _bare(kind)
-
-
-def _keys(kind: Any, data: Any) -> tuple[str, ...]:
-    member = _member(kind, data)
-    return getattr(member, "__struct_fields__", ())
 
 
 def _description(kind: Any) -> str:
@@ -124,14 +108,15 @@ def _description(kind: Any) -> str:
     if stated:
         return str(stated[0])
     if get_origin(kind) in (Union, types.UnionType) and type(None) in get_args(kind):
-        return _description(next(one for one in get_args(kind) if one is not type(None)))
+        return _description(get_args(kind)[0])
     bare = _bare(kind)
     if get_origin(bare) is Literal:
         return f"one of {', '.join(map(str, get_args(bare)))}"
-    if get_origin(bare) is list:
-        return "a list"
-    keys = _keys(bare, None)
-    return f"a table with {', '.join(keys)}" if keys else "a table"
+    if hasattr(bare, "__struct_fields__"):
+        return f"a table with {', '.join(bare.__struct_fields__)}"
+    words = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list"}
+    entries = f" whose entries are each {_description(get_args(bare)[1])}" if get_origin(bare) is dict else ""
+    return words.get(get_origin(bare) or bare, f"a table{entries}")
 
 
 def plain(data: Any) -> Any:

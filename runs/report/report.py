@@ -26,7 +26,7 @@ from .changed_data import ChangedData, changed_data
 from .comparison import Comparison, comparisons
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Flights
-from .goal import GoalAttainment, goal_attainments
+from .goal import Goal, GoalAttainment, goal_attainments
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import papers, published_tables
 from .run_measures import AXES, histories
@@ -106,6 +106,8 @@ def report(
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         published = papers(study.get("paper") or [])
+        if study.get("goal") is not None:
+            Goal.of(study["goal"], {})
         for address in reference_addresses(keys.reference):
             check_trusted(address, trust, "it")
     found = comparisons(store, {})
