@@ -1,4 +1,4 @@
-"""A study: every problem on every transcription by every solver, many independent runs of each. What it is; `executing` runs it."""
+"""Study: many independent runs of every solver on every problem and transcription, stated, run and reported."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ class Study:
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
-        {label of a solver: what it works with where that is not what the others do}: any of transcription (one), evaluations, inner and
-        start. Reports compare it with the others on each of their transcriptions.
+        {label of a solver: terms of its own}: any of transcription (one), evaluations, inner and start. Reports
+        compare it with the others on each of their transcriptions.
     evaluations : int, or mapping, optional
         Budget of each run, or {label of a problem: budget}. Default: the problem's own.
     runs : int
@@ -72,9 +72,9 @@ class Study:
     seed : int
         The one that all seeds are spawned from.
     reference : optional
-        What reports measure fronts against; see `report`.
+        The reference that reports measure fronts against; see `report`.
     inner : str, optional
-        The inner level, by name. Default: the problem's own, which mostly is "auto".
+        The inner level, by name. Default: the problem's own, usually "auto".
     tolerance : float, default 1e-6
         As for `solve`.
     start : "uniform", "smooth", Smooth or mapping, optional
@@ -82,22 +82,22 @@ class Study:
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float, optional
         Simulate the points of each run, see `Front.simulate`; reports count only those that violate nothing by more than this, in
-        the constraints' scales, with their objectives as flown. Default: points are what the solver says.
+        the constraints' scales, with their objectives as simulated. Default: points count as the solver returns them.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
         One line, for lists.
     paper : sequence of mappings
-        Published tables to print beside ours; see `reporting.published`.
+        Published tables to print beside ours; see `report.published`.
     goal : mapping, optional
-        Of which objective reports draw the goal attainment, between which values; see `reporting.goal.Goal`.
+        Of which objective reports draw the goal attainment, between which values; see `report.goal.Goal`.
     nominal : str, optional
-        Label of the problem whose front reports fly under the data of all others, which have the same variables and objectives; see
-        `reporting.changed`.
+        Label of the problem whose front reports simulate under the data of all others, which have the same variables and objectives; see
+        `report.changed_data`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
     note : str
-        What readers of the report should know beforehand.
+        Text that stands at the beginning of the report.
     trust : bool
         Whether a report loads addresses that the study's folder names and that are not in the catalogue; see `load`. A study stated in
         Python is the user's own words, so it does.
@@ -193,12 +193,12 @@ class Study:
         Parameters
         ----------
         out : path
-            A folder, made if it is not there; `store` says what is in it. A finished run in it is neither made again nor touched.
+            A folder, made if it does not exist; see `batch.store` for its files. A finished run in it is neither made again nor changed.
         jobs : int
             How many processes of this machine work at a time.
         executor : concurrent.futures.Executor, optional
-            Who does the work instead: threads, processes, a Dask client's `get_executor()`. Each of its workers keeps one process, in which
-            the runs happen; so a run that crashes or hangs takes none of them down.
+            The executor that makes the runs instead: threads, processes, a Dask client's `get_executor()`. Each of its workers keeps one
+            process for its runs, so a run that crashes or hangs ends none of the workers.
         retry : bool
             Make those runs again, too, that ended with an exception. Those that were killed or took too long always are.
         progress : bool
@@ -212,7 +212,7 @@ class Study:
         Raises
         ------
         ValueError
-            `out` holds another study, or is in use by another process.
+            `out` contains another study, or is in use by another process.
         OSError
             A run's file could not be written; those that are finished stay as they are.
         KeyboardInterrupt
@@ -223,7 +223,7 @@ class Study:
         return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
     def status(self, out: str | PathLike[str]) -> Summary:
-        """How many runs of each cell `out` has, and why others failed. Raises ValueError if it holds another study, or none."""
+        """How many runs of each cell `out` has, and why others failed. Raises ValueError if it contains another study, or none."""
         store = Store.open(out)
         store.check(self.definition())
         return store.summary(self.runs)
@@ -236,7 +236,7 @@ class Study:
         figures: bool = True,
         progress: bool = False,
     ) -> Report:
-        """Tables and figures of the runs that `out` has; see `reporting.report.report`. Raises ValueError if it holds another study,
+        """Tables and figures of the runs that `out` has; see `report.report.report`. Raises ValueError if it contains another study,
         or none."""
         from .report.report import report
 
@@ -248,7 +248,7 @@ class Study:
         return self._terms(cell).get("inner", self.inner or INNER)
 
     def sampling_of(self, cell: Cell) -> Smooth | str | None:
-        """What `solve` gets as its `start` in a cell's runs."""
+        """The argument `start` of `solve` in a cell's runs."""
         return sampling(self._terms(cell).get("start", self.start))
 
     def quick(self) -> Study:
@@ -278,7 +278,7 @@ class Study:
         }
 
     def _task(self, run: StoredRun, checkpoint: Path) -> Task:
-        """What a worker needs to make a run."""
+        """The task that makes a run."""
         return Task(
             payload=self.payloads[run.cell.labels],
             evaluations=run.cell.evaluations,
@@ -292,7 +292,7 @@ class Study:
         )
 
     def _terms(self, cell: Cell) -> dict[str, Any]:
-        """What a cell's runs have of their own: the problem's inner level and start where the study names none, and the solver's terms."""
+        """The terms of a cell's runs: the problem's inner level and start where the study states none, and the solver's own."""
         return {**cell.terms, **self.terms.get(cell.solver, {})}
 
     def _check_values(self) -> None:

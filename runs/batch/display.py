@@ -1,4 +1,4 @@
-"""How a study stands, for people: a table of the runs that are going on on a terminal, plain lines elsewhere. It writes to stderr."""
+"""Display of a study's progress on stderr: a live table of the current runs on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SHOWN = 20
 
 
 class StudyDisplay(AbstractContextManager["StudyDisplay"]):
-    """Tells, if it is to be shown, which runs are going on and what is left.
+    """The progress of a study, if it is shown: its current runs, and how many are left.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class StudyDisplay(AbstractContextManager["StudyDisplay"]):
             self._live.stop()
 
     def reporter(self, run: StoredRun) -> Callable[[int, float], None]:
-        """What a run that is being made is to call, from any thread, with evaluations and seconds."""
+        """The function that a run calls, from any thread, with evaluations and seconds."""
         key = run.cell.folder, run.number
 
         def report(evaluations: int, elapsed: float) -> None:

@@ -18,7 +18,7 @@ def locked(path: Path) -> Iterator[None]:
     Raises
     ------
     ValueError
-        Another process has it; the message says which.
+        Another process has it; the message names the process.
     OSError
         The file cannot be made.
     """

@@ -77,7 +77,7 @@ class StoredRun:
         1, 2, ...
     seed : int
     status : str
-        "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": there is a front that cannot be read.
+        "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": its front or its record is damaged.
     message, traceback : str
         Why it is not finished; of a finished one with an empty front, why that is empty.
     wall_time : float
@@ -107,18 +107,18 @@ class StoredRun:
 
     @property
     def finished(self) -> bool:
-        """Whether there is a front."""
+        """Whether it has a front."""
         return self.status == FINISHED
 
     @cached_property
     def front(self) -> Front:
-        """Its front, read when it is asked for. Raises ValueError or FileNotFoundError if there is none to read."""
+        """Its front, read at first use. Raises ValueError or FileNotFoundError if it cannot be read."""
         return load_front(self.path, self.trust)
 
 
 @dataclass(frozen=True)
 class Summary:
-    """How a study stands.
+    """The state of a study.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ class Store:
     ----------
     path : Path
     definition : dict
-        What `Study.definition` gave: "name", "seed", "runs", "reference", "paper", and so on.
+        As of `Study.definition`: "name", "seed", "runs", "reference", "paper", and so on.
     cells : tuple of Cell
     """
 
@@ -195,7 +195,7 @@ class Store:
                 raise ValueError(f"another version of MACS wrote it (format {data['version']}, not {VERSION}): use that version")
             return cls(path, data["study"], trust)
         except FileNotFoundError:
-            raise ValueError(f"'{out}' holds no study: there is no study.json in it") from None
+            raise ValueError(f"'{out}' contains no study: there is no study.json in it") from None
         except OSError as error:
             raise ValueError(f"'{out}' cannot be read: {error.strerror or error}") from error
         except (ValueError, KeyError, TypeError) as error:
@@ -204,13 +204,13 @@ class Store:
     @classmethod
     @contextmanager
     def claim(cls, out: str | PathLike[str], definition: Mapping[str, Any]) -> Iterator[Store]:
-        """The folder of this study, made if there is none, and no other process's as long as this is entered. Its record says how many runs
-        were ever asked for.
+        """The folder of this study, made if it does not exist, and locked within the context. Its record has
+        the largest number of runs ever asked for.
 
         Raises
         ------
         ValueError
-            It holds another study, or other things, or another process has claimed it.
+            It contains another study, or other files, or another process has locked it.
         OSError
             It cannot be written.
         """
@@ -227,7 +227,7 @@ class Store:
 
     @classmethod
     def _suits(cls, path: Path, definition: Mapping[str, Any]) -> Store | None:
-        """What is in a folder; None if it is new. Raises ValueError if it holds something else."""
+        """The study in a folder; None if the folder is new. Raises ValueError if it contains something else."""
         if (path / "study.json").exists():
             store = cls.open(path)
             store.check(definition)
@@ -236,7 +236,7 @@ class Store:
             raise ValueError(f"'{path}' is not a folder")
         others = sorted(one.name for one in path.iterdir() if not one.name.startswith(".")) if path.exists() else []
         if others:
-            raise ValueError(f"'{path}' holds no study but other things, '{others[0]}' for one; give a folder of its own")
+            raise ValueError(f"'{path}' contains no study but other things, '{others[0]}' for one; give a folder of its own")
         return None
 
     def check(self, definition: Mapping[str, Any]) -> None:
@@ -249,7 +249,7 @@ class Store:
                 different = f"cell '{name}' is {'there but not here' if name in theirs else 'here but not there'}"
             different = different or _difference(theirs[name], ours[name], f"{name}: ")
         if different:
-            raise ValueError(f"'{self.path}' holds another study: {different}; give another folder")
+            raise ValueError(f"'{self.path}' contains another study: {different}; give another folder")
 
     # Its runs
 
@@ -288,15 +288,15 @@ class Store:
         )
 
     def summary(self, count: int | None = None) -> Summary:
-        """How it stands."""
+        """The state of the study, with the runs that were asked for or `count` of each cell."""
         return Summary(self.definition["name"], self.path, tuple(self.runs(count)))
 
     def front_path(self, cell: Cell, number: int) -> Path:
-        """Where the front of a run is."""
+        """Path of the front of a run."""
         return self.path / cell.folder / f"{number:04d}.nc"
 
     def record_path(self, cell: Cell, number: int) -> Path:
-        """Where it is said how a run went."""
+        """Path of the record of a run."""
         return self.path / cell.folder / f"{number:04d}.json"
 
     def checkpoint_path(self, cell: Cell, number: int) -> Path:
@@ -360,7 +360,7 @@ LINE = 200
 
 
 WORTH = 20
-"""Most failures told one by one."""
+"""Most failures listed one by one."""
 
 
 def summary_text(summary: Summary) -> str:

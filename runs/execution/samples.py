@@ -1,4 +1,4 @@
-"""How a run went: its archive at some counts, noted as it goes, and kept beside its checkpoint so that a run that goes on has all of it."""
+"""Samples of a run: its archive at some counts, stored beside its checkpoint so that a resumed run has its whole history."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..data.schema import checked
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30
-"""At how many evaluation counts, at most and evenly spaced, the archive is noted, besides the end."""
+"""Largest number of samples, evenly spaced in evaluations, besides the one at the end."""
 EVERY = 0.25
 """Seconds between reports."""
 
 log = logging.getLogger(__name__)
 
 Report = Callable[[int, float], Any]
-"""Called now and then with evaluations and seconds spent so far."""
+"""Called at intervals with the evaluations and seconds so far."""
 
 
 class History(TypedDict, total=False):
@@ -38,7 +38,7 @@ class History(TypedDict, total=False):
 
 
 class Samples:
-    """Notes the archive at some counts, and reports now and then; costs next to nothing.
+    """Samples of the archive at some counts, and reports of the progress at intervals.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Samples:
         Evaluations of the run.
     report : callable, optional
     path : Path, optional
-        A file in which they are kept. Those in it that a run which goes on comes by once more are made anew.
+        A file in which they are stored. A resumed run replaces those after the count at which it begins.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Samples:
         return History(**self.columns)  # type: ignore[typeddict-item]
 
     def _take_up(self, evaluations: int) -> None:
-        """At first: what was noted before this count."""
+        """Take over, at the first call, the stored samples before this count."""
         if self._before is None:
             return
         count = sum(before < evaluations for before in self._before["evaluations"])
@@ -99,7 +99,7 @@ class Samples:
         try:
             write_whole(self._path, records.to_bytes(self.columns))
             self._behind = False
-        except OSError as error:  # as for a checkpoint: no reason to stop, and the next time it may be possible
+        except OSError as error:  # as for a checkpoint: the run goes on, and the next write may succeed
             log.warning("%s", error)
 
 

@@ -1,4 +1,4 @@
-"""In what indicators were measured, in words: whoever reads a table must see what was normalised by what, and where volumes end."""
+"""The normalisation of indicators in words, for the captions of tables: the ranges, the reference, and the corner of volumes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Scale:
         The same in ranges of the reference from its ideal, as `hypervolume` has it.
     names, units : tuples of m str
     what : str
-        What the reference is: "the closed form", "the union of 60 runs".
+        Name of the reference: "the closed form", "the union of 60 runs".
     count : int
         How many points it has.
     curve : bool
@@ -52,16 +52,16 @@ class Scale:
         point: float = 1.1,
         curve: bool = True,
     ) -> Scale:
-        """What the indicators of `runs.measures.indicators` do with a reference.
+        """The normalisation by a reference that the indicators of `runs.measures.indicators` use.
 
         Parameters
         ----------
         reference : Front or array (k, m)
         like : Front, optional
-            One of the fronts that are measured against it: says names, units and senses where the reference is an array. Without it all
+            One of the fronts that are measured against it: it has names, units and senses where the reference is an array. Without it all
             columns are minimised.
         what : str
-            What the reference is, for captions.
+            Name of the reference, for captions.
         point, curve
             As the indicators were given them.
         """

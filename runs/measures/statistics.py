@@ -1,8 +1,8 @@
-"""Statistics of batches: what an indicator was over many runs, and whether solvers differ in it. Pure functions of samples.
+"""Statistics of an indicator over many runs, and tests of whether solvers differ in it. Pure functions of samples.
 
 A value that is NaN or infinite is a *failed* run: an empty front has no distance. Failed runs are never dropped: they rank below all
-others, all alike. Mean and variance, which cannot say that, are those of the runs that did not fail, and how many did stands beside them.
-Every test is of ranks, two-sided. Smaller values are better, unless `larger` says that larger ones are (hypervolume).
+others, all alike. Mean and variance are those of the runs that did not fail, beside the number of failures.
+Every test is of ranks, two-sided. Smaller values are better, unless `larger` is True (hypervolume).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 SMALL, MEDIUM, LARGE = 0.56, 0.64, 0.71
 """From which A12 an effect is called so (Vargha and Delaney 2000)."""
 ALPHA = 0.05
-"""The level below which samples are told to be too few to ever reach it."""
+"""A pair whose samples are too few for any p below this level has a note."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class PairTest:
     effect : str
         "negligible", "small", "medium" or "large".
     note : str
-        That there are too few runs for any p below 0.05; mostly nothing.
+        States that there are too few runs for any p below 0.05; usually empty.
     """
 
     first: str
@@ -184,11 +184,11 @@ def holm(p: Sequence[float] | np.ndarray) -> np.ndarray:
     return corrected
 
 
-def _costs(values: Sequence[float] | np.ndarray, larger: bool, what: str) -> np.ndarray:
+def _costs(values: Sequence[float] | np.ndarray, larger: bool, name: str) -> np.ndarray:
     """Values (n,) of which smaller is better; infinite for failed runs."""
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or not len(values):
-        raise ValueError(f"{what} must be a list of at least one number, not an array of shape {values.shape}")
+        raise ValueError(f"{name} must be a list of at least one number, not an array of shape {values.shape}")
     return np.where(np.isfinite(values), -values if larger else values, np.inf)
 
 
@@ -210,7 +210,7 @@ def _quantile(costs: np.ndarray, share: float) -> float:
 
 
 def _mann_whitney(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """U of the first, p, and the least p that so many runs can have. Of ranks, because infinities have no differences."""
+    """U of the first, p, and the least p that this number of runs can have. Of ranks, because infinities have no differences."""
     from scipy.stats import mannwhitneyu, rankdata
 
     ranks = rankdata(np.concatenate([a, b]))

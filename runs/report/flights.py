@@ -19,7 +19,7 @@ from problems import load
 from transcription import SingleShooting, from_dict, parse, word
 
 from ..measures.indicators import pieces, truth
-from ..measures.references import Reference, room
+from ..measures.references import Reference, module_of
 from .comparison import Comparison
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .plots import front_figure
@@ -51,8 +51,8 @@ class Flights:
     points : tuple of Point
     many : sequence of Point
         Up to a hundred of that front, for pictures of a population.
-    room : module or None
-        Where the problem comes from, see `references.room`.
+    case : module or None
+        The module of the problem, see `references.module_of`.
     laws : {name: flights}
         One for each point, None where there is none.
     ends : Front
@@ -66,7 +66,7 @@ class Flights:
     solver: str
     points: tuple[Point, ...]
     many: Sequence[Point]
-    room: ModuleType | None
+    case: ModuleType | None
     laws: Mapping[str, Sequence[Law | None]]
     ends: Front
     note: str
@@ -81,7 +81,7 @@ class Flights:
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
                 source = front.source
                 named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
-                place = room(source.address) if source is not None and named else None
+                place = module_of(source.address) if source is not None and named else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(comparison, comparison.against, solver, points, many, place, laws, ends, note)
@@ -124,11 +124,11 @@ class Flights:
             ),
             "flights": flights_figure(self.points, laws=self.laws, solver=self.solver),
         }
-        plot = getattr(self.room, "plot", None)
+        plot = getattr(self.case, "plot", None)
         if plot is not None and self.many:
             with style():
                 found |= plot(self.many)
-        track = getattr(self.room, "track", None)
+        track = getattr(self.case, "track", None)
         if track is not None:
             tracks = [track(time_histories(point)) for point in self.points]
             across, up = tracks[0]

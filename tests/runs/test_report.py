@@ -150,7 +150,7 @@ def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
 
 def test_nothing_to_report_on(tmp_path, capsys):
     assert main(["study", "report", str(tmp_path)]) == 2
-    assert "holds no study" in capsys.readouterr().err
+    assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
         store.keep(store.cells[0], 1, Outcome("crashed", "it broke"))

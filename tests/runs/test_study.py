@@ -394,7 +394,7 @@ def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, w
 )
 def test_another_study_in_the_same_folder_is_refused(made, changes, words):
     before = stamps(made[0])
-    with pytest.raises(ValueError, match="holds another study") as refused:
+    with pytest.raises(ValueError, match="contains another study") as refused:
         study(**changes).run(made[0])
     assert words in str(refused.value) and stamps(made[0]) == before
 

@@ -61,7 +61,7 @@ def test_run_resume_and_status(capsys):
         study.name == "gliders" and study.runs == 2 and [run.status for run in study.status("out/gliders").runs] == ["finished", "missing"]
     )
     assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1", "--out", "."]) == 2
-    assert "holds no study but other things" in capsys.readouterr().err
+    assert "contains no study but other things" in capsys.readouterr().err
 
 
 def test_status_says_what_is_wrong(capsys):
