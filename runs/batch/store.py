@@ -41,6 +41,7 @@ MISSING, UNREADABLE = "missing", "unreadable"
 
 
 FORMAT, VERSION = "macs study", 2
+"""Of study.json."""
 
 
 class Definition(msgspec.Struct):
@@ -55,9 +56,9 @@ class Definition(msgspec.Struct):
 
 
 class RunRecord(msgspec.Struct):
-    """The record of a run, see `Outcome`; `front` is the checksum of its front's file."""
+    """The record of a run, see `Outcome`; `front` is the checksum of its front's file. By default that of a run without a record."""
 
-    status: Literal["finished", "crashed", "timeout", "out of memory", "killed"]
+    status: Literal["finished", "crashed", "timeout", "out of memory", "killed", "missing"] = "missing"
     message: str = ""
     traceback: str = ""
     wall_time: float = 0.0
@@ -204,8 +205,9 @@ class Store:
     @classmethod
     @contextmanager
     def claim(cls, out: str | PathLike[str], definition: Mapping[str, Any]) -> Iterator[Store]:
-        """The folder of this study, made if it does not exist, and locked within the context. Its record has
-        the largest number of runs ever asked for.
+        """The folder of this study, made if it does not exist, and locked within the context.
+
+        Its record has the largest number of runs ever asked for.
 
         Raises
         ------
@@ -242,7 +244,7 @@ class Store:
     def check(self, definition: Mapping[str, Any]) -> None:
         """Raise ValueError with the first difference unless this is the same study: what decides its numbers, and its cells."""
         here, there = ({key: one.get(key) for key in definition["decides"]} for one in (definition, self.definition))
-        ours, theirs = ({cell.name: cell.to_dict() for cell in checked(one, Definition).cells} for one in (definition, self.definition))
+        ours, theirs = ({cell.name: cell.to_dict() for cell in cells} for cells in (checked(definition, Definition).cells, self.cells))
         different = _difference(there, here)
         for name in (*theirs, *ours):
             if not different and (name in ours) != (name in theirs):
@@ -261,24 +263,22 @@ class Store:
 
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        path, record, message = self.front_path(cell, number), None, ""
+        path, record, status, message = self.front_path(cell, number), RunRecord(), UNREADABLE, ""
         try:
             record = self._record(cell, number)
             if path.exists():
                 self._check_front(path, record)
-            message = record.message if record is not None else ""
         except (ValueError, OSError) as error:
-            status, message = UNREADABLE, str(error)
+            message = str(error)
         else:
-            unfinished = MISSING if record is None or record.status == FINISHED else record.status
-            status = FINISHED if path.exists() else unfinished
-        record = record or RunRecord(status="killed")
+            status = FINISHED if path.exists() else MISSING if record.status == FINISHED else record.status
+            message = record.message if status != MISSING else ""
         return StoredRun(
             cell=cell,
             number=number,
             seed=cell.seed(self.definition["seed"], number),
             status=status,
-            message=message if status != MISSING else "",
+            message=message,
             traceback=record.traceback,
             wall_time=record.wall_time,
             history=record.history,
@@ -321,21 +321,19 @@ class Store:
             for path in (checkpoint, samples_path(checkpoint)):
                 path.unlink(missing_ok=True)
 
-    def _record(self, cell: Cell, number: int) -> RunRecord | None:
-        """The record of a run; None if it has none. Raises ValueError or OSError if it cannot be read."""
+    def _record(self, cell: Cell, number: int) -> RunRecord:
+        """The record of a run. Raises ValueError or OSError if it cannot be read."""
         path = self.record_path(cell, number)
         try:
-            content = records.from_bytes(path.read_bytes())
+            with errors_begin_with(f"its record '{path}' is damaged"):
+                found: RunRecord = checked(records.from_bytes(path.read_bytes()), RunRecord)
+                return found
         except FileNotFoundError:
-            return None
-        except ValueError as error:
-            raise ValueError(f"its record '{path}' is damaged: {error}") from error
-        with errors_begin_with(f"its record '{path}' is damaged"):
-            return checked(content, RunRecord)
+            return RunRecord()
 
-    def _check_front(self, path: Path, record: RunRecord | None) -> None:
+    def _check_front(self, path: Path, record: RunRecord) -> None:
         """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read."""
-        if record is None:
+        if record.status == MISSING:
             load_front(path, self.trust)
         elif crc32(path.read_bytes()) != record.front:
             raise ValueError(f"'{path}' is damaged: its content is not what was written")

@@ -19,7 +19,7 @@ def from_bytes(data: bytes) -> Any:
     except (ValueError, RecursionError) as error:
         raise ValueError(f"it is not JSON ({error})") from error
     if not isinstance(record, dict) or record.keys() != {"crc32", "content"}:
-        raise ValueError("it is no record with a checksum")
+        raise ValueError("it has no checksum: another version of MACS wrote it, or it is damaged")
     if record["crc32"] != _checksum(record["content"]):
         raise ValueError("its content does not match its checksum")
     return record["content"]
