@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
 
 
-def _key(kind: Any = Any, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
+def _key(kind: Any = None, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
     """The metadata of a field of `Study` that is a key of study files.
 
     Parameters
     ----------
     kind : type
-        Of its values, see `checked`. `Any` if another check follows.
+        Of its values, see `checked`. None if it has a check of its own.
     decides : bool
         Whether it decides the runs' numbers, so that it must not change between two calls on one folder.
     record : callable or None
@@ -78,7 +78,7 @@ class Study:
     tolerance : float, default 1e-6
         As for `solve`.
     start : "uniform", "smooth", Smooth or mapping, optional
-        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: the
+        How the first candidates of a run are drawn, as for `solve`; a mapping has settings of `transcription.Smooth`. Default: the
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float, optional
         Simulate the points of each run, see `Front.simulate`; reports count only those that violate nothing by more than this, in
@@ -105,7 +105,7 @@ class Study:
     Raises
     ------
     ValueError
-        Whatever does not make sense, before any work; the message names it.
+        A value is wrong; the message names it, before any work.
     """
 
     name: str = field(metadata=_key(Text, decides=True))
@@ -172,11 +172,9 @@ class Study:
             There is no such study, the file is not TOML, a key or value in it is wrong, or an address in it is not trusted; the message
             names it.
         """
-        stated = studyfile.read(source, [key.name for key in _KEYS], trust)
+        keys = {key.name: key.default is MISSING and key.default_factory is MISSING for key in _KEYS} | {"name": False}
+        stated = studyfile.read(source, keys, trust)
         with errors_begin_with(str(source)):
-            for key in _KEYS:
-                if key.name not in stated and key.default is MISSING and key.default_factory is MISSING:
-                    raise ValueError(f"{key.name} is missing")
             return cls(**stated, trust=trust)
 
     def run(
@@ -297,7 +295,8 @@ class Study:
 
     def _check_values(self) -> None:
         for key in _KEYS:
-            checked(getattr(self, key.name), key.metadata["kind"], key.name)
+            if key.metadata["kind"] is not None:
+                checked(getattr(self, key.name), key.metadata["kind"], key.name)
         sampling(self.start)
         if self.inner is not None:
             check_inner(self.inner)

@@ -232,7 +232,7 @@ class Cell:
     evaluations : int
         Budget of each run.
     details : mapping
-        Plain data that decide the runs' numbers: fingerprint and settings. They tell another study in the same folder from this one.
+        Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
     """
 
     problem: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -27,21 +27,22 @@ def describe(name: str) -> str:
     return str(tomllib.loads((STUDIES / f"{name}.toml").read_text(encoding="utf-8")).get("description", ""))
 
 
-def read(source: str | PathLike[str], keys: Collection[str], trust: bool) -> dict[str, Any]:
+def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> dict[str, Any]:
     """The content of a study file, with the name of the file as its name unless it states one.
 
     Parameters
     ----------
     source : path, or name of a study that comes with the project
-    keys : collection of str
-        That the file may have.
+    keys : {key: bool}
+        The keys that the file may have, and whether each is required.
     trust : bool
         Whether addresses of code in it may be loaded that are not in the catalogue.
 
     Raises
     ------
     ValueError
-        There is no such file, it is not TOML, or it has another key or an address that is not trusted; the message names it.
+        There is no such file, it is not TOML, or it has an unknown key, lacks a key, or has an address that
+        is not trusted; the message names it.
     """
     path = _find(source)
     with errors_begin_with(str(source)):
@@ -51,11 +52,14 @@ def read(source: str | PathLike[str], keys: Collection[str], trust: bool) -> dic
             raise ValueError(f"cannot be read: {error.strerror or error}") from error
         except UnicodeDecodeError as error:
             raise ValueError("it is not a text file") from error
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise ValueError(f"it is not TOML: {error}") from error
         for key in data:
             if key not in keys:
                 raise ValueError(unknown("key", key, keys))
+        for key, required in keys.items():
+            if required and key not in data:
+                raise ValueError(f"{key} is missing")
         for address in _addresses(data):
             check_trusted(address, trust, "it")
     data.setdefault("name", path.stem)

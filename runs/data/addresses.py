@@ -1,4 +1,4 @@
-"""Addresses of code that files name. Loading one runs it, so only the catalogue's own are loaded unless the user says otherwise."""
+"""Addresses of code that files name. Loading one runs it, so without the user's trust only the catalogue's own are loaded."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def paths_figure(
                 values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
                 x, y = _of(values, across), _of(values, up)
                 name = f"point {i + 1}" if k == 0 else None
-                # Where paths coincide the first are on top, and a dot says where each ends.
+                # Where paths coincide the first are on top, and a dot marks the end of each.
                 look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
                 ax.plot(x, y, lw=1.3, label=name, **look)
                 if k == len(phases) - 1:
@@ -190,7 +190,7 @@ def _check(points: Sequence[Point], laws: Laws) -> None:
 
 
 def _title(number: int, point: Point, width: int) -> str:
-    """The point's number and objectives, in lines of at most so many characters."""
+    """The point's number and objectives, in lines of at most `width` characters."""
     goals = point._front.goals
     values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
     lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]

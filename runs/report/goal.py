@@ -139,7 +139,7 @@ class GoalAttainment:
         unit = f" {self.objective.unit}" if self.objective.unit else ""
         notes = [
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
-            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: so many runs did not reach it. "
+            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: that share of runs did not reach it. "
             "Values are those of the transcription"
             + (", except those as simulated: of the feasible points of each run in the end." if self.simulated else ", not simulated.")
         ]

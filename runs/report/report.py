@@ -95,7 +95,7 @@ def report(
     Raises
     ------
     ValueError
-        The folder holds no study, or no finished run; a reference or foreign front cannot be read; an address is not trusted.
+        The folder contains no study, or no finished run; a reference or foreign front cannot be read; an address is not trusted.
     OSError
         A file cannot be written.
     """
