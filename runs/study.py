@@ -221,7 +221,7 @@ class Study:
         return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
     def status(self, out: str | PathLike[str]) -> Summary:
-        """How many runs of each cell `out` has, and why others failed. Raises ValueError if it contains another study, or none."""
+        """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""
         store = Store.open(out)
         store.check(self.definition())
         return store.summary(self.runs)

@@ -332,9 +332,10 @@ class Store:
             return RunRecord()
 
     def _check_front(self, path: Path, record: RunRecord) -> None:
-        """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read."""
+        """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
+        loaded."""
         if record.status == MISSING:
-            load_front(path, self.trust)
+            Front.load(path)
         elif crc32(path.read_bytes()) != record.front:
             raise ValueError(f"'{path}' is damaged: its content is not what was written")
 

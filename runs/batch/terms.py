@@ -20,7 +20,7 @@ INNER = "auto"
 
 
 class Terms(Section):
-    """What one solver of a study works with, where it differs from the others."""
+    """The terms of one solver of a study, where they differ from those of the others."""
 
     transcription: Any = None
     evaluations: Any = None

@@ -55,7 +55,7 @@ class Case:
     asked: Mapping[str, float] = field(default_factory=dict)
 
     def batch(self, nlp: NLP, rng: np.random.Generator) -> Batch:
-        """One more."""
+        """A batch of candidates of the case, with a warm start if it has one."""
         lower, upper, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
         cold = lower + rng.random((BATCH, len(span))) * span
         if not self.warm:

@@ -1,4 +1,4 @@
-"""Inner levels side by side: the same batches, in turn, so that a noisy machine hits all alike."""
+"""Benchmark of inner levels: the same batches in turn, so that a noisy machine affects all alike."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RANGES = 20
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
+    """Size of a measurement: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
     and whether functions are measured interpreted too, where they can be compiled."""
 
     least: int = 5

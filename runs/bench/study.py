@@ -27,7 +27,7 @@ FASTER, BEYOND = 1.7, 0.05
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds, runs in each, an even number, and the evaluations of a run."""
+    """Size of a measurement: rounds, runs in each, an even number, and the evaluations of a run."""
 
     rounds: int = 3
     runs: int = 8

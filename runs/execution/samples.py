@@ -73,7 +73,7 @@ class Samples:
             self._report(progress.evaluations, progress.elapsed)
 
     def add(self, counts: Any, elapsed: float, F: Any) -> None:
-        """One more."""
+        """Add a sample."""
         self._take_up(counts["evaluations"] + 1)
         for key in COUNTS:
             self.columns[key].append(int(counts[key]))

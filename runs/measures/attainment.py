@@ -48,7 +48,7 @@ class Attainment:
         return self.of(self.count(share))
 
     def count(self, share: float) -> int:
-        """How many runs `share` per cent are: the next whole number of them."""
+        """The number of runs that `share` per cent are, rounded up."""
         if not 0 < share <= 100:
             raise ValueError(f"a share of the runs is more than 0 and at most 100 per cent, not {share}")
         return max(1, int(np.ceil(share * self.runs / 100 - 1e-9)))

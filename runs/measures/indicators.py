@@ -23,7 +23,7 @@ from macs.pareto.dominance import nondominated
 JOINED = 0.02
 """Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
 SAMPLES = 2001
-"""How many points, evenly along its length, such a reference is looked at from."""
+"""Number of points, evenly along its length, that represent such a reference."""
 
 Points = Front | np.ndarray
 

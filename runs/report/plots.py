@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKERS = "o^sDvPX*"
-"""One more than there are colours, so that of nine solvers no two look alike."""
+"""One more than there are colours, so that no two of many solvers look alike."""
 
 
 def front_figure(

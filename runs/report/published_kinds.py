@@ -78,7 +78,7 @@ class Published(Section, tag_field="of", kw_only=True):
         raise NotImplementedError
 
     def remark(self, comparison: Comparison) -> str:
-        """How our figures were obtained."""
+        """A sentence on how our figures were obtained."""
         raise NotImplementedError
 
     def check_problem(self, problem: CompiledProblem) -> None:

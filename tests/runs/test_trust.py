@@ -189,3 +189,14 @@ def test_damaged_records_are_refused_or_the_same(made, tmp_path):
             refusals += found != expected
         file.write_bytes(content)
     assert numbers(Store.open(out)) == expected and refusals > 900
+
+
+def test_a_front_without_a_record_counts_whatever_it_names(mark, out):
+    path = next(out.rglob("*.nc"))
+    front = Front.load(path)
+    front.source = Source(front.source.name, front.source.fingerprint, "evil:build", {})
+    front.save(path)
+    path.with_suffix(".json").unlink()
+    assert [run.status for run in Store.open(out).runs()] == ["finished", "finished"] and not mark.exists()
+    with pytest.raises(ValueError, match="names 'evil:build'"):
+        _ = next(run for run in Store.open(out).runs() if run.path == path).front
