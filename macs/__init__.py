@@ -3,8 +3,8 @@
 from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
+from .fronts.points import Point
 from .gradient_tools import optimize, payoff, sweep
-from .point import Point
 from .search.macs import MACS
 from .solvers.progress import Progress
 from .solvers.solver import Solver

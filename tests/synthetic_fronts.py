@@ -88,7 +88,7 @@ def flights(n: int = 5, seed: int = 0, elements: int | list[int] = 3, **changes)
         "variables": [Variable(f"climb.u[{i}]", -1.0, 1.0, "km/s²", 2.0) for i in range(4)],
         "goals": compiled().goals,
         "problem": compiled(),
-        "transcription": {"method": "DFET", "settings": {"elements": 3, "order": 4, "basis": None}},
+        "transcriptions": {"method": "DFET", "settings": {"elements": 3, "order": 4, "basis": None}},
         "solver": {"name": "MACS", "settings": {"agents": 10, "archive": 10}},
         "stats": {"evaluations": 1000, "inner_iterations": 321, "failures": {"infeasible": 3}, "wall_time": 1.25, "seed": 7},
     }

@@ -1,4 +1,4 @@
-"""A problem as something to search: each candidate is made feasible by the inner level before its objectives are looked at."""
+"""An optimal control problem as an evaluator: the inner level makes each candidate feasible before its objectives count."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Bilevel(Evaluator):
     tolerance : float
         Largest scaled residual of a feasible point.
     start : Smooth, optional
-        How candidates look that a search begins with. Default: each variable by itself.
+        Shape of the first candidates of a search. Default: each variable drawn by itself.
     """
 
     def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float, start: Smooth | None = None) -> None:
@@ -63,7 +63,7 @@ class Bilevel(Evaluator):
         )
         return evaluation, int(np.sum(found.iterations))
 
-    def _refine(
+    def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
     ) -> tuple[Evaluation, int]:
         found = []

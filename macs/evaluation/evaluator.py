@@ -1,19 +1,20 @@
-"""The contract between the search and what it searches: candidates go in, evaluated points come out, everything is counted.
+"""The contract of what can be searched: candidates in, evaluated points out, every evaluation and solve counted.
 
-The search knows full vectors. Of their D entries it alters only the *free* ones (d of them); the others are the memory of a point, which
-the evaluator needs again: for a trajectory, the states from which the next inner solve starts. A black box has no others.
+A search has full vectors. Of their D entries it alters only the *free* ones (d of them). The others belong to the evaluator: for a
+trajectory, the states from which the next inner solve starts. A black box has none.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from transcription.inner.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
 
@@ -33,11 +34,11 @@ class Evaluation:
     status : array (k,) of str
         "converged" (feasible within the tolerance), "infeasible", "failed" or "timeout".
     clocked : bool
-        Whether a clock ended any of the work: then the same vectors need not give the same batch again.
+        Whether a clock ended any of the work: the same vectors need not give the same batch again.
     fallbacks : int
-        How many vectors a faster method left to a slower one.
+        Vectors that a faster inner level left to a slower one.
     itemise : callable, optional
-        Returns what `violations` are, for those who ask: most do not, and then nothing has been spent on it.
+        Returns `violations`; called only where they are needed.
     """
 
     Z: np.ndarray
@@ -50,13 +51,24 @@ class Evaluation:
 
     @property
     def violations(self) -> np.ndarray:
-        """Of each constraint its own largest scaled residual (k, c), at least 0; they are one (k, 1) where nobody tells them apart."""
+        """Largest scaled residual of each constraint (k, c), at least 0; one column (k, 1) where constraints are not told apart."""
         return self.violation[:, None] if self.itemise is None else self.itemise()
 
 
 @dataclass
 class Counts:
-    """What a run has spent so far: `failures` are the statuses that are not "converged", `clocked` the batches that a clock cut short."""
+    """Costs of a run so far.
+
+    Attributes
+    ----------
+    evaluations, inner_iterations, gradient_solves : int
+    fallbacks : int
+        Candidates that a faster inner level left to a slower one.
+    failures : Counter
+        Evaluations and gradient solves that did not converge, by status.
+    clocked : int
+        Batches and solves that a clock, not a count, ended early.
+    """
 
     evaluations: int = 0
     inner_iterations: int = 0
@@ -65,11 +77,18 @@ class Counts:
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
 
+    def add_solves(self, count: int, status: Iterable[str], iterations: int, clocked: int) -> None:
+        """Count gradient solves that ended with these statuses."""
+        self.gradient_solves += count
+        self.failures.update(one for one in status if one != CONVERGED)
+        self.inner_iterations += iterations
+        self.clocked += clocked
+
 
 class Evaluator(ABC):
-    """Something whose points can be evaluated.
+    """A problem whose points can be evaluated.
 
-    An implementation sets the attributes below and defines `first_guess` and `_evaluate`; it never counts.
+    An implementation sets the attributes below and defines `first_guess` and `_evaluate`; this class counts.
 
     Attributes
     ----------
@@ -82,7 +101,7 @@ class Evaluator(ABC):
     tolerance : float
         A point whose violation is at most this is feasible.
     has_gradients : bool
-        Whether `refine` works.
+        Whether `descend` works.
     m_known : int or None
         Number of objectives; None as long as only an evaluation could tell.
     counts : Counts
@@ -98,22 +117,19 @@ class Evaluator(ABC):
     has_gradients: bool = False
     m_known: int | None = None
     counts: Counts
-    before_batch: Callable[[], None] = staticmethod(lambda: None)
+    before_batch: Callable[[], Any] = staticmethod(lambda: None)
 
     def resume(self, counts: Counts, m: int) -> None:
-        """Go on counting where another run of the same had got to, which knew the number of objectives to be m."""
+        """Continue the counts of an earlier run, in which there were m objectives."""
         self.counts = counts
 
     def opening(self, candidates: np.ndarray) -> np.ndarray:
-        """What a search is to begin with (k, d), from candidates (k, d) that were drawn from the box, each variable by itself.
-
-        The same, unless something is known of how candidates should look.
-        """
+        """First candidates (k, d) of a search, from candidates (k, d) drawn uniformly from the box; by default these."""
         return candidates
 
     @abstractmethod
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
-        """Full vectors (k, D) for candidates (k, d) that nothing is known of yet."""
+        """Full vectors (k, D) for new candidates (k, d)."""
 
     @abstractmethod
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
@@ -130,7 +146,7 @@ class Evaluator(ABC):
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation
 
-    def refine(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None = None) -> Evaluation:
+    def descend(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None = None) -> Evaluation:
         """Gradient solves, each to the least alpha with F - reference <= alpha weights; they are counted beside evaluations.
 
         Parameters
@@ -149,14 +165,12 @@ class Evaluator(ABC):
             the first rows, which were solved by then; only these are counted.
         """
         self.before_batch()
-        found, iterations = self._refine(starts, references, weights, margins)
-        self.counts.gradient_solves += len(found.F)
-        self.counts.inner_iterations += iterations
-        self.counts.clocked += found.clocked or len(found.F) < len(starts)
+        found, iterations = self._descend(starts, references, weights, margins)
+        self.counts.add_solves(len(found.F), found.status.tolist(), iterations, found.clocked or len(found.F) < len(starts))
         return found
 
-    def _refine(
+    def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
     ) -> tuple[Evaluation, int]:
-        """Solve, if there are gradients, as many of the rows, in order, as may be; also returns the iterations spent."""
+        """Solve the rows in order, where there are gradients, until the work is to end; also returns the iterations spent."""
         raise NotImplementedError(f"{type(self).__name__} has no gradients")

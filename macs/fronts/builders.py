@@ -1,4 +1,4 @@
-"""From what a search ends with to a Front in the user's words."""
+"""Points from vectors of an NLP, and from the archive of a search."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from transcription.stopping import stopping
 from transcription.trajectories.limits import excursions
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
-from ..front import Front
 from ..io.text import counted
 from ..pareto.archive import Archive
-from ..point import Point
+from .points import Point, Points
 
 
-def trajectory_front(
+def trajectory_points(
     nlp: NLP,
     archive: Archive,
     closest: Archive,
@@ -28,13 +27,13 @@ def trajectory_front(
     stats: Mapping[str, Any],
     *,
     certified: bool,
-) -> Front:
-    """A front of the trajectories in an archive, `certified` with their optimality; objectives count in the front's ranges there."""
+) -> Points:
+    """The trajectories of an archive, `certified` with their optimality; objectives count in the ranges of the archive there."""
     if len(archive):
         found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
-        return vectors_front(nlp, archive.Z, solver, stats, optimality=found)
-    nearest = vectors_front(nlp, closest.Z, solver, stats)[0]
-    return vectors_front(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+        return vectors_points(nlp, archive.Z, solver, stats, optimality=found)
+    nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
+    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
 
 
 def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
@@ -42,24 +41,24 @@ def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | No
     return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
 
 
-def vectors_front(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Front:
-    """A front of vectors (k, n) of an NLP; `more` is for `Front`.
+def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:
+    """Points from vectors (k, n) of an NLP; `more` is for `Points`.
 
-    Objectives and violations are taken anew from the NLP, not from whoever found the points; so is the status, unless it is given.
+    Objectives and violations are computed anew from the NLP; so is the status, unless it is given.
     """
-    # An empty front, too, says what its vectors are of.
+    # Without any point, too, the variables are recorded.
     given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
-    return Front(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
+    return Points(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
 
 
 def nearest_misses(nearest: Point) -> str:
-    """What keeps the least infeasible point from being feasible."""
+    """Which constraint the least infeasible point violates most, and by how much."""
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
     return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
-    """What a Front holds of vectors (k, n) of one NLP: k entries each."""
+    """Columns of `Points` for vectors (k, n) of one NLP: k entries each."""
     k = len(Z)
     F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
     flights = [nlp.unpack(z) for z in Z]
@@ -72,22 +71,22 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
         "violations": [nlp.violations(z) for z in Z],
         "trajectories": flights,
         "excursions": [excursions(nlp.problem, flight) for flight in flights],
-        "transcription": [nlp.transcription.to_dict()] * k,
+        "transcriptions": [nlp.transcription.to_dict()] * k,
     }
 
 
-def black_box_front(
+def black_box_points(
     archive: Archive,
     closest: Archive,
     goals: Sequence[Objective],
     variables: Sequence[Variable],
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
-) -> Front:
-    """A front of plain decisions."""
+) -> Points:
+    """The archive of a black box as points."""
 
-    def of(points: Archive, **more: Any) -> Front:
-        return Front(
+    def of(points: Archive, **more: Any) -> Points:
+        return Points(
             F=points.F,
             decision=points.Z,
             violation=points.violation,

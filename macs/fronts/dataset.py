@@ -15,8 +15,8 @@ import numpy as np
 
 from problems.compiled import Limit, Objective
 
-from ..front import Front
 from .labelled import Labelled, document, named_columns, read_named, read_variables, variable_columns, words
+from .points import Points
 from .provenance import Source
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ LENGTHS = ("node", "edge", "element", "state_function", "control_edge", "control
 """The dimensions in which points may differ; `<dimension>_count` (point) are the true lengths."""
 
 
-def root_dataset(front: Front) -> Labelled:
+def root_dataset(front: Points) -> Labelled:
     """Everything of a front but its trajectories."""
     names = list(dict.fromkeys(name for point in front for name in point.parameters))
     parameters = [[point.parameters.get(name, np.nan) for name in names] for point in front]
@@ -53,13 +53,13 @@ def root_dataset(front: Front) -> Labelled:
         "decision": (("point", "variable"), front.decision),
         "place": (("point", "variable"), _places(front)),
         "transcription": (("point",), words([document(transcription) for transcription in front.transcriptions])),
-        "note": (("point",), words(front._notes)),
-        "optimality": (("point",), np.array([np.nan if point.optimality is None else point.optimality for point in front])),
+        "note": (("point",), words(front.notes)),
+        "optimality": (("point",), np.array([np.nan if value is None else value for value in front.optimality])),
         "objective_unit": (("objective",), words(front.units)),
         "objective_sense": (("objective",), words(front.senses)),
         "objective_scale": (("objective",), np.array([np.nan if goal.scale is None else goal.scale for goal in front.goals])),
-        **named_columns(front._violations, "violations", "constraint"),
-        **named_columns(front._excursions, "excursions", "quantity"),
+        **named_columns(front.violations, "violations", "constraint"),
+        **named_columns(front.excursions, "excursions", "quantity"),
         **variable_columns(front.variables, "variable"),
         "objective": (("objective",), words(front.names)),
         "parameter": (("parameter",), words(names)),
@@ -89,7 +89,7 @@ def root_columns(root: Labelled) -> dict[str, Any]:
         "excursions": read_named(root, "excursions", "quantity"),
         "optimality": root["optimality"],
         "problem": _read_source(root.attrs),
-        "transcription": [json.loads(str(text)) for text in root["transcription"]],
+        "transcriptions": [json.loads(str(text)) for text in root["transcription"]],
         "solver": solver,
         "stats": stats,
         "message": str(root.attrs["message"]),
@@ -97,12 +97,12 @@ def root_columns(root: Labelled) -> dict[str, Any]:
     }
 
 
-def phase_names(front: Front) -> list[str]:
+def phase_names(front: Points) -> list[str]:
     """The phases that the trajectories of a front have; none for a black box."""
     return next((list(point.trajectory) for point in front if point.trajectory is not None), [])
 
 
-def phase_dataset(front: Front, name: str) -> Labelled:
+def phase_dataset(front: Points, name: str) -> Labelled:
     """The trajectories of one phase, all points. Raises KeyError if there is no such phase."""
     phases = [None if point.trajectory is None else point.trajectory[name] for point in front]
     first = next((phase for phase in phases if phase is not None), None)
@@ -196,7 +196,7 @@ def _counts(rows: Sequence[Mapping[str, np.ndarray] | None], dimension: str) -> 
     return np.array([0 if row is None else row[array].shape[axis] for row in rows], dtype=int)
 
 
-def _attributes(front: Front) -> dict[str, Any]:
+def _attributes(front: Points) -> dict[str, Any]:
     stats = front.stats
     return {
         "format": FORMAT,
@@ -209,9 +209,9 @@ def _attributes(front: Front) -> dict[str, Any]:
     }
 
 
-def _places(front: Front) -> np.ndarray:
+def _places(front: Points) -> np.ndarray:
     places = np.full(front.decision.shape, -1, dtype=np.int32)
-    for row, columns in zip(places, front._decisions.places, strict=True):
+    for row, columns in zip(places, front.places, strict=True):
         row[columns] = np.arange(len(columns))
     return places
 

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from ..front import Front
 from ..io.atomic import check_target, write_whole
 from .dataset import FORMAT, VERSION, phase_dataset, phase_names, root_columns, root_dataset, trajectories
 from .labelled import Labelled, document, words
+from .points import Points
 
 CLOSEST = "_closest"
 
@@ -35,13 +35,13 @@ DIMENSION_ONLY = "This is a netCDF dimension but not a netCDF variable"
 """What netCDF-4 calls a dimension without labels."""
 
 
-def save(front: Front, path: str | PathLike[str]) -> None:
+def save(front: Points, path: str | PathLike[str]) -> None:
     """Write a front; see `Front.save`."""
     check_target(path)
     write_whole(path, to_bytes(front))
 
 
-def load(path: str | PathLike[str], problem: Any = None) -> Front:
+def load(path: str | PathLike[str], problem: Any = None) -> Points:
     """Read a front; see `Front.load`."""
     try:
         content = Path(path).read_bytes()
@@ -61,14 +61,14 @@ def load(path: str | PathLike[str], problem: Any = None) -> Front:
     return front
 
 
-def save_csv(front: Front, path: str | PathLike[str]) -> None:
+def save_csv(front: Points, path: str | PathLike[str]) -> None:
     """Write objectives, violation, status and decisions; see `Front.to_csv`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     columns = [(goal.name, goal.unit) for goal in front.goals]
     decisions = [(variable.name, variable.unit) for variable in front.variables]
     writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in [*columns, ("violation", ""), ("status", ""), *decisions]])
-    for point, objectives, place in zip(front, front.objectives.tolist(), front._decisions.places, strict=True):
+    for point, objectives, place in zip(front, front.objectives.tolist(), front.places, strict=True):
         # Of a variable that the point, on a mesh of its own, does not have, the cell is empty.
         cells = [""] * len(front.variables)
         for column, value in zip(place.tolist(), point.decision.tolist(), strict=True):
@@ -78,7 +78,7 @@ def save_csv(front: Front, path: str | PathLike[str]) -> None:
     write_whole(path, text.getvalue().encode())
 
 
-def to_bytes(front: Front) -> bytes:
+def to_bytes(front: Points) -> bytes:
     """The content of a front's file."""
     import h5netcdf
 
@@ -89,7 +89,7 @@ def to_bytes(front: Front) -> bytes:
     return buffer.getvalue()
 
 
-def from_bytes(content: bytes) -> Front:
+def from_bytes(content: bytes) -> Points:
     """The front in a file's content. Raises whatever comes if it is none."""
     import h5py
 
@@ -103,7 +103,7 @@ def from_bytes(content: bytes) -> Front:
         return _read_front(file)
 
 
-def _datasets(front: Front, group: str = "") -> Iterator[tuple[str, Labelled]]:
+def _datasets(front: Points, group: str = "") -> Iterator[tuple[str, Labelled]]:
     """A front's groups by name, its root first."""
     root = root_dataset(front)
     groups = _group_names(phase_names(front), {CLOSEST, *root.variables, *root.sizes})
@@ -143,11 +143,11 @@ def _write_group(group: Any, data: Labelled) -> None:
         group.attrs[key] = value
 
 
-def _read_front(group: Any) -> Front:
+def _read_front(group: Any) -> Points:
     root = _read_group(group)
     phases = [_read_group(group[place]) for place in json.loads(root.attrs[PHASES]).values()]
     closest = _read_front(group[CLOSEST])[0] if root.attrs["has_closest"] else None
-    return Front(**root_columns(root), trajectories=trajectories(root, phases), closest=closest)
+    return Points(**root_columns(root), trajectories=trajectories(root, phases), closest=closest)
 
 
 def _read_group(group: Any) -> Labelled:

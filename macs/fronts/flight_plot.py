@@ -1,4 +1,4 @@
-"""Drawing one point: the states, controls and path constraints of its flight over time."""
+"""Picture of one trajectory: its states, controls and path constraints over time."""
 
 from __future__ import annotations
 
@@ -15,38 +15,30 @@ from .style import COLORS, GREY, STYLE, label, new_figure
 if TYPE_CHECKING:
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
-    from ..point import Point
-
 DENSE = np.linspace(-1.0, 1.0, 41)
 """Where a polynomial is drawn, on each element."""
 
 
-def draw_point(point: Point, figure: Any = None) -> np.ndarray:
-    """Draw a flight: a panel for each state, then control, then path constraint, all phases on one axis of time.
+def draw_flight(flight: Trajectory, title: str, figure: Any = None) -> np.ndarray:
+    """Draw a trajectory: a panel for each state, then control, then path constraint, all phases on one axis of time.
 
     Lines are the method's own polynomials, element by element, so that jumps show; dots are its nodes; dashes are bounds, where they are
     near enough to be drawn without flattening what is between them. Panels name them always.
 
     Parameters
     ----------
-    point : Point
+    flight : Trajectory
+    title : str
+        Stands above the panels.
     figure : matplotlib Figure, optional
         An empty one to draw into.
 
     Returns
     -------
     array of Axes, one for each panel
-
-    Raises
-    ------
-    ValueError
-        For a point without a trajectory.
     """
     import matplotlib
 
-    flight = point.trajectory
-    if flight is None:
-        raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         panels = quantities(flight)
         columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
@@ -60,7 +52,7 @@ def draw_point(point: Point, figure: Any = None) -> np.ndarray:
             _draw_panel(ax, flight, name, kind)
         for ax in grid[len(panels) :]:
             ax.remove()
-        _finish(figure, grid[: len(panels)], columns, flight, point)
+        _finish(figure, grid[: len(panels)], columns, flight, title)
     return grid[: len(panels)]
 
 
@@ -152,8 +144,8 @@ def _range(limit: Variable | Limit) -> str:
     return f"= {low}" if limit.lower == limit.upper else f"in [{low}, {high}]"
 
 
-def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, point: Point) -> None:
-    """Times, the borders and names of the phases, and which point it is."""
+def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, title: str) -> None:
+    """Times, the borders and names of the phases, and the title."""
     unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flight.phases))
     for i, ax in enumerate(axes):
         for phase in flight.phases[1:]:
@@ -168,9 +160,4 @@ def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, poi
 
         handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(flight)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
-    goals = point._front.goals
-    values = ", ".join(
-        f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}"
-        for goal, value in zip(goals, point.objectives.values(), strict=True)
-    )
-    figure.suptitle(values, fontsize=9, x=0.01, ha="left")
+    figure.suptitle(title, fontsize=9, x=0.01, ha="left")

@@ -12,16 +12,16 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from ..point import Point
+from .points import Point
 from .style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..front import Front
+    from .points import Points
 
 
-def save_picture(what: Front | Point, path: str | PathLike[str]) -> None:
+def save_picture(what: Points | Point, path: str | PathLike[str]) -> None:
     """Draw a front, or the flight of a point, into a file whose suffix says its kind."""
     import matplotlib
 
@@ -31,18 +31,18 @@ def save_picture(what: Front | Point, path: str | PathLike[str]) -> None:
             what.plot(figure)
         else:
             figure.set_size_inches(*_size(what))
-            what.plot(figure.add_subplot())
+            draw_front(what, figure.add_subplot())
     suffix = Path(path).suffix.lstrip(".").lower()
     picture = io.BytesIO()
     figure.savefig(picture, format=suffix, dpi=200)
     write_whole(path, picture.getvalue())
 
 
-def _size(front: Front) -> tuple[float, float]:
+def _size(front: Points) -> tuple[float, float]:
     return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
 
 
-def draw_front(front: Front, ax: Axes | None = None) -> Axes:
+def draw_front(front: Points, ax: Axes | None = None) -> Axes:
     """Draw the objectives of a front.
 
     One objective: against the point's number. Two: a scatter. Three: the third as colour (or in space, on 3-D Axes). More: parallel
@@ -50,7 +50,7 @@ def draw_front(front: Front, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    front : Front
+    front : Points
     ax : Axes, optional
         Where to draw; a new figure's otherwise.
 
@@ -71,14 +71,14 @@ def draw_front(front: Front, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _title(front: Front) -> str:
+def _title(front: Points) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
     return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
 
 
-def _scatter(front: Front, ax: Any) -> None:
+def _scatter(front: Points, ax: Any) -> None:
     if not len(front):
         ax.text(0.5, 0.9, front.message, transform=ax.transAxes, ha="center", va="center", wrap=True, color=GREY)
         front = front if front.closest is None else front.closest.alone()
@@ -101,7 +101,7 @@ def _scatter(front: Front, ax: Any) -> None:
         _mark_extremes(front, ax)
 
 
-def _mark_extremes(front: Front, ax: Any) -> None:
+def _mark_extremes(front: Points, ax: Any) -> None:
     """Ring the best point of each of two objectives, and name them in a legend."""
     F = np.where((front.status == "converged")[:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
@@ -113,7 +113,7 @@ def _mark_extremes(front: Front, ax: Any) -> None:
     ax.legend(frameon=True, framealpha=0.85, edgecolor="none", loc="best")
 
 
-def _parallel(front: Front, ax: Any) -> None:
+def _parallel(front: Points, ax: Any) -> None:
     """One upright axis for each objective, better at the top, a line for each point, coloured by the first objective."""
     import matplotlib
 

@@ -1,14 +1,408 @@
-"""What a front holds of its points, an entry for each: small helpers that keep arrays and lists in step."""
+"""Points of a front as columns, and one point as a view of a row. Nothing here knows of files, tables, pictures or solvers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Self, overload
 
 import numpy as np
 
+from problems.compiled import CompiledProblem, Objective, Variable
+from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.trajectory import Trajectory
 
-def frozen(array: np.ndarray) -> np.ndarray:
+from .decision_table import Decisions
+from .provenance import STATS, Source, versions
+
+
+class Points:
+    """Points of one problem as columns, one entry a point.
+
+    Parameters
+    ----------
+    F : array (n, m)
+        Objectives, all minimised.
+    decision : n arrays
+        Decision vectors in the user's units.
+    violation, status : (n,)
+        Largest scaled residual of any constraint; "converged", "infeasible", "failed" or "timeout".
+    goals : tuple of Objective
+        The m objectives as the user stated them.
+    variables : tuple of Variable, or n of them
+        The entries of the decision vectors: the same for all points, or for each its own.
+    violations : n dicts, optional
+        Scaled residual by constraint.
+    trajectories : n Trajectories, optional
+        None for black boxes; an entry may be None where a point has none.
+    excursions : n dicts or None, optional
+        By how much, scaled, a quantity leaves its bounds between nodes, by name.
+    optimality : n floats or None, optional
+    notes : n str, optional
+        Remarks, such as why a mesh could not be refined enough.
+    transcriptions : dict, or n of them, optional
+        `{"method": ..., "settings": {...}}`: how the problem was transcribed for all points, or for each; None for black boxes.
+    problem : CompiledProblem or Source, optional
+        None for black boxes.
+    solver : dict, optional
+        `{"name": ..., "settings": {...}}`.
+    stats : dict, optional
+        What the points cost; missing entries of `STATS` are added.
+    message : str
+        Of an empty front: why, with the most violated constraint.
+    closest : Point, optional
+        The least infeasible point of a search that found nothing feasible.
+    sort : bool
+        By the first objective, in the user's value; else the order given is kept.
+
+    Attributes
+    ----------
+    F, violation, status : read-only arrays
+    violations, trajectories, excursions, optimality, notes, transcriptions : tuples of n
+        As above. Points on one mesh share one dict of `transcriptions`.
+    goals, solver, stats, message, source
+        As above; `source` identifies the problem, None for a black box.
+    variables : tuple of Variable (D)
+        Every variable that any point has. Those of one point, in the order of its decision vector, are `Point.variables`.
+    decision : array (n, D)
+        A column for each of `variables`; NaN where a point, on a mesh of its own, has no such variable. `Point.decision` is without these.
+    """
+
+    ROWS = ("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions")
+    """The columns that have one entry a point, beside the decision vectors."""
+
+    def __init__(
+        self,
+        *,
+        F: Any,
+        decision: Any,
+        violation: Any,
+        status: Any,
+        goals: Sequence[Objective],
+        variables: Sequence[Variable | Sequence[Variable]] = (),
+        violations: Sequence[Mapping[str, float] | None] | None = None,
+        trajectories: Sequence[Trajectory | None] | None = None,
+        excursions: Sequence[Mapping[str, float] | None] | None = None,
+        optimality: Sequence[float | None] | None = None,
+        notes: Sequence[str | None] | None = None,
+        transcriptions: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
+        problem: CompiledProblem | Source | None = None,
+        solver: Mapping[str, Any] | None = None,
+        stats: Mapping[str, Any] | None = None,
+        message: str = "",
+        closest: Point | None = None,
+        sort: bool = True,
+    ):
+        self.goals = tuple(goals)
+        self.solver = dict(solver or {})
+        self.stats: dict[str, Any] = {**STATS, "failures": {}, "versions": versions(), **(stats or {})}
+        self.stats["failures"] = dict(self.stats["failures"])
+        self.message = message
+        self._closest = closest
+        self.source = Source.of(problem) if isinstance(problem, CompiledProblem) else problem
+        self._problem = problem if isinstance(problem, CompiledProblem) else None
+
+        rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
+        n = len(rows)
+        order = by_first(rows * self._signs) if sort else np.arange(n)
+
+        def ordered(values: Any, name: str) -> list[Any]:
+            entries = column(values, n, name)
+            return [entries[i] for i in order]
+
+        self.F = frozen(rows[order])
+        self.violation = frozen(np.asarray(ordered(violation, "violation"), dtype=float))
+        self.status = frozen(np.asarray(ordered(status, "status"), dtype=str))
+        common = not len(variables) or isinstance(variables[0], Variable)
+        self._decisions = Decisions.of(ordered(decision, "decision"), variables if common else ordered(variables, "variables"))
+        given = [transcriptions] * n if isinstance(transcriptions, Mapping) else transcriptions
+        self.transcriptions = shared(ordered(given, "transcriptions"))
+        self.violations: tuple[Mapping[str, float] | None, ...] = tuple(ordered(violations, "violations"))
+        self.trajectories: tuple[Trajectory | None, ...] = tuple(ordered(trajectories, "trajectories"))
+        self.excursions: tuple[Mapping[str, float] | None, ...] = tuple(ordered(excursions, "excursions"))
+        self.optimality = tuple(number(value) for value in ordered(optimality, "optimality"))
+        self.notes = tuple(note or "" for note in ordered(notes, "notes"))
+
+    @property
+    def _signs(self) -> np.ndarray:
+        return np.array([goal.sign for goal in self.goals])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objectives."""
+        return tuple(goal.name for goal in self.goals)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the objectives."""
+        return tuple(goal.unit for goal in self.goals)
+
+    @property
+    def senses(self) -> tuple[str, ...]:
+        """ "minimize" or "maximize", for each objective."""
+        return tuple(goal.sense for goal in self.goals)
+
+    @property
+    def objectives(self) -> np.ndarray:
+        """Objectives (n, m) in the user's units and senses."""
+        return self.F * self._signs
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """See the class."""
+        return self._decisions.variables
+
+    @property
+    def decision(self) -> np.ndarray:
+        """See the class."""
+        return self._decisions.values
+
+    @property
+    def places(self) -> tuple[np.ndarray, ...]:
+        """For each point, the columns of `decision` that its own vector consists of, in its order."""
+        return self._decisions.places
+
+    @property
+    def closest(self) -> Point | None:
+        """The least infeasible point. None only if not one evaluation gave a number."""
+        if self._closest is not None or not len(self):
+            return self._closest
+        return self[int(np.argmin(np.where(np.isnan(self.violation), np.inf, self.violation)))]
+
+    @property
+    def problem(self) -> CompiledProblem | None:
+        """The problem, if it is known; points from a file have it after `compiled` has loaded it."""
+        return self._problem
+
+    def compiled(self) -> CompiledProblem:
+        """The problem: the one that the points were made with, else the one that their address loads (which runs the code there).
+
+        Raises
+        ------
+        ValueError
+            For a black box, and where the problem is not found or is another one.
+        """
+        if self.source is None:
+            raise ValueError("this front is of a black box: there are no dynamics to simulate")
+        if self._problem is None:
+            self._problem = self.source.load()
+        return self._problem
+
+    def __len__(self) -> int:
+        return len(self.F)
+
+    def __iter__(self) -> Iterator[Point]:
+        return (Point(self, i) for i in range(len(self)))
+
+    @overload
+    def __getitem__(self, key: int) -> Point: ...
+    @overload
+    def __getitem__(self, key: slice | Sequence[int] | np.ndarray) -> Self: ...
+    def __getitem__(self, key: Any) -> Point | Self:
+        """A Point for a number; points, in that order, for a slice, a list of numbers or a mask."""
+        if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
+            if not -len(self) <= key < len(self):
+                raise IndexError(f"point {key} of a front of {len(self)}" + (f": {self.message}" if self.message and not len(self) else ""))
+            return Point(self, int(key) % len(self))
+        return self.take(np.arange(len(self))[key])
+
+    def take(self, rows: Sequence[int] | np.ndarray) -> Self:
+        """Some of the points, in the order given; all that is not a column stays."""
+        index = np.asarray(rows, dtype=int)
+        taken = self._copy()
+        taken._decisions = self._decisions.take(index)
+        for name in self.ROWS:
+            entries = getattr(self, name)
+            setattr(taken, name, frozen(entries[index]) if isinstance(entries, np.ndarray) else tuple(entries[i] for i in index))
+        return taken
+
+    def replace(self, **changes: Any) -> Self:
+        """The same points with other columns of `ROWS`, or another problem, solver, stats, message or closest.
+
+        Raises
+        ------
+        ValueError
+            If a column has not one entry for each point.
+        """
+        changed = self._copy()
+        for name, value in changes.items():
+            if name in self.ROWS:
+                entries = column(value, len(self), name)
+                setattr(changed, name, frozen(entries) if isinstance(getattr(self, name), np.ndarray) else tuple(entries))
+            elif name == "problem":
+                changed._problem, changed.source = value, Source.of(value)
+            elif name == "closest":
+                changed._closest = value
+            elif name in ("solver", "stats", "message"):
+                setattr(changed, name, value)
+            else:
+                raise TypeError(f"points have no '{name}' to replace")
+        return changed
+
+    def sorted(self) -> Self:
+        """The same points in the order of the first objective, in the user's value."""
+        return self.take(by_first(self.objectives))
+
+    @classmethod
+    def concatenate(cls, several: Sequence[Points]) -> Self:
+        """The points of several sets, one after the other; all that is not a column is that of the first set whose problem is known."""
+        known = next((points for points in several if points.problem is not None), several[0])
+        all_rows: dict[str, Any] = {name: [entry for points in several for entry in getattr(points, name)] for name in cls.ROWS}
+        every = [point for points in several for point in points]
+        return cls(
+            **all_rows,
+            decision=[point.decision for point in every],
+            variables=[point.variables for point in every] or known.variables,
+            goals=known.goals,
+            problem=known.problem or known.source,
+            solver=known.solver,
+            stats=known.stats,
+            message=known.message,
+            closest=known._closest,
+            sort=False,
+        )
+
+    def _copy(self) -> Self:
+        copy = type(self).__new__(type(self))
+        copy.__dict__.update(self.__dict__)
+        copy.stats = dict(self.stats)
+        return copy
+
+
+class Point:
+    """One point of a front: a trajectory, or one input of a black box. It keeps its front alive."""
+
+    __slots__ = ("_points", "index")
+
+    def __init__(self, points: Points, index: int):
+        self._points = points
+        self.index = index
+
+    def alone(self) -> Points:
+        """The front of this point alone."""
+        return self._points.take([self.index])
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """The objectives as the user stated them."""
+        return self._points.goals
+
+    @property
+    def objectives(self) -> dict[str, float]:
+        """By name, in the user's units and senses."""
+        return dict(zip(self._points.names, self._points.objectives[self.index].tolist(), strict=True))
+
+    @property
+    def F(self) -> np.ndarray:
+        """Objectives (m,), all minimised."""
+        return self._points.F[self.index]
+
+    @property
+    def violation(self) -> float:
+        """Largest scaled residual of any constraint."""
+        return float(self._points.violation[self.index])
+
+    @property
+    def violations(self) -> dict[str, float]:
+        """Scaled residual by constraint; empty where none was recorded."""
+        return dict(self._points.violations[self.index] or {})
+
+    @property
+    def status(self) -> str:
+        """ "converged", "infeasible", "failed" or "timeout"."""
+        return str(self._points.status[self.index])
+
+    @property
+    def decision(self) -> np.ndarray:
+        """The decision vector, in the user's units; `variables` names its entries."""
+        return self._points._decisions.row(self.index)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables that are the entries of the decision vector."""
+        return self._points._decisions.variables_of(self.index)
+
+    @property
+    def transcription(self) -> dict[str, Any] | None:
+        """The transcription of this point, as `Transcription.to_dict` has it. None for a black box."""
+        return self._points.transcriptions[self.index]
+
+    @property
+    def note(self) -> str:
+        """A remark on the point; mostly empty."""
+        return self._points.notes[self.index]
+
+    @property
+    def source(self) -> Source | None:
+        """The identity of the problem. None for a black box."""
+        return self._points.source
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Static decision variables by name. Of a black box, these are all there are."""
+        if self._points.source is None:
+            return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
+        return {} if self.trajectory is None else dict(self.trajectory.parameters)
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The trajectory. None for a black box."""
+        return self._points.trajectories[self.index]
+
+    @property
+    def optimality(self) -> float | None:
+        """Scaled residual of the conditions of Pareto optimality; None where it was not computed, as after Ctrl-C or a time limit."""
+        return self._points.optimality[self.index]
+
+    @property
+    def excursions(self) -> dict[str, float] | None:
+        """How far, scaled, a control, path constraint or state leaves its bounds *between* nodes, by name; None where unknown."""
+        found = self._points.excursions[self.index]
+        return None if found is None else dict(found)
+
+    def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation:
+        """Integrate the dynamics under this point's own controls by an integrator that is independent of the transcription.
+
+        Parameters
+        ----------
+        rtol, atol : float
+            Tolerances of the integrator; `atol` is relative to the scales of the states.
+        method : str
+            Any of `scipy.integrate.solve_ivp`.
+
+        Returns
+        -------
+        Simulation
+            `defect[phase][state]`, `max_defect`, `violation`, `violations`, `objectives`, `trajectory`.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to simulate: a black box, or a saved front whose problem cannot be found.
+        """
+        problem = self._points.compiled()
+        if self.trajectory is None:
+            raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
+        return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
+
+    def plot(self, figure: Any = None) -> np.ndarray:
+        """Draw states, controls and path constraints over time; returns the array of Axes, one for each of them."""
+        from .flight_plot import draw_flight
+
+        if self.trajectory is None:
+            raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
+        return draw_flight(self.trajectory, self.title, figure)
+
+    @property
+    def title(self) -> str:
+        """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
+        named = zip(self.goals, self.objectives.values(), strict=True)
+        return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+
+    def __repr__(self) -> str:
+        return f"<Point: {self.title}; violation {self.violation:.1e}, {self.status}>"
+
+
+def frozen(array: Any) -> np.ndarray:
     """A read-only copy."""
     copy = np.array(array)
     copy.setflags(write=False)
@@ -21,7 +415,7 @@ def by_first(objectives: np.ndarray) -> np.ndarray:
 
 
 def number(value: Any) -> float | None:
-    """None for None and for what is no number."""
+    """None for None and for NaN."""
     return None if value is None or np.isnan(value) else float(value)
 
 
@@ -35,7 +429,7 @@ def column(values: Any, n: int, name: str) -> Any:
 
 
 def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """Equal ones as one object."""
+    """Equal dicts as one object."""
     distinct: list[dict[str, Any]] = []
     found: list[dict[str, Any] | None] = []
     for given in dicts:

@@ -1,23 +1,26 @@
-"""Which problem a front belongs to: enough to find it again, and to know that it is the same one."""
+"""Origin of a result: the identity of its problem, what it cost, and the versions that made it."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from problems.compiled import CompiledProblem
+import problems
+from problems.compiled import CompiledProblem
+
+from ..evaluation.evaluator import Counts
 
 
 @dataclass(frozen=True)
 class Source:
-    """The name of a problem, what `problems.load` takes to make it, and its fingerprint.
+    """Identity of a problem: its name, its fingerprint, and the address and data that `problems.load` makes it from.
 
-    `address` is empty where a script built the problem; then only the script can give it again.
+    `address` is empty where a script stated the problem; then only the script can give it again.
     """
 
     name: str
@@ -30,12 +33,12 @@ class Source:
         return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data))
 
     def check(self, problem: Any, whose: str) -> CompiledProblem:
-        """`problem` (a `Problem` or a `CompiledProblem`), compiled, once it is known to be the one that is meant.
+        """`problem` (a `Problem` or a `CompiledProblem`), compiled.
 
         Raises
         ------
         ValueError
-            If it is another problem; the message says whose it is not.
+            If it is another problem than this source's; `whose` begins the message.
         """
         compiled = problem.compile() if hasattr(problem, "compile") else problem
         if compiled.fingerprint != self.fingerprint:
@@ -57,8 +60,6 @@ class Source:
             raise ValueError(
                 f"problem '{self.name}' was stated in a script, so it cannot be found by name: pass it, Front.load(path, problem=problem)"
             )
-        import problems
-
         try:
             problem = problems.load(self.address, **self.data)
         except Exception as error:
@@ -79,7 +80,7 @@ STATS: dict[str, Any] = {
     "tolerance": 1e-6,
     "reproducible": True,
 }
-"""What every front's `stats` hold, and `versions`."""
+"""Entries that the `stats` of every front have, beside `versions`."""
 
 
 PACKAGES = ("macs-trajectories", "casadi", "numpy", "scipy")
@@ -99,3 +100,48 @@ def _found() -> tuple[tuple[str, str], ...]:
 def versions() -> dict[str, str]:
     """Versions of Python, of this package and of those whose arithmetic its results depend on, by name."""
     return dict(_found())
+
+
+def costs(counts: Counts, **about: Any) -> dict[str, Any]:
+    """`stats` of a front from the counts of a run, with `about`: `wall_time`, `seed`, `tolerance` and more."""
+    return {
+        "evaluations": counts.evaluations,
+        "inner_iterations": counts.inner_iterations,
+        "gradient_solves": counts.gradient_solves,
+        "fallbacks": counts.fallbacks,
+        "failures": dict(counts.failures),
+        **about,
+    }
+
+
+def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopped: str) -> dict[str, Any]:
+    """`stats` of a front that was worked on further: counts and seconds are added, `stopped` says what ended the work early."""
+    return {
+        **stats,
+        "gradient_solves": stats["gradient_solves"] + counts.gradient_solves,
+        "inner_iterations": stats["inner_iterations"] + counts.inner_iterations,
+        "wall_time": stats["wall_time"] + wall_time,
+        "reproducible": stats["reproducible"] and not (counts.clocked or stopped),
+        **({"stopped": stopped} if stopped else {}),
+    }
+
+
+def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """`stats` of merged fronts: costs are summed, seeds listed; the loosest tolerance and the least reproducible run count for all."""
+    summed = {key: sum(s[key] for s in several) for key in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time")}
+    failures: Counter[str] = Counter()
+    found: dict[str, dict[str, None]] = {}
+    seeds: list[Any] = []
+    for stats in several:
+        failures.update(stats["failures"])
+        seeds += stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
+        for package, number in stats["versions"].items():
+            found.setdefault(package, {})[number] = None
+    return {
+        **summed,
+        "failures": dict(failures),
+        "seed": seeds if len(seeds) > 1 else seeds[0],
+        "tolerance": max(stats["tolerance"] for stats in several),
+        "reproducible": all(stats["reproducible"] for stats in several),
+        "versions": {package: ", ".join(numbers) for package, numbers in found.items()},
+    }

@@ -1,4 +1,4 @@
-"""What a front's points turn out to be when somebody flies them: as they are stated, or under other data."""
+"""Re-evaluates points by independent simulation, optionally under other problem data."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.evaluator import CONVERGED, INFEASIBLE
-from ..front import Front
 from ..pareto.dominance import nondominated
-from .points import frozen
-from .provenance import Source
+from .points import Points
 
 if TYPE_CHECKING:
     from problems import Problem
     from transcription.trajectories.trajectory import Trajectory
 
 
-def simulated(front: Front, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Front:
+def simulated(front: Points, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Points:
     """The front with objectives and violations as simulated, in the same order; see `Front.simulate`."""
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
@@ -32,19 +30,15 @@ def simulated(front: Front, problem: Problem | CompiledProblem | None, tolerance
     else:
         compiled = problem if isinstance(problem, CompiledProblem) else problem.compile()
         check_alike(known, compiled)
-    missing = [point.index for point in front if point.trajectory is None]
+    missing = [point for point in front if point.trajectory is None]
     if missing:
-        raise ValueError(f"point {missing[0]} has no trajectory to fly: its status is '{front[missing[0]].status}'")
-    planned = [point.trajectory for point in front if point.trajectory is not None]
-    flights = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
-    violations = [{**flight.violations, **_decided(plan, compiled)} for flight, plan in zip(flights, planned, strict=True)]
-    signs = compiled.signs
-    F = np.array([list(flight.objectives.values()) for flight in flights]).reshape(len(front), len(signs)) * signs
-    found = judged(front, F, np.array([max(one.values(), default=0.0) for one in violations]), tolerance)
-    found._violations = violations
-    found._trajectories = [flight.trajectory for flight in flights]
-    found._problem, found.source = compiled, Source.of(compiled)
-    return found
+        raise ValueError(f"point {missing[0].index} has no trajectory to simulate: its status is '{missing[0].status}'")
+    planned = [trajectory for trajectory in front.trajectories if trajectory is not None]
+    found = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
+    violations = [{**one.violations, **_decided(plan, compiled)} for one, plan in zip(found, planned, strict=True)]
+    F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(compiled.signs)) * compiled.signs
+    judged_points = judged(front, F, np.array([max(one.values(), default=0.0) for one in violations]), tolerance)
+    return judged_points.replace(violations=violations, trajectories=[one.trajectory for one in found], problem=compiled)
 
 
 def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
@@ -68,17 +62,14 @@ def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
     return found
 
 
-def judged(front: Front, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Front:
-    """The front with other objectives (n, m), all minimised, and violations (n,); a point converged if it violates nothing by more."""
-    found = front[:]
-    found.F, found.violation = frozen(F), frozen(violation)
-    found.status = frozen(np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE))
-    found._optimality = [None] * len(front)
-    found.stats["tolerance"] = float(tolerance)
-    return found
+def judged(front: Points, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Points:
+    """The points with other objectives (n, m), all minimised, and violations (n,); a point converged if it violates nothing by more."""
+    status = np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE)
+    stats = {**front.stats, "tolerance": float(tolerance)}
+    return front.replace(F=F, violation=violation, status=status, optimality=[None] * len(front), stats=stats)
 
 
-def best(front: Front) -> np.ndarray:
+def best(front: Points) -> np.ndarray:
     """Which points (k,) converged and are not dominated by others that did, by the first objective."""
     converged = np.flatnonzero(front.status == CONVERGED)
     kept = converged[nondominated(front.F[converged])]
@@ -86,7 +77,7 @@ def best(front: Front) -> np.ndarray:
 
 
 def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
-    """Raise ValueError unless what one problem decides can be flown under the other."""
+    """Raise ValueError unless trajectories of one problem can be simulated under the other."""
 
     def parts(problem: CompiledProblem) -> dict[str, list[str]]:
         named = {
@@ -101,7 +92,5 @@ def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
     ours, theirs = parts(known), parts(other)
     for what, names in ours.items():
         if theirs.get(what) != names:
-            raise ValueError(
-                f"points of '{known.name}' cannot be flown under '{other.name}': {what} are {', '.join(theirs.get(what, [])) or 'none'} "
-                f"there and {', '.join(names) or 'none'} here"
-            )
+            there, here = (", ".join(listed) or "none" for listed in (theirs.get(what, []), names))
+            raise ValueError(f"points of '{known.name}' cannot be simulated under '{other.name}': {what} are {there} there and {here} here")

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 from ..io.text import call, counted, duration, numbers, text_table
 
 if TYPE_CHECKING:
-    from ..front import Front
-    from ..point import Point
+    from .points import Point, Points
 
 
-def front_table(front: Front, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+def front_table(front: Points, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
     """A headline, a row for each point and a footer: what `Front.table` returns."""
     more = {**({} if defects is None else {"defect": defects}), **(columns or {})}
     for header, values in more.items():
@@ -45,7 +44,7 @@ def front_table(front: Front, defects: Sequence[float] | None = None, columns: M
     return "\n".join([headline(front), "", table, "", *_footer(front)]).rstrip()
 
 
-def headline(front: Front) -> str:
+def headline(front: Points) -> str:
     """Problem, points, transcription, and what they cost, on one line."""
     seed, count = front.stats["seed"], len(front)
     parts = [
@@ -60,7 +59,7 @@ def headline(front: Front) -> str:
     return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
 
 
-def _transcribed(front: Front) -> str:
+def _transcribed(front: Points) -> str:
     """How the problem was written for the points, or for the nearest where there is none."""
     given = front if len(front) or front.closest is None else front.closest.alone()
     distinct = list({id(one): one for one in given.transcriptions if one is not None}.values())
@@ -88,7 +87,7 @@ def _excursion(found: Mapping[str, float] | None) -> str:
     return f"{name} by {found[name]:.2g}{rest}"
 
 
-def _footer(front: Front) -> list[str]:
+def _footer(front: Points) -> list[str]:
     lines = []
     leaving = [
         (max(found.values()), max(found, key=lambda key: found[key]), i) for i, point in enumerate(front) if (found := point.excursions)
@@ -116,7 +115,7 @@ def _footer(front: Front) -> list[str]:
     return lines
 
 
-def _nothing(front: Front) -> list[str]:
+def _nothing(front: Points) -> list[str]:
     lines = [front.message or "There is no point."]
     if front.closest is not None:
         lines += ["", "The least infeasible point:", "", front_table(front.closest.alone()).split("\n", 2)[2]]

@@ -20,8 +20,7 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..front import Front
-from ..point import Point
+from .points import Point, Points
 
 EQUAL = 1e-9
 """Numbers that another run of the same arithmetic on another machine may give, in scales."""
@@ -67,7 +66,7 @@ class Check:
 
 
 def verify(
-    front: Front,
+    front: Points,
     *,
     tolerance: float,
     rtol: float = 1e-10,
@@ -79,7 +78,7 @@ def verify(
 
     Parameters
     ----------
-    front : Front
+    front : Points
         Of a problem that is known or can be loaded.
     tolerance : float
         Largest defect, violation and miss of a flown trajectory that pass. The transcription's own violation is held against the front's
@@ -139,7 +138,7 @@ def verify(
     return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
 
 
-def objective_scales(front: Front) -> np.ndarray:
+def objective_scales(front: Points) -> np.ndarray:
     """What counts as one in each objective (m,): its own scale, or the largest size or the range that it has on the front."""
     largest = np.abs(front.F).max(axis=0, initial=0.0)
     found = np.maximum(largest, np.ptp(front.F, axis=0) if len(front) else 0.0)

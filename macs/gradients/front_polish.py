@@ -1,50 +1,51 @@
-"""A front brought down to the Pareto front by gradients, on a transcription that is made for them, whoever found it on whichever."""
+"""Gradient polish of a finished front on another transcription, with back-off until its points are feasible when simulated.
+
+A search wants a transcription whose candidates are evaluated quickly, gradient solves want a sparse one. A point that exceeds a limit
+between its nodes is solved once more, inside of its limits by what it exceeded. A finer mesh would do it, too, at many times the cost:
+where the excess is small, so is the loss in the objectives. To keep away from constraints by their known excess is called back-off:
+Figueroa, Bahri, Bandoni and Romagnoli, "Economic impact of disturbances and uncertain parameters in chemical processes - a dynamic back-off
+analysis", Computers and Chemical Engineering 20(4), 1996.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from problems.checks import check_count, check_positive
-from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import Propagate
-from transcription.stopping import stopped_by
 from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certificates, vectors_front
+from ..evaluation.evaluator import CONVERGED
+from ..fronts.builders import certificates, vectors_points
 from ..fronts.merging import merge
-from ..io.console import Told
-from ..io.interrupts import Monitor
+from ..fronts.points import Point, Points
+from ..fronts.provenance import more_costs
+from ..fronts.simulated import simulated
+from ..io.console import working
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import ranges
-from .polish import Solves, polish
+from .polish import CountedSolves, polish
 
-if TYPE_CHECKING:
-    from ..front import Front
-    from ..point import Point
-
-KEPT_INSIDE = "kept inside its limits, so that it holds when it is flown"
-"""What there is to say of a point that missed some."""
+KEPT_INSIDE = "kept inside its limits, so that it is feasible when simulated"
+"""Note of a point that exceeded a limit before."""
 
 
 def polished(
-    front: Front,
+    front: Points,
     transcription: Transcription,
     solves: int | None,
     limit: int | None,
     verify: float | None,
     time_limit: float | None,
     progress: bool,
-) -> Front:
+) -> Points:
     """See `Front.polished`."""
     problem = front.compiled()
     check_problem(problem, transcription)
@@ -58,48 +59,44 @@ def polished(
     if time_limit is not None:
         check_positive("time_limit", time_limit)
     refuse_peaks(problem)
-    nlp = _written(problem, transcription)
+    nlp = transcription.nlp(problem)
     evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
-    with Told(progress) as told, Monitor(time_limit, None, None) as monitor, stopped_by(lambda: bool(monitor.reason)):
-        evaluator.before_batch = lambda: told(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
-        left = Solves(evaluator, solves)
+    with working(time_limit, progress) as (show, interrupts):
+        evaluator.before_batch = lambda: show(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
+        left = CountedSolves(evaluator, solves)
         begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
         if not len(begun):
-            found = front[:]
-            found.stats = _costs(front, evaluator.counts, monitor.elapsed, monitor.reason)
-            return found
+            return front.replace(stats=more_costs(front.stats, evaluator.counts, interrupts.elapsed, interrupts.reason))
         archive = polish(begun, left, limit)
         untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         moved = np.zeros(len(Z), dtype=bool)
         if verify is not None:
-            evaluator.before_batch = lambda: told("polish: points that miss something when flown are solved once more")
-            Z, holds, moved = hold(evaluator, Z, ranges(archive.F), verify)
-            Z, moved = Z[holds], moved[holds]
-            known = believable(nlp.evaluate(Z)[0], known, verify)
-        told(f"polish: how near to optimal {len(Z)} points are")
+            evaluator.before_batch = lambda: show("polish: points that are infeasible when simulated are solved once more")
+            Z, feasible, moved = back_off(evaluator, Z, ranges(archive.F), verify)
+            Z, moved = Z[feasible], moved[feasible]
+            known = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
+        show(f"polish: how near to optimal {len(Z)} points are")
         certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
-        # What was moved inside is no optimum of the problem as it is stated, but the nearest that can be flown.
+        # A point that was moved inside is no optimum of the problem as stated, but the nearest that is feasible when simulated.
         optimality = [None if inside else next(certified) for inside in moved]
-        taken, stopped = monitor.elapsed, monitor.reason
-    stats = _costs(front, evaluator.counts, taken, stopped)
+        elapsed, stopped = interrupts.elapsed, interrupts.reason
+    stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
-    found = merge([vectors_front(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
+    found = merge([vectors_points(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
-    found.solver, found.stats = dict(front.solver), stats
-    if not len(found):
-        found.message = f"no point misses less than {verify:g} when it is flown"
-    return found
+    message = found.message if len(found) else f"no point misses less than {verify:g} when simulated"
+    return found.replace(solver=dict(front.solver), stats=stats, message=message)
 
 
-def _archive(nlp: NLP, known: Front, tolerance: float) -> Archive:
-    """Known points on this mesh. What is promised is what was found, on whichever mesh: nothing worse is to take its place."""
+def _archive(nlp: NLP, known: Points, tolerance: float) -> Archive:
+    """Known points on this mesh, with the objectives that they have on their own: a polished point must not be worse than these."""
     starts = [nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None]
     return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
 
 
-def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
-    """What one solve makes of the least infeasible point: one point, or none."""
+def _made_feasible(nlp: NLP, closest: Point | None, solves: CountedSolves) -> Archive:
+    """One point by a solve from the least infeasible one; none if that fails."""
     if closest is None or closest.trajectory is None or not np.isfinite([*closest.F, closest.violation]).all():
         return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
     found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
@@ -107,39 +104,20 @@ def _made_feasible(nlp: NLP, closest: Point | None, solves: Solves) -> Archive:
     return Archive(found.Z[good], found.F[good], found.violation[good])
 
 
-def _costs(front: Front, counts: Counts, taken: float, stopped: str) -> dict[str, Any]:
-    """The stats of a front, with what was spent beside."""
-    before = front.stats
-    return {
-        **before,
-        "gradient_solves": before["gradient_solves"] + counts.gradient_solves,
-        "inner_iterations": before["inner_iterations"] + counts.inner_iterations,
-        "wall_time": before["wall_time"] + taken,
-        "reproducible": before["reproducible"] and not (counts.clocked or stopped),
-        **({"stopped": stopped} if stopped else {}),
-    }
-
-
-@lru_cache(maxsize=4)
-def _written(problem: CompiledProblem, transcription: Transcription) -> NLP:
-    """The problem by this method: fronts of one problem share it, and all that is compiled of it."""
-    return transcription.transcribe(problem)
-
-
 ROUNDS = 3
 """How often a point is moved further inside, at most."""
 
 
 MORE = 1.2
-"""How many times what was missed it is moved: where it moves to, it may miss a little more."""
+"""A point is moved by so many times the excess: it may be a little larger at the new place."""
 
 
 PART = 1e-4
-"""Errors of the integrator are this part of what may be missed, at most."""
+"""Errors of the integrator are this part of what may be excess, at most."""
 
 
-def hold(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vectors that hold, in place of such as do not.
+def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vectors that are feasible when simulated, in place of those that are not.
 
     Parameters
     ----------
@@ -150,64 +128,64 @@ def hold(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -
     ranges : array (m,)
         What counts as much in each objective.
     verify : float
-        By how much, in their scales, constraints may be missed in flight.
+        By how much, in their scales, constraints may be exceeded in a simulation.
 
     Returns
     -------
     Z : array (k, D)
-    holds : array (k,) of bool
-        Which do, in the end.
+    feasible : array (k,) of bool
+        Which are feasible when simulated, in the end.
     moved : array (k,) of bool
-        Which are not what they were.
+        Which were solved once more.
     """
     nlp, Z = evaluator.nlp, Z.copy()
     F = nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(ranges)))
     margins = np.zeros((len(Z), len(nlp.g_scale)))
-    holds, moved = np.zeros((2, len(Z)), dtype=bool)
+    feasible, moved = np.zeros((2, len(Z)), dtype=bool)
     waiting = np.arange(len(Z))
     for _ in range(ROUNDS):
-        waiting = _missing(nlp, Z, waiting, margins, holds, verify)
+        waiting = _infeasible(nlp, Z, waiting, margins, feasible, verify)
         if not len(waiting):
-            return Z, holds, moved
-        found = evaluator.refine(Z[waiting], F[waiting], np.tile(ranges, (len(waiting), 1)), margins[waiting])
+            return Z, feasible, moved
+        found = evaluator.descend(Z[waiting], F[waiting], np.tile(ranges, (len(waiting), 1)), margins[waiting])
         good = found.status == CONVERGED
         waiting = waiting[: len(good)][good]
         Z[waiting], moved[waiting] = found.Z[good], True
-    _missing(nlp, Z, waiting, margins, holds, verify)
-    return Z, holds, moved
+    _infeasible(nlp, Z, waiting, margins, feasible, verify)
+    return Z, feasible, moved
 
 
-def _missing(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarray, holds: np.ndarray, verify: float) -> np.ndarray:
-    """Fly the rows that are waiting: which of them miss something. Their `margins` grow by that; the others hold."""
+def _infeasible(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarray, feasible: np.ndarray, verify: float) -> np.ndarray:
+    """Those of the rows `waiting` that are infeasible when simulated; their `margins` grow by the excess, the others become `feasible`."""
     rtol, atol = _accuracy(verify)
-    flights = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
-    holds[waiting] = [flight.violation <= verify for flight in flights]
-    for row, flight in zip(waiting, flights, strict=True):
-        margins[row] += MORE * _by_row(flight.violations, nlp.g_labels)
-    return waiting[~holds[waiting]]
+    simulations = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
+    feasible[waiting] = [simulation.violation <= verify for simulation in simulations]
+    for row, simulation in zip(waiting, simulations, strict=True):
+        margins[row] += MORE * _by_row(simulation.violations, nlp.g_labels)
+    return waiting[~feasible[waiting]]
 
 
 def _by_row(violations: Mapping[str, float], labels: Sequence[str]) -> np.ndarray:
-    """What was missed, in each row of the constraints; 0 where a row is none of a constraint that can be missed in flight."""
-    missed = np.array([violations.get(label, 0.0) for label in labels])
-    return np.where(np.isfinite(missed), np.maximum(missed, 0.0), 0.0)
+    """The excess in each row of the constraints; 0 in a row whose constraint a simulation does not evaluate."""
+    excess = np.array([violations.get(label, 0.0) for label in labels])
+    return np.where(np.isfinite(excess), np.maximum(excess, 0.0), 0.0)
 
 
-def believable(found: np.ndarray, known: Front, verify: float) -> Front:
-    """Of a front's points those that hold when flown, as far as it matters: what points `found` (k, m) dominate is not flown."""
-    holds, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
+def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> Points:
+    """Points that are feasible when simulated; those that `found` (k, m) dominates are kept without a simulation."""
+    feasible, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
     while True:
-        rows = np.flatnonzero(holds)
+        rows = np.flatnonzero(feasible)
         apart = nondominated(np.vstack([found, known.F[rows]]))[len(found) :]
         look = rows[apart & ~seen[rows]]
         if not len(look):
             return known[rows]
         seen[look] = True
         rtol, atol = _accuracy(verify)
-        holds[look] = known[look].simulate(tolerance=verify, rtol=rtol, atol=atol).status == CONVERGED
+        feasible[look] = simulated(known[look], None, verify, rtol, atol, "DOP853").status == CONVERGED
 
 
 def _accuracy(verify: float) -> tuple[float, float]:
-    """rtol and atol of an integrator that is as exact as the question whether something is missed by more than `verify`."""
+    """rtol and atol of an integrator that decides whether a constraint is exceeded by more than `verify`."""
     accuracy = min(PART * verify, PART)
     return accuracy, 0.1 * accuracy

@@ -1,15 +1,14 @@
-"""Gradient solves from several starts, with memory: whatever was found before is where the next one may begin."""
+"""Gradient solves from several starts, with memory: each may begin at the best vector found before."""
 
 from __future__ import annotations
-
-from collections import Counter
 
 import numpy as np
 
 from transcription.base import NLP
-from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scalarized import Solved
 
 from ..evaluation.evaluator import CONVERGED, Counts
+from .solves import GradientSolves
 
 HOPELESS = 100.0
 """Propagated states that miss bounds or constraints by more scales than this are worse to start from than a straight line."""
@@ -18,7 +17,7 @@ LIMIT, BETTER = 1e-8, 1e-7
 """By what fraction of an objective's range a limit may be missed, and by what alpha an answer counts as better than another."""
 
 
-class Descents:
+class MultistartSolver:
     """Solves scalarised problems of one NLP, each from the best vector known for it and from random candidates, and counts.
 
     Parameters
@@ -40,13 +39,19 @@ class Descents:
     """
 
     def __init__(self, nlp: NLP, given: np.ndarray | None, starts: int, rng: np.random.Generator, tolerance: float) -> None:
-        self.nlp, self.starts, self.tolerance, self.counts = nlp, starts, tolerance, Counts(failures=Counter())
+        self.nlp, self.starts, self.tolerance = nlp, starts, tolerance
+        self._solves = GradientSolves(tolerance)
         self._rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
         self._violation: np.ndarray = np.empty(0)
         if given is not None:
             self._F, self._violation = nlp.evaluate(given)
+
+    @property
+    def counts(self) -> Counts:
+        """See the class."""
+        return self._solves.counts
 
     def solve(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
@@ -63,13 +68,8 @@ class Descents:
 
     def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
         """One solve from a vector (n,)."""
-        solved = scalarize(self.nlp, start, reference=reference, weights=weights, ceiling=ceiling, tolerance=self.tolerance)
-        self.counts.gradient_solves += solved.begun
-        self.counts.inner_iterations += solved.iterations
-        self.counts.clocked += solved.clocked
-        if solved.status != CONVERGED:
-            self.counts.failures[solved.status] += 1
-        else:
+        solved = self._solves(self.nlp, start, reference, weights, ceiling)
+        if solved.status == CONVERGED:
             self._known = np.vstack([self._known, solved.z])
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
         return solved
@@ -126,13 +126,13 @@ class Descents:
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
 
     def _from_anywhere(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> Solved:
-        """A solve from a random candidate: with the states that it flies, and if that leads nowhere with guessed ones."""
+        """A solve from a random candidate: from its propagated states, and if that fails from guessed ones."""
         nlp = self.nlp
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         guessed = nlp.first_guess((lower + self._rng.random(len(lower)) * span)[None])
-        flown = nlp.propagate(guessed)
-        usable = np.isfinite(flown).all() and nlp.evaluate(flown)[1][0] <= HOPELESS
-        attempts = [flown[0], guessed[0]] if usable else [guessed[0]]
+        propagated = nlp.propagate(guessed)
+        usable = np.isfinite(propagated).all() and nlp.evaluate(propagated)[1][0] <= HOPELESS
+        attempts = [propagated[0], guessed[0]] if usable else [guessed[0]]
         found: list[Solved] = []
         for start in attempts:
             found.append(self.from_vector(start, reference, weights, ceiling))

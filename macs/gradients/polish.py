@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import count
-from math import comb
 
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
-from ..pareto.directions import across, simplex_lattice
-from ..pareto.dominance import extremes, nondominated
-from ..pareto.ranges import CURVE, SAME, keeps_promise, nearest, ranges, slack
+from ..pareto.directions import across, divisions_below, simplex_lattice
+from ..pareto.dominance import extremes
+from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
 
 PLACES = 500
 """How many places a surface has, at most."""
-
-
-BETTER = 1e-6
-"""By what part of the ranges a point has to be better to be worth another round."""
 
 
 ROUNDS = 6
@@ -35,7 +29,7 @@ GAIN = 0.995
 """A slide is tried if it is to lower the energy of a point to this part."""
 
 
-def polish(archive: Archive, solves: Solves, limit: int, exponent: float | None = None) -> Archive:
+def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None) -> Archive:
     """Bring every point of an archive down to the front, and spread them along it as evenly as their number, at most `limit`, allows.
 
     First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
@@ -79,7 +73,7 @@ def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
-def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tuple[Archive, Archive]:
+def _descended(archive: Archive, solves: CountedSolves, exponent: float | None) -> tuple[Archive, Archive]:
     """Guarded solves of the points; ends of the front for their own objective first, then for the others. Also returns the points
     for which there are too few solves: they are not among the others any more."""
     span = ranges(archive.F)
@@ -87,7 +81,7 @@ def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tupl
     chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
     archive, waiting = archive.take(chosen), archive.take(~chosen)
     found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
-    kept = keeps_promise(found, archive.F, archive.violation, span)
+    kept = feasible_and_no_worse(found, archive.F, archive.violation, span)
     archive = Archive(
         np.where(kept[:, None], found.Z, archive.Z),
         np.where(kept[:, None], found.F, archive.F),
@@ -96,7 +90,7 @@ def _descended(archive: Archive, solves: Solves, exponent: float | None) -> tupl
     return _front(_joined(_ends(archive, span, solves), archive), span), waiting
 
 
-def _covered(archive: Archive, solves: Solves, limit: int, exponent: float | None) -> Archive:
+def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None) -> Archive:
     """Ends of the front, and as many places between them as there may be points: always that which is farthest from what is known."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
@@ -104,7 +98,7 @@ def _covered(archive: Archive, solves: Solves, limit: int, exponent: float | Non
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
-    places = simplex_lattice(m, _divisions(m)) @ known
+    places = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
             break
@@ -119,12 +113,7 @@ def _covered(archive: Archive, solves: Solves, limit: int, exponent: float | Non
     return _thinned(_front(pool, between), limit, exponent)
 
 
-def _divisions(m: int) -> int:
-    """Of the finest lattice that has no more than `PLACES` points."""
-    return next(d for d in count(1) if comb(d + m, m - 1) > PLACES)
-
-
-def _ends(archive: Archive, span: np.ndarray, solves: Solves) -> Archive:
+def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     """The best of each objective, and of these the best in the others."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
@@ -137,11 +126,11 @@ def _ends(archive: Archive, span: np.ndarray, solves: Solves) -> Archive:
     # From the least value of its own objective, which becomes a limit, all others together.
     both = solves(Z, F, np.where(one, 0.0, span))
     violation = np.where(kept, single.violation, best.violation)
-    good = keeps_promise(both, F, violation, span)
+    good = feasible_and_no_worse(both, F, violation, span)
     return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
 
 
-def _taught(archive: Archive, solves: Solves) -> Archive:
+def _taught(archive: Archive, solves: CountedSolves) -> Archive:
     """Guarded solves of every point from its neighbours' controls, if there are enough for all; the archive itself if none was clearly
     better."""
     span = ranges(archive.F)
@@ -184,8 +173,8 @@ def _slides(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nd
 
 
 def _front(points: Archive, span: np.ndarray) -> Archive:
-    """Points that no other dominates, to as many digits as they have; of equal ones the first."""
-    return points.take(np.flatnonzero(nondominated(np.round((points.F - points.F.min(axis=0)) / span / SAME))))
+    """Points that are `distinct` and not dominated."""
+    return points.take(distinct(points.F, span))
 
 
 def _joined(one: Archive, two: Archive) -> Archive:
@@ -193,7 +182,7 @@ def _joined(one: Archive, two: Archive) -> Archive:
 
 
 @dataclass
-class Polishing:
+class PolishLog:
     """A polish that is under way, after k solves.
 
     Attributes
@@ -211,7 +200,7 @@ class Polishing:
     status: np.ndarray
 
     @classmethod
-    def of(cls, archive: Archive) -> Polishing:
+    def of(cls, archive: Archive) -> PolishLog:
         """One that begins."""
         return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
 
@@ -228,14 +217,14 @@ class Polishing:
         return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
 
 
-class Solves:
+class CountedSolves:
     """Gradient solves, as long as there are any left: none are, once the work is to end early.
 
     Parameters
     ----------
     evaluator : Evaluator
     left : int
-    polishing : Polishing, optional
+    polishing : PolishLog, optional
         The solves that it knows are not made again, all others are added to it.
 
     Attributes
@@ -245,13 +234,13 @@ class Solves:
         Whether the work was to end early, with solves left to make.
     """
 
-    def __init__(self, evaluator: Evaluator, left: int, polishing: Polishing | None = None) -> None:
+    def __init__(self, evaluator: Evaluator, left: int, polishing: PolishLog | None = None) -> None:
         self._evaluator, self._polishing = evaluator, polishing
         self._made = 0
         self.left, self.stopped = left, False
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """See `Evaluator.refine`; rows for which nothing is left have failed."""
+        """See `Evaluator.descend`; rows for which nothing is left have failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         for row in range(max(min(len(starts), self.left), 0)):
@@ -269,7 +258,7 @@ class Solves:
         made, self._made = self._made, self._made + 1
         if self._polishing is not None and made < len(self._polishing):
             return self._polishing.take(slice(made, made + 1))
-        found = self._evaluator.refine(start, reference, weights)
+        found = self._evaluator.descend(start, reference, weights)
         if self._polishing is not None:
             self._polishing.add(found)
         return found

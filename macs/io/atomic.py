@@ -10,7 +10,9 @@ from uuid import uuid4
 
 def check_target(path: str | PathLike[str]) -> None:
     """Raise, before any work, the OSError that writing `path` would end in: a missing or unwritable folder, a folder in its place."""
-    target = Path(path).resolve()
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OSError(f"cannot write '{path}': its symbolic links lead in a circle")
     if target.is_dir():
         raise IsADirectoryError(f"cannot write '{path}': it is a folder")
     if target.exists() and not target.is_file():

@@ -1,49 +1,76 @@
-"""How a search stands, for people: a live display on a terminal, a plain line now and then elsewhere. It writes to stderr."""
+"""Displays of long work: live on a terminal, a plain line every ten seconds elsewhere. They write to stderr."""
 
 from __future__ import annotations
 
 import sys
 import time
-from contextlib import AbstractContextManager
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any, Self, TextIO
 
-from .interrupts import Monitor, Stopped
+from transcription.stopping import stopped_by
+
+from .interrupts import Interrupts
 
 EVERY = 10.0
 """Seconds between plain lines."""
 
 
-class Told(AbstractContextManager["Told"]):
-    """Says in one line what is being done, as long as it is entered; nothing unless it is `wanted`. Where there is no terminal, not more
-    often than every `EVERY` seconds.
+class Display(AbstractContextManager, ABC):
+    """Something that is shown while it is entered.
 
     Parameters
     ----------
-    wanted : bool
+    shown : bool
+        False: nothing is written at all.
     stream : text stream, optional
         stderr by default.
     """
 
-    def __init__(self, wanted: bool, stream: TextIO | None = None) -> None:
-        self._wanted, self._stream = wanted, stream or sys.stderr
+    transient = False
+    """Whether a terminal is cleared in the end."""
+
+    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
+        self._shown, self._stream = shown, stream or sys.stderr
         self._live: Any = None
-        self._written = -float("inf")
+        self._began, self._written = time.perf_counter(), -float("inf")
 
-    def __call__(self, words: str) -> None:
-        """What is being done now."""
+    @abstractmethod
+    def line(self) -> str:
+        """The state of the work in one line; "" if there is none yet."""
+
+    def render(self) -> Any:
+        """The same for a terminal: anything that rich can print."""
+        from rich.text import Text
+
+        return Text(self.line())
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the work began."""
+        return time.perf_counter() - self._began
+
+    def refresh(self) -> None:
+        """Write a plain line, where there is no terminal and the last one is `EVERY` seconds old."""
+        if self._shown and self._live is None and self.elapsed - self._written >= EVERY:
+            self._write(self.line())
+
+    def say(self, line: str) -> None:
+        """Write a line now, above what is live."""
         if self._live is not None:
-            self._live.update(words)
-        elif self._wanted and time.perf_counter() - self._written >= EVERY:
-            self._written = time.perf_counter()
-            print(words, file=self._stream, flush=True)
+            self._live.console.print(line, markup=False, highlight=False)
+        elif self._shown:
+            self._write(line)
 
-    def __enter__(self) -> Told:
-        if self._wanted and self._stream.isatty():
+    def __enter__(self) -> Self:
+        if self._shown and self._stream.isatty():
             from rich.console import Console
-            from rich.status import Status
+            from rich.live import Live
 
-            self._live = Status("", console=Console(file=self._stream))
+            console = Console(file=self._stream)
+            self._live = Live(console=console, refresh_per_second=8, transient=self.transient, get_renderable=self.render)
             self._live.start()
         return self
 
@@ -51,14 +78,38 @@ class Told(AbstractContextManager["Told"]):
         if self._live is not None:
             self._live.stop()
 
+    def _write(self, line: str) -> None:
+        self._written = self.elapsed
+        if line:
+            print(line, file=self._stream, flush=True)
 
-def minutes(seconds: float) -> str:
-    """0:07, 12:30 or 2:00:05."""
-    hours, rest = divmod(round(seconds), 3600)
-    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+
+class StatusLine(Display):
+    """One line that says what is being done; see `Display`."""
+
+    transient = True
+
+    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
+        super().__init__(shown, stream)
+        self._words = ""
+
+    def __call__(self, words: str) -> None:
+        """What is being done now."""
+        self._words = words
+        self.refresh()
+
+    def line(self) -> str:
+        """What is being done."""
+        return self._words
+
+    def render(self) -> Any:
+        """The same with a sign of life."""
+        from rich.spinner import Spinner
+
+        return Spinner("dots", self._words)
 
 
-class Steps(AbstractContextManager["Steps"]):
+class Steps(Display):
     """Steps of a known number; Ctrl-C ends the work between two of them by raising `Stopped`, a second one at once.
 
     Parameters
@@ -69,46 +120,62 @@ class Steps(AbstractContextManager["Steps"]):
         stderr by default.
     """
 
+    transient = True
+
     def __init__(self, title: str, total: int, stream: TextIO | None = None) -> None:
+        super().__init__(True, stream)
         self._title, self._total, self._done = title, total, 0
-        self._stream = stream or sys.stderr
-        self._began, self._written = time.perf_counter(), -float("inf")
-        self._monitor = Monitor(None, None, None)
-        self._bar: Any = None
-        self._task: Any = None
+        self._what = ""
+        self._interrupts = Interrupts()
 
-    def __enter__(self) -> Steps:
-        self._monitor.__enter__()
-        if self._stream.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-            columns = TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn()
-            self._bar = Progress(*columns, console=Console(file=self._stream), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task(self._title, total=self._total)
-        return self
+    def __enter__(self) -> Self:
+        self._interrupts.__enter__()
+        return super().__enter__()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-        self._monitor.__exit__(kind, error, trace)
+        super().__exit__(kind, error, trace)
+        self._interrupts.__exit__(kind, error, trace)
 
     def begin(self, what: str) -> None:
         """The next step: what it does."""
         self.check()
         self._done += 1
-        if self._bar is not None:
-            self._bar.update(self._task, description=f"{self._title}: {what}", completed=self._done - 1)
-        elif (elapsed := time.perf_counter() - self._began) - self._written >= EVERY:
-            self._written = elapsed
-            print(f"{self._title}: {what}, step {self._done} of {self._total}, {minutes(elapsed)}", file=self._stream, flush=True)
+        self._what = what
+        self.refresh()
+
+    def line(self) -> str:
+        """The step, its number and the time."""
+        return f"{self._title}: {self._what}, step {self._done} of {self._total}, {minutes(self.elapsed)}"
+
+    def render(self) -> Any:
+        """The same with a bar."""
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        row = Table.grid(padding=(0, 2), expand=False)
+        finished = max(self._done - 1, 0)
+        bar = ProgressBar(total=self._total, completed=finished, width=30)
+        row.add_row(Text(f"{self._title}: {self._what}"), bar, Text(f"{finished}/{self._total}"), Text(minutes(self.elapsed), style="dim"))
+        return row
 
     def asked(self) -> bool:
-        """Whether somebody pressed Ctrl-C, for `transcription.stopping`."""
-        return bool(self._monitor.reason)
+        """Whether Ctrl-C was pressed, for `transcription.stopping`."""
+        return bool(self._interrupts.reason)
 
     def check(self) -> None:
-        """Raise `Stopped` if somebody pressed Ctrl-C."""
-        if self._monitor.reason:
-            raise Stopped(self._monitor.reason)
+        """Raise `Stopped` if Ctrl-C was pressed."""
+        self._interrupts.check()
+
+
+@contextmanager
+def working(time_limit: float | None, progress: bool) -> Iterator[tuple[StatusLine, Interrupts]]:
+    """Long work with a status line, which Ctrl-C and a time limit ask to end early (see `transcription.stopping`)."""
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, stopped_by(lambda: bool(interrupts.reason)):
+        yield status, interrupts
+
+
+def minutes(seconds: float) -> str:
+    """0:07, 12:30 or 2:00:05."""
+    hours, rest = divmod(round(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"

@@ -8,16 +8,13 @@ solves what is separable and full of local fronts, differences solve what is cou
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..evaluation.box import Box
+from .settings import Settings
 from .state import SearchState, remember
-from .trials import Attempts
-
-if TYPE_CHECKING:
-    from .macs import MACS
+from .trials import Trials
 
 NEAR, WIDE = 20, 0.3
 """Among how many of the nearest mates are chosen; the probability that they are chosen among all (Zhang and Li 2007; Li and Zhang 2009)."""
@@ -158,21 +155,21 @@ def _part(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return rng.random(X.shape) < np.where(rng.random((len(X), 1)) < 0.5, 1.0, 0.5)
 
 
-def breed_archive(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
+def breed_archive(state: SearchState, settings: Settings, box: Box, trials: Trials) -> None:
     """Offspring of points of the archive, of as many as possible; the operators whose offspring it keeps will make more."""
-    archive, evaluator, rng = state.archive, attempts.evaluator, state.rng
+    archive, evaluator, rng = state.archive, trials.evaluator, state.rng
     count = settings.offspring(len(archive))
     if not count:
         return
     rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
     rows = np.concatenate(rounds)[:count]
     points = box.to_unit(archive.Z[:, evaluator.free])
-    pool = points if len(points) > FEW else np.vstack([points, attempts.positions()])
+    pool = points if len(points) > FEW else np.vstack([points, trials.positions()])
     trial, operator = breed(box, points[rows], pool, state.credit, rng)
-    bred, result = attempts.look(archive.Z[rows], points[rows], trial)
+    bred, result = trials.evaluate(archive.Z[rows], points[rows], trial)
     if result is None:
         return
-    remember(state, attempts.seen, settings, evaluator)
+    remember(state, trials.seen, settings, evaluator)
     kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
     state.credit = learn(state.credit, operator[bred], kept)
 

@@ -7,18 +7,13 @@ if it is feasible and keeps that promise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..pareto.ranges import CURVE, keeps_promise, nearest, ranges
+from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
-from .state import NO_DIRECTION
-
-if TYPE_CHECKING:
-    from .state import SearchState
+from .state import NO_DIRECTION, SearchState
 
 FLAT = 0.05
 """Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
@@ -65,11 +60,11 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
     reference = np.where(direction > 0, reference, np.inf) if alone else reference
-    found = evaluator.refine(start[None], reference[None], weights[None])
+    found = evaluator.descend(start[None], reference[None], weights[None])
     if not len(found.F):  # the search is to end
         return []
     promised = agents.F[i] if feasible else np.full(m, np.inf)
-    if keeps_promise(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
+    if feasible_and_no_worse(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
 

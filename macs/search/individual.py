@@ -6,16 +6,12 @@ sends the proposals of all agents together, and goes on with those that had no s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..evaluation.box import Box
+from .settings import Settings
 from .state import SearchState
-from .trials import Attempts
-
-if TYPE_CHECKING:
-    from .macs import MACS
+from .trials import Trials
 
 
 def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:
@@ -78,7 +74,7 @@ def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.ran
     return np.argsort(scores, axis=1)[:, np.arange(count) % max(population - 1, 1)].T
 
 
-def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: Attempts) -> None:
+def individual_actions(state: SearchState, settings: Settings, box: Box, trials: Trials) -> None:
     """Inertia, pattern search, differential evolution: the agents go through them in step, and each leaves at its first success."""
     agents, rng = state.agents, state.rng
     waiting = np.arange(len(agents))
@@ -87,15 +83,15 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
     def attempt(propose, velocity=True) -> None:
         nonlocal waiting
         if waiting.size:
-            X = attempts.positions(waiting)
-            waiting = waiting[~attempts.try_out(waiting, X, propose(waiting, X), velocity)]
+            X = trials.positions(waiting)
+            waiting = waiting[~trials.evaluate_and_accept(waiting, X, propose(waiting, X), velocity)]
 
     def along_velocity(who: np.ndarray, X: np.ndarray) -> np.ndarray:
         return inertia(box, X, agents.velocity[who], agents.rho[who], settings.shorten, rng)
 
     attempt(along_velocity, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], attempts.budget)
+    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], trials.budget)
     for coordinate in order.T[:scanned]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)
@@ -103,8 +99,8 @@ def individual_actions(state: SearchState, settings: MACS, box: Box, attempts: A
         attempt(lambda who, X, c=coordinate, s=-side * length[1]: coordinate_step(box, X, c[who], s[who]))
 
     def by_differences(who: np.ndarray, X: np.ndarray) -> np.ndarray:
-        donors = attempts.positions()[distinct_others(who, count, 3, rng)]
+        donors = trials.positions()[distinct_others(who, count, 3, rng)]
         return differential(box, X, donors, settings.F, settings.CR, rng)
 
     attempt(by_differences, settings.keep_velocity)
-    agents.adapt_radius(attempts.credited, settings.rho, settings.contraction, settings.max_contractions)
+    agents.adapt_radius(trials.credited, settings.rho, settings.contraction, settings.max_contractions)

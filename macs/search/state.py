@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..gradients.polish import Polishing
+from ..gradients.polish import PolishLog
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
-
-if TYPE_CHECKING:
-    from .macs import MACS
+from .settings import Settings
 
 NO_DIRECTION = -1
 
@@ -97,7 +94,7 @@ class SearchState:
         Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
     rng : numpy.random.Generator
         Its `bit_generator.state` is data, and all there is to keep of it.
-    polishing : Polishing, optional
+    polishing : PolishLog, optional
         Of a polish that has begun and is not finished: where to go on.
     """
 
@@ -113,10 +110,10 @@ class SearchState:
     evaluations: int
     rng: np.random.Generator
     refinements: int = 0
-    polishing: Polishing | None = None
+    polishing: PolishLog | None = None
 
 
-def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluator: Evaluator) -> None:
+def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator) -> None:
     """Offer what was seen to the archive, and keep the ideal and nadir points, or else the least violated point."""
     if not seen:
         return
@@ -132,7 +129,7 @@ def remember(state: SearchState, seen: list[Evaluation], settings: MACS, evaluat
     state.closest = archives.least_violated(state.closest, Z, F, violation)
 
 
-def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: MACS) -> Agents:
+def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: Settings) -> Agents:
     """Agents at rest on the evaluated points `rows`."""
     count = len(rows)
     return Agents(

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
-from .state import NO_DIRECTION
-
-if TYPE_CHECKING:
-    from .macs import MACS
-    from .state import SearchState
+from .settings import Settings
+from .state import NO_DIRECTION, SearchState
 
 CREDIT = 0.5
 """Least part of a proposed step that must have been achieved for the radius to take it as its own success."""
 
 
-class Attempts:
+class Trials:
     """The one door between proposals and the evaluator, for the length of one phase of an iteration.
 
     Attributes
@@ -31,7 +26,7 @@ class Attempts:
         Which agents had a success that their own step brought about, not the inner level that moved the candidate elsewhere.
     """
 
-    def __init__(self, settings: MACS, state: SearchState, evaluator: Evaluator, box: Box, budget: int) -> None:
+    def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, box: Box, budget: int) -> None:
         self.settings, self.state, self.evaluator, self.box, self.budget = settings, state, evaluator, box, budget
         self.seen: list[Evaluation] = []
         self.credited = np.zeros(len(state.agents), dtype=bool)
@@ -41,7 +36,7 @@ class Attempts:
         Z = self.state.agents.Z if rows is None else self.state.agents.Z[rows]
         return self.box.to_unit(Z[:, self.evaluator.free])
 
-    def look(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
+    def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
         """Evaluate the proposals `trial` (k, d) made from the full vectors Z (k, D), at X (k, d), and move nobody.
 
         Returns
@@ -62,7 +57,7 @@ class Attempts:
         self.seen.append(result)
         return moved, result
 
-    def try_out(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
+    def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
         """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d); put those that had success there.
 
         The velocity of these, and the experience of all, are made of the displacements that came back, not of those that were proposed.
@@ -74,7 +69,7 @@ class Attempts:
             Who had success. A proposal that did not move, or for which no budget is left, is not evaluated and has none.
         """
         success = np.zeros(len(rows), dtype=bool)
-        moved, result = self.look(self.state.agents.Z[rows], X, trial)
+        moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)
         if result is None:
             return success
         rows, X, trial = rows[moved], X[moved], trial[moved]

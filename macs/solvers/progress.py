@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
-from ..io.console import EVERY, minutes
+from ..front import Front
+from ..io.console import Display, minutes
 from ..io.text import counted
-
-if TYPE_CHECKING:
-    from ..front import Front
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How a search stands.
+    """State of a running search.
 
     Attributes
     ----------
@@ -55,56 +51,47 @@ class Progress:
         return self.make_front()
 
 
-class Display(AbstractContextManager["Display"]):
-    """Shows the `Progress` it is updated with, until it is left.
+class SearchDisplay(Display):
+    """Shows the `Progress` that it is updated with.
 
     Parameters
     ----------
-    title : str
-        What is being searched.
+    shown : bool
     stream : text stream, optional
         stderr by default.
+    title : str
+        Of what is searched.
     """
 
-    def __init__(self, title: str = "", stream: TextIO | None = None) -> None:
+    def __init__(self, shown: bool = True, stream: TextIO | None = None, title: str = "") -> None:
+        super().__init__(shown, stream)
         self._title = title
-        self._stream = stream or sys.stderr
-        self._live: Any = None
         self._last: Progress | None = None
-        self._written: Progress | None = None
+        self._shown_last: Progress | None = None
 
-    def __enter__(self) -> Display:
-        if self._stream.isatty():
-            from rich.console import Console
-            from rich.live import Live
-
-            self._live = Live(console=Console(file=self._stream), refresh_per_second=8, get_renderable=self._render)
-            self._live.start()
-        return self
-
-    def __call__(self, progress: Progress) -> None:
-        """As `update`."""
-        self.update(progress)
+    @property
+    def elapsed(self) -> float:
+        """Seconds that the search has taken, those in other processes included."""
+        return self._last.elapsed if self._last else 0.0
 
     def update(self, progress: Progress) -> None:
-        """Take note of how the search stands; cheap enough for every batch."""
+        """Take note of the state of the search; cheap enough for every batch."""
         self._last = progress
-        if self._live is None and (self._written is None or progress.elapsed - self._written.elapsed >= EVERY):
-            self._write()
+        self.refresh()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._live is not None:
-            self._live.stop()
-        elif self._last is not self._written:
-            self._write()
+        super().__exit__(kind, error, trace)
+        if self._shown and self._live is None and self._last is not self._shown_last:
+            self._write(self.line())
 
-    def _write(self) -> None:
-        self._written = self._last
-        if self._last is not None:
-            words = [self._title, count(self._last), clock(self._last), *found(self._last)]
-            print(", ".join(word for word in words if word), file=self._stream, flush=True)
+    def line(self) -> str:
+        """Title, counts, time, archive and failures."""
+        if self._last is None:
+            return ""
+        return ", ".join(word for word in [self._title, count(self._last), clock(self._last), *found(self._last)] if word)
 
-    def _render(self) -> Any:
+    def render(self) -> Any:
+        """The same with a bar."""
         from rich.console import Group
         from rich.progress_bar import ProgressBar
         from rich.table import Table
@@ -116,6 +103,10 @@ class Display(AbstractContextManager["Display"]):
         bar = ProgressBar(total=self._last.budget, completed=self._last.evaluations, width=30)
         line.add_row(Text(self._title, style="bold"), bar, Text(count(self._last)), Text(clock(self._last), style="dim"))
         return Group(line, Text(", ".join(found(self._last)), overflow="ellipsis", no_wrap=True))
+
+    def _write(self, line: str) -> None:
+        self._shown_last = self._last
+        super()._write(line)
 
 
 def count(progress: Progress) -> str:

@@ -1,14 +1,14 @@
-"""One run of a solver: from a seed to a front, watched, and with what it cost."""
+"""One run of a solver, from a seed to a front: progress, interrupts, checkpoint and costs."""
 
 from __future__ import annotations
 
 import hashlib
 import secrets
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,11 @@ from transcription.stopping import stopped_by
 
 from ..evaluation.evaluator import Counts, Evaluator
 from ..front import Front
-from ..io.interrupts import Monitor, Stopped
+from ..fronts.provenance import costs
+from ..io.interrupts import Interrupts, Stopped
 from .checkpoint import Checkpoint, Kept
-from .progress import Progress
-
-if TYPE_CHECKING:
-    from .solver import Solver
+from .method import SearchMethod
+from .progress import Progress, SearchDisplay
 
 IDLE_ITERATIONS = 100
 """A search that evaluated nothing in so many iterations on end has nothing left to try."""
@@ -31,15 +30,15 @@ ENDED = ("budget", "idle")
 
 
 @dataclass
-class Run:
-    """What to search, and how to tell of it.
+class SearchRun:
+    """One run of a solver, from a seed to a front.
 
     Attributes
     ----------
-    solver : Solver
+    solver : SearchMethod
     evaluator : Evaluator
     goals : callable
-        The objectives; asked for once something has been evaluated, since a black box tells their number only then.
+        The objectives; called after the first evaluation, since a black box does not know their number before.
     make_front : callable
         (state, stats) -> Front.
     budget : int
@@ -49,10 +48,10 @@ class Run:
     start : array (k, D) or None
         Full vectors to begin with.
     what : mapping
-        What is searched and how, as data: with what is above, a checkpoint belongs to it.
+        Problem, solver and settings as data: a checkpoint belongs to these and to the fields above.
     """
 
-    solver: Solver
+    solver: SearchMethod
     evaluator: Evaluator
     goals: Callable[[], Sequence[Objective]]
     make_front: Callable[[Any, dict[str, Any]], Front]
@@ -83,32 +82,33 @@ class Run:
         if self._state is not None:
             self.evaluator.resume(kept.counts, self._state.archive.F.shape[1])
         self._uncut = kept.counts.clocked
+        self._callback = callback
         with (
             self._checkpoint or nullcontext(),
-            _display(progress) as display,
-            Monitor(time_limit, callback, display, kept.elapsed) as monitor,
-            stopped_by(lambda: self._asked_to_stop(monitor)),
+            SearchDisplay(progress) as self._display,
+            Interrupts(time_limit, kept.elapsed) as self._interrupts,
+            stopped_by(self._asked_to_stop),
         ):
-            stopped = kept.stopped or self._search(monitor)
+            stopped = kept.stopped or self._search()
             if not kept.stopped and stopped in ENDED:
-                self._keep(monitor, stopped)
-            monitor.show(self._standing(monitor))
+                self._keep(stopped)
+            self._show()
             if self._checkpoint:
                 self._checkpoint.write()
-            front = self.make_front(self._state, self._stats(monitor, stopped))
-            # To say how near to optimal the points are takes its time, too.
-            front.stats["wall_time"] = monitor.elapsed
+            front = self.make_front(self._state, self._stats(stopped))
+            # The certificates of optimality take their time, too.
+            front.stats["wall_time"] = self._interrupts.elapsed
             return front
 
-    def _search(self, monitor: Monitor) -> str:
-        """To the end of the search; returns what ended it."""
+    def _search(self) -> str:
+        """Search to the end; returns what ended the search."""
         if self._state is None:
-            self.evaluator.before_batch = lambda: monitor.show(self._standing(monitor))
+            self.evaluator.before_batch = self._show
             self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
-            self._keep(monitor)
+            self._keep()
             self._write_in_time()
-        # From here on there is something to return, so from here on a batch need not even begin. Before, it ends with what it has.
-        self.evaluator.before_batch = lambda: monitor.before_batch(self._standing(monitor))
+        # From here on there is a state to return, so a batch need not even begin. Before, the first population ends with what it has.
+        self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         try:
             # A search that evaluates nothing any more has nothing left to try.
@@ -116,34 +116,49 @@ class Run:
                 spent = counts.evaluations
                 self.solver.advance(self._state, self.evaluator, self.budget)
                 self._idle = self._idle + 1 if counts.evaluations == spent else 0
-                self._keep(monitor)
-                monitor.after_iteration(self._standing(monitor))
-                self._write_in_time()  # what is in the file, the callback has been told
-            # Asked to stop, this ends with what it has; so far as it got, it is kept.
-            self.evaluator.before_batch = lambda: self._within_the_end(monitor)
+                self._keep()
+                self._call_back(self._show())
+                self._write_in_time()  # after the callback: what is in the file, the callback has seen
+            # Asked to stop, this ends with what it has; what it reached is kept.
+            self.evaluator.before_batch = self._within_the_end
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
-        if self._cut_short(monitor):
-            return monitor.reason
+        if self._cut_short():
+            return self._interrupts.reason
         return "idle" if counts.evaluations < self.budget else "budget"
 
-    def _keep(self, monitor: Monitor, stopped: str = "") -> None:
-        """Tell the checkpoint how the run stands, unless something of the last iteration was cut short: that has to be done again."""
-        if self._cut_short(monitor):
+    def _show(self) -> Progress:
+        progress = self._progress()
+        self._display.update(progress)
+        return progress
+
+    def _show_and_check(self) -> None:
+        self._show()
+        self._interrupts.check()
+
+    def _call_back(self, progress: Progress) -> None:
+        """Raise `Stopped` if the callback returns True."""
+        answer = None if self._callback is None else self._callback(progress)
+        if isinstance(answer, bool | np.bool_) and answer:
+            raise Stopped("callback")
+
+    def _keep(self, stopped: str = "") -> None:
+        """Give the state to the checkpoint, unless something of the last iteration was cut short: that has to be done again."""
+        if self._cut_short():
             return
         counts = self.evaluator.counts
         self._uncut = counts.clocked
         if self._checkpoint:
             assert self.seed is not None
-            self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, monitor.elapsed, stopped))
+            self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
-    def _cut_short(self, monitor: Monitor) -> bool:
-        """Whether something was since the run was last kept, or would have been."""
-        return bool(monitor.reason) and self.evaluator.counts.clocked > self._uncut
+    def _cut_short(self) -> bool:
+        """Whether a clock or Ctrl-C has cut work short since the state was last kept."""
+        return bool(self._interrupts.reason) and self.evaluator.counts.clocked > self._uncut
 
-    def _within_the_end(self, monitor: Monitor) -> None:
-        self._keep(monitor)
+    def _within_the_end(self) -> None:
+        self._keep()
         self._write_in_time()
 
     def _write_in_time(self) -> None:
@@ -151,53 +166,41 @@ class Run:
             self._checkpoint.write_in_time()
 
     def _belongs(self) -> dict[str, Any]:
-        """What a checkpoint has to be of, but for the seed."""
+        """All that decides the run but the seed: a checkpoint of another run is refused."""
         start = None if self.start is None else {"shape": self.start.shape, "hash": hashlib.sha256(self.start.tobytes()).hexdigest()}
         return {**self.what, "evaluations": self.budget, "tolerance": self.evaluator.tolerance, "start": start}
 
-    def _asked_to_stop(self, monitor: Monitor) -> bool:
-        """Asked between long solves: also the time to show that it is still at work."""
-        monitor.show(self._standing(monitor))
-        return bool(monitor.reason)
+    def _asked_to_stop(self) -> bool:
+        """Whether the work is to end; also the time for a sign of life between long solves."""
+        self._show()
+        return bool(self._interrupts.reason)
 
-    def _stats(self, monitor: Monitor, stopped: str) -> dict[str, Any]:
-        counts = self.evaluator.counts
-        return {
-            "evaluations": counts.evaluations,
-            "inner_iterations": counts.inner_iterations,
-            "gradient_solves": counts.gradient_solves,
-            "fallbacks": counts.fallbacks,
-            "failures": dict(counts.failures),
-            "wall_time": monitor.elapsed,
-            "seed": self.seed,
-            "tolerance": self.evaluator.tolerance,
-            "stopped": stopped,
-            "reproducible": stopped in ENDED and not counts.clocked and not (self._checkpoint and self._checkpoint.mixed),
-            **({} if self._state is None else self.solver.tells(self._state, self.evaluator.tolerance)),
-            **({"checkpoint": self._checkpoint.failure} if self._checkpoint and self._checkpoint.failure else {}),
-        }
+    def _stats(self, stopped: str) -> dict[str, Any]:
+        counts, state, checkpoint = self.evaluator.counts, self._state, self._checkpoint
+        return costs(
+            counts,
+            wall_time=self._interrupts.elapsed,
+            seed=self.seed,
+            tolerance=self.evaluator.tolerance,
+            stopped=stopped,
+            reproducible=stopped in ENDED and not counts.clocked and not (checkpoint and checkpoint.mixed),
+            **({} if state is None else self.solver.tells(state, self.evaluator.tolerance)),
+            **({"checkpoint": checkpoint.failure} if checkpoint and checkpoint.failure else {}),
+        )
 
-    def _standing(self, monitor: Monitor) -> Progress:
+    def _progress(self) -> Progress:
         counts = self.evaluator.counts
         archived = len(self._state.archive) if self._state is not None else 0
         best = self._state.archive.F.min(axis=0) if archived else ()
         return Progress(
             evaluations=counts.evaluations,
             budget=self.budget,
-            elapsed=monitor.elapsed,
+            elapsed=self._interrupts.elapsed,
             archive=archived,
             ideal={goal.name: float(goal.sign * value) for goal, value in zip(self.goals() if archived else (), best, strict=False)},
             failures=dict(counts.failures),
-            make_front=lambda: self.make_front(self._state, self._stats(monitor, "running")),
+            make_front=lambda: self.make_front(self._state, self._stats("running")),
             F=self._state.archive.F if self._state is not None else np.empty((0, 0)),
             inner_iterations=counts.inner_iterations,
             gradient_solves=counts.gradient_solves,
         )
-
-
-def _display(progress: bool) -> AbstractContextManager[Callable[[Progress], None] | None]:
-    if not progress:
-        return nullcontext()
-    from .progress import Display
-
-    return Display()

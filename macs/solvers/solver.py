@@ -1,11 +1,10 @@
-"""The contract of this floor: a solver has settings, begins and advances a search, and so solves problems and minimises functions."""
+"""Solvers: what a user calls to search an optimal control problem or a plain function for its Pareto front."""
 
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
@@ -19,11 +18,11 @@ from transcription.smooth import Smooth
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
-from ..evaluation.evaluator import Evaluator
 from ..front import Front
-from ..fronts.builders import black_box_front, trajectory_front
+from ..fronts.builders import black_box_points, trajectory_points
+from .method import SearchMethod
 from .progress import Progress
-from .run import ENDED, Run
+from .run import ENDED, SearchRun
 from .start import beginning, check_run, decisions, drawing
 
 Callback = Callable[[Progress], Any]
@@ -31,60 +30,8 @@ NO_TIME = 1e-6
 """Seconds that are left when there are none: what comes then ends before its first solve."""
 
 
-class Solver(ABC):
-    """A search over several objectives.
-
-    An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state is all that it knows
-    between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
-
-    So that runs can be kept in a checkpoint, and go on from it to the same bits, the state is a dataclass, of the very class that `begin`
-    (or what `makes_state` names) is annotated to return; names in that annotation and in those of the fields are known at run time, not
-    only to type checkers. Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator,
-    dataclasses of these, and lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full: `X | None` may be missing,
-    other unions are refused, and so is `Any`. It is rebuilt from its fields alone, without `__init__`. Hence nothing else may change
-    between two iterations, neither in the solver nor in what the state refers to; no generator may be in two fields; and arrays that are
-    changed in place must not share their memory with others. An error says which field does not comply. Budget and evaluator are not the
-    state's to keep.
-    """
-
-    @abstractmethod
-    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """Evaluate a first population, of which the full vectors `start` (k, D) are the first; returns the state."""
-
-    @abstractmethod
-    def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
-        """One iteration, within the budget of evaluations."""
-
-    def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
-        """The last thing to do with the state of a search that ended by itself, beyond its evaluations. Nothing, for most solvers.
-
-        If the work is to end early (`transcription.stopping`), it leaves what it has. A checkpoint may keep the state before each of its
-        batches: called with that, it has to go on to the same bits.
-        """
-
-    def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
-        """What the state adds to the `stats` of a front, as plain data. Nothing, for most solvers."""
-        return {}
-
-    @property
-    def makes_state(self) -> Callable[..., Any]:
-        """The method that is annotated to return the class of the state, which checkpoints have to know."""
-        return self.begin
-
-    @property
-    def certifies(self) -> bool:
-        """Whether points of its fronts are to carry their `optimality`."""
-        return False
-
-    def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
-        """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
-
-    def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
-        """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
-
-    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
-        """What is left to do with the front of a search that ended by itself, in so many seconds. Nothing, for most solvers."""
-        return front
+class Solver(SearchMethod):
+    """A search method with the two calls of its user: `solve` for optimal control problems, `minimize` for plain functions."""
 
     def solve(
         self,
@@ -151,20 +98,22 @@ class Solver(ABC):
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
         solver = inner_solver(inner)
-        nlp = transcription.transcribe(problem)
+        nlp = transcription.nlp(problem)
         self.check_transcription(transcription, nlp.problem)
         check_freedom(nlp)
         self.check_objectives(len(nlp.problem.goals))
-        about = self._about()
+        about = self.about()
         level = {"inner": inner if isinstance(inner, str) else repr(inner)}
         drawn = drawing(start)
         evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
-        run = Run(
+        run = SearchRun(
             self,
             evaluator,
             goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: trajectory_front(nlp, state.archive, state.closest, about, stats | level, certified=certified),
+            make_front=lambda state, stats: Front.of(
+                trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified)
+            ),
             budget=evaluations,
             seed=seed,
             start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
@@ -236,16 +185,16 @@ class Solver(ABC):
         sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
         variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
 
-        about = self._about()
+        about = self.about()
 
         def goals() -> tuple[Objective, ...]:
             return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
 
-        run = Run(
+        run = SearchRun(
             self,
             box,
             goals=goals,
-            make_front=lambda state, stats: black_box_front(state.archive, state.closest, goals(), variables, about, stats),
+            make_front=lambda state, stats: Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats)),
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),
@@ -257,8 +206,3 @@ class Solver(ABC):
             },
         )
         return run.go(time_limit, progress, callback, checkpoint)
-
-    def _about(self) -> dict[str, Any]:
-        if not is_dataclass(self):
-            raise TypeError(f"{type(self).__name__} must be a dataclass of its settings, which its fronts record")
-        return {"name": type(self).__name__, "settings": asdict(self)}

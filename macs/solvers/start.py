@@ -13,9 +13,8 @@ from problems.compiled import Variable
 from transcription.base import NLP
 from transcription.smooth import Smooth
 
-from ..front import Front
+from ..fronts.points import Point, Points
 from ..io.atomic import check_target
-from ..point import Point
 
 STARTS = ("uniform", "smooth")
 """How first candidates are drawn."""
@@ -97,7 +96,7 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
 
 def _points(start: Any) -> list[Point]:
     """The Points that a start consists of; none if it is an array."""
-    points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Front | list | tuple) else []
+    points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Points | list | tuple) else []
     return points if all(isinstance(point, Point) for point in points) else []
 
 

@@ -71,7 +71,7 @@ def combine(
                 with errors_begin_with(place):
                     method.check_objectives(len(compiled.goals))
                     method.check_transcription(scheme, compiled)
-                details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method._about()}
+                details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method.about()}
                 details |= {"terms": own} if own else {}
                 cell = Cell(label, scheme_label, method_label, budget, plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))

@@ -11,8 +11,8 @@ import numpy as np
 
 from problems import Problem, load
 from transcription import DFET, NLP
+from transcription.base import CONVERGED
 from transcription.inner import Auto
-from transcription.inner.base import CONVERGED
 
 BATCH = 10
 """Candidates in a batch, as the search sends them: one for each agent."""

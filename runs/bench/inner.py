@@ -14,8 +14,8 @@ import numpy as np
 from macs.io.console import Steps
 from macs.io.text import text_table
 from transcription import NLP
+from transcription.base import CONVERGED
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, Newton, Propagate
-from transcription.inner.base import CONVERGED
 from transcription.numerics.batched import compiler
 
 from .cases import BATCH, INNER, Batch, Case

@@ -14,12 +14,12 @@ import problems
 import transcription
 from macs.front import Front
 from macs.fronts.front_plot import save_picture
+from macs.fronts.points import Point
 from macs.fronts.style import label
 from macs.fronts.verification import Check, missed, objective_scales
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
 from macs.io.text import text_table
-from macs.point import Point
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
 from macs.solvers.start import STARTS
@@ -106,7 +106,7 @@ def show(arguments: Namespace) -> int:
     if arguments.plot:
         draw(front if point is None else point, arguments.plot)
     if arguments.csv:
-        (front if point is None else point.alone()).to_csv(arguments.csv)
+        (front if point is None else front[[point.index]]).to_csv(arguments.csv)
         print(f"values in {arguments.csv}")
     return DONE
 

@@ -58,8 +58,8 @@ The exit code is 1 while any run is missing or failed."""
 
 
 TRANSCRIPTION = (
-    "such as dfet:4x6 (4 elements of order 6), shooting:200:linear (200 nodes; controls constant, linear or spline) or "
-    "multiple-shooting:40x5:rk8 (40 intervals of 5 steps; Runge-Kutta scheme) (default: the problem's own)"
+    "such as dfet:4x6 (4 elements of order 6) or shooting:200 (200 nodes); an unknown word shows how all are written "
+    "(default: the problem's own)"
 )
 
 

@@ -5,12 +5,7 @@ from __future__ import annotations
 from os import PathLike
 
 from macs.front import Front
-from problems.catalogue import CASES
-
-
-def is_catalogued(address: str) -> bool:
-    """Whether an address is a name of the catalogue, or the address of one of its cases."""
-    return address in CASES or address in {place for place, _ in CASES.values()}
+from problems.catalogue import is_catalogued
 
 
 def check_trusted(address: str, trust: bool, where: str) -> None:

@@ -144,9 +144,6 @@ def _simulated(task: Task, front: Front) -> SimulationRecord:
 
 @lru_cache(maxsize=8)
 def _unpacked(payload: bytes) -> tuple[Any, Any]:
-    """Problem and transcription; the runs that one process makes of them share an NLP, and all that is compiled of it."""
+    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
     problem, scheme = pickle.loads(payload)
-    nlp = scheme.transcribe(problem)
-    # This hides the method in this one unpickled value, which no other code has.
-    object.__setattr__(scheme, "transcribe", lambda _: nlp)
     return problem, scheme

@@ -62,7 +62,7 @@ class Verified:
         simulated = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
         rows = best(simulated)
         places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
-        return cls(simulated[rows], places, len(front), int((simulated.status == CONVERGED).sum()))
+        return cls(Front.of(simulated[rows]), places, len(front), int((simulated.status == CONVERGED).sum()))
 
 
 @dataclass(frozen=True, eq=False)

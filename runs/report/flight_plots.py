@@ -12,9 +12,9 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.flight_plot import along, quantities
+from macs.fronts.points import Point
 from macs.fronts.style import COLORS, label
 from macs.pareto.archive import spread
-from macs.point import Point
 
 from ..measures.indicators import normalised
 from .style import COLUMN, PAGE, new_figure, style
@@ -191,7 +191,7 @@ def _check(points: Sequence[Point], laws: Laws) -> None:
 
 def _title(number: int, point: Point, width: int) -> str:
     """The point's number and objectives, in lines of at most `width` characters."""
-    goals = point._front.goals
+    goals = point.goals
     values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
     lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
     return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))

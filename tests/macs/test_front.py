@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
 from macs.front import Front
+from macs.fronts.points import Point
 from macs.fronts.provenance import Source
 from macs.io.text import duration, numbers
 from macs.pareto.dominance import nondominated
-from macs.point import Point
 from problems.compiled import Variable
 
 
@@ -166,7 +166,7 @@ def test_merging_only_empty_fronts_keeps_the_closest():
 def test_points_of_different_meshes_merge_and_keep_their_own():
     more = [Variable(f"climb.u[{i}]", -1.0, 1.0, "km/s²", 2.0) for i in range(6)]
     fine = flights(
-        2, 3, decision=np.arange(12.0).reshape(2, 6), variables=more, transcription={"method": "DFET", "settings": {"elements": 5}}
+        2, 3, decision=np.arange(12.0).reshape(2, 6), variables=more, transcriptions={"method": "DFET", "settings": {"elements": 5}}
     )
     coarse = flights(3, F=[[5.0, 5.0], [6.0, 4.0], [7.0, 3.0]])
     merged = Front.merge([coarse, fine])

@@ -15,8 +15,9 @@ import pytest
 
 from macs import MACS, Front
 from macs.evaluation.bilevel import Bilevel
-from macs.gradients.front_polish import believable, hold
-from macs.io import interrupts as monitor
+from macs.gradients import front_polish
+from macs.gradients.front_polish import back_off, feasible_when_simulated
+from macs.io import interrupts
 from problems import Problem
 from transcription import DFET, SingleShooting
 from transcription.inner import Propagate
@@ -74,27 +75,28 @@ def test_points_hold_at_a_price_that_is_small(rough):
 def test_what_cannot_be_made_to_hold_is_told():
     evaluator = Bilevel(DFET(2, 1).transcribe(gust()), Propagate(), 1e-6)
     start = evaluator.nlp.propagate(evaluator.first_guess(np.zeros((1, len(evaluator.free)))))
-    flat = evaluator.refine(start, np.full((1, 1), 0.0), np.ones((1, 1)))
+    flat = evaluator.descend(start, np.full((1, 1), 0.0), np.ones((1, 1)))
     assert flat.status[0] == "converged"
-    Z, holds, _ = hold(evaluator, flat.Z, np.ones(1), VERIFY)
+    Z, holds, _ = back_off(evaluator, flat.Z, np.ones(1), VERIFY)
     assert holds.shape == (1,) and not holds[0] and evaluator.nlp.evaluate(Z)[1][0] <= 1e-6
-    none, holds, moved = hold(evaluator, flat.Z[:0], np.ones(1), VERIFY)
+    none, holds, moved = back_off(evaluator, flat.Z[:0], np.ones(1), VERIFY)
     assert len(none) == len(holds) == len(moved) == 0
 
 
 def test_known_points_are_flown_only_if_it_matters(rough, monkeypatch):
-    flown, fly = [], Front.simulate
+    counts, simulated = [], front_polish.simulated
 
-    def counted(self, *arguments, **settings):
-        flown.append(len(self))
-        return fly(self, *arguments, **settings)
+    def counted(points, *arguments):
+        counts.append(len(points))
+        return simulated(points, *arguments)
 
-    monkeypatch.setattr(Front, "simulate", counted)
-    assert len(believable(rough.F.min(axis=0)[None] - 1.0, rough, VERIFY)) == len(rough) and not flown, "dominated, all of them"
+    monkeypatch.setattr(front_polish, "simulated", counted)
+    dominating = rough.F.min(axis=0)[None] - 1.0
+    assert len(feasible_when_simulated(dominating, rough, VERIFY)) == len(rough) and not counts
     nothing = np.empty((0, 2))
-    kept = believable(nothing, rough, VERIFY)
-    assert sum(flown) == len(rough)
-    actual = fly(rough, tolerance=VERIFY)
+    kept = feasible_when_simulated(nothing, rough, VERIFY)
+    assert sum(counts) == len(rough)
+    actual = rough.simulate(tolerance=VERIFY)
     assert np.array_equal(kept.F, rough.F[actual.status == "converged"])
 
 
@@ -104,7 +106,7 @@ def test_margins_keep_rows_inside(rough):
     start = nlp.interpolate(rough[4].trajectory)[None]
     height = np.array(["height" in label for label in nlp.g_labels])
     margins = np.where(height, 0.01, 0.0)[None]
-    plain, inside = (evaluator.refine(start, rough.F[4:5], np.ones((1, 2)), one) for one in (None, margins))
+    plain, inside = (evaluator.descend(start, rough.F[4:5], np.ones((1, 2)), one) for one in (None, margins))
     g = [np.array(nlp.functions(found.Z[0])[1]).ravel() for found in (plain, inside)]
     assert g[0][height].max() == pytest.approx(0.0, abs=1e-6)
     assert g[1][height].max() == pytest.approx(-0.01, abs=1e-6)
@@ -112,7 +114,7 @@ def test_margins_keep_rows_inside(rough):
 
 
 def test_an_interruption_leaves_what_holds(rough, monkeypatch):
-    refine = Bilevel._refine
+    refine = Bilevel._descend
 
     def interrupted(self, starts, references, weights, margins):
         found = refine(self, starts, references, weights, margins)
@@ -120,7 +122,7 @@ def test_an_interruption_leaves_what_holds(rough, monkeypatch):
             signal.raise_signal(signal.SIGINT)
         return found
 
-    monkeypatch.setattr(Bilevel, "_refine", interrupted)
+    monkeypatch.setattr(Bilevel, "_descend", interrupted)
     found = rough.polished(COARSE, solves=30, verify=VERIFY)
     assert found.stats["stopped"] == "interrupted" and len(found)
     assert found.simulate(tolerance=VERIFY).violation.max() <= VERIFY
@@ -130,7 +132,7 @@ def test_if_nothing_holds_the_front_says_so():
     front = MACS(archive=1).solve(gust(), DFET(2, 1), evaluations=40, seed=1)
     assert len(front)
     empty = front.polished(DFET(2, 1), solves=2, verify=VERIFY)
-    assert not len(empty) and empty.message == "no point misses less than 0.0001 when it is flown"
+    assert not len(empty) and empty.message == "no point misses less than 0.0001 when simulated"
     assert "0.0001" in empty.table() and len(front.polished(DFET(2, 1), solves=2, verify=1.0))
 
 
@@ -160,14 +162,14 @@ class TestOfASearch:
         assert np.array_equal(first.F, again.F) and any(point.transcription == COARSE.to_dict() for point in again)
 
     def test_its_time_limit_is_for_both(self, monkeypatch):
-        solve, late = Bilevel._refine, SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
+        solve, late = Bilevel._descend, SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
 
         def refine(self, *arguments):
             found = solve(self, *arguments)
-            monkeypatch.setattr(monitor, "time", late)
+            monkeypatch.setattr(interrupts, "time", late)
             return found
 
-        monkeypatch.setattr(Bilevel, "_refine", refine)
+        monkeypatch.setattr(Bilevel, "_descend", refine)
         solver = MACS(polish_on="dfet:3x3", polish_every=20, verify=VERIFY)
         found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, time_limit=600.0)
         assert found.stats["evaluations"] == 400 and found.stats["stopped"] == "time limit" and not found.stats["reproducible"]

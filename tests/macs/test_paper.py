@@ -11,7 +11,7 @@ from macs.pareto.archive import Archive
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
 from macs.search.social import assign, social_actions
-from macs.search.trials import Attempts
+from macs.search.trials import Trials
 
 
 def schaffer(X):
@@ -22,12 +22,12 @@ def begun(settings, function=schaffer, d=3):
     """Settings at work on a function: its state, and the two phases of an iteration as functions."""
     box = BlackBox(function, [(-2, 2)] * d)
     state = settings.begin(box, 10_000, np.random.default_rng(0))
-    attempts = Attempts(settings, state, box, box_of(box), 10_000)
+    trials = Trials(settings, state, box, box_of(box), 10_000)
     return (
         state,
-        lambda: individual_actions(state, settings, box_of(box), attempts),
-        lambda: social_actions(state, settings, box_of(box), attempts, box),
-        attempts,
+        lambda: individual_actions(state, settings, box_of(box), trials),
+        lambda: social_actions(state, settings, box_of(box), trials, box),
+        trials,
     )
 
 
@@ -58,13 +58,13 @@ def test_there_are_as_many_directions_as_social_agents_unless_told(overrides, ex
 
 def test_social_actions_only_feed_the_archive():
     for settings in (MACS.paper(), MACS()):
-        state, individual, social, attempts = begun(settings)
+        state, individual, social, trials = begun(settings)
         individual()
-        before, seen = copy.deepcopy(state), len(attempts.seen)
+        before, seen = copy.deepcopy(state), len(trials.seen)
         social()
         unchanged = [np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items()]
-        assert len(attempts.seen) == seen + 1
-        assert state.evaluations == before.evaluations + len(attempts.seen[-1].F)
+        assert len(trials.seen) == seen + 1
+        assert state.evaluations == before.evaluations + len(trials.seen[-1].F)
         assert all(unchanged) == np.array_equal(state.experience, before.experience) == (settings == MACS.paper())
 
 

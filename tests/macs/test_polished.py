@@ -84,7 +84,7 @@ def test_without_time_nothing_is_solved(rough):
 
 
 def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
-    solve, solved = Bilevel._refine, []
+    solve, solved = Bilevel._descend, []
 
     def refine(self, *arguments):
         solved.append(solve(self, *arguments))
@@ -93,7 +93,7 @@ def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
             assert stopping()
         return solved[-1]
 
-    monkeypatch.setattr(Bilevel, "_refine", refine)
+    monkeypatch.setattr(Bilevel, "_descend", refine)
     found = rough.polished(FINE, solves=50)
     assert 7 <= found.stats["gradient_solves"] < 10 and found.stats["stopped"] == "interrupted" and not found.stats["reproducible"]
     assert any(point.transcription == FINE.to_dict() for point in found) and len(found) == len(rough)

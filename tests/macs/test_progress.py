@@ -4,7 +4,7 @@ import io
 import time
 
 from macs.io.console import minutes
-from macs.solvers.progress import Display, Progress, clock, count
+from macs.solvers.progress import Progress, SearchDisplay, clock, count
 
 
 def standing(evaluations: int = 1200, elapsed: float = 12.0, archive: int = 4, **failures: int) -> Progress:
@@ -19,9 +19,9 @@ class Terminal(io.StringIO):
 
 def test_plain_lines_come_now_and_then_and_at_the_end():
     stream = io.StringIO()
-    with Display("goddard", stream) as display:
+    with SearchDisplay(title="goddard", stream=stream) as display:
         for second in range(25):
-            display(standing(evaluations=100 * second, elapsed=float(second)))
+            display.update(standing(evaluations=100 * second, elapsed=float(second)))
         display.update(standing(10_000, 25.0, infeasible=3))
     lines = stream.getvalue().splitlines()
     assert len(lines) == 4
@@ -31,17 +31,17 @@ def test_plain_lines_come_now_and_then_and_at_the_end():
 
 def test_nothing_is_written_twice_nor_of_nothing():
     stream = io.StringIO()
-    with Display("", stream):
+    with SearchDisplay(stream=stream):
         pass
     assert stream.getvalue() == ""
-    with Display("", stream) as display:
+    with SearchDisplay(stream=stream) as display:
         display.update(standing(archive=0))
     assert stream.getvalue() == "1 200 / 10 000 evaluations, 0:12, 1:28 left, nothing feasible yet\n"
 
 
 def test_a_terminal_sees_it_live():
     stream = Terminal()
-    with Display("goddard", stream) as display:
+    with SearchDisplay(title="goddard", stream=stream) as display:
         display.update(standing(failed=2))
         time.sleep(0.3)
     shown = stream.getvalue()

@@ -14,7 +14,7 @@ from synthetic_fronts import black_box, flights
 from macs import MACS, Front
 from macs.fronts.builders import trajectory_columns
 from macs.fronts.verification import verify
-from macs.gradients.mesh_refinement import Refinement, Resolver
+from macs.gradients.mesh_refinement import MeshRefinement, PointSolver
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET
@@ -137,7 +137,7 @@ def test_objectives_without_derivatives_are_solved_by_projection():
 
 
 def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
-    plain, solved = Refinement._solve, []
+    plain, solved = MeshRefinement._solve, []
 
     def solve(self, i, *arguments):
         solved.append(i)
@@ -145,7 +145,7 @@ def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
         if len(solved) == 2:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Refinement, "_solve", solve)
+    monkeypatch.setattr(MeshRefinement, "_solve", solve)
     front = coarse.refine_mesh()
     assert len(solved) == 2
     assert len(front) == 5 and front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
@@ -153,14 +153,14 @@ def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
 
 
 def test_ctrl_c_while_a_point_is_solved_says_nothing_of_that_point(coarse, monkeypatch):
-    plain = Resolver.solve
+    plain = PointSolver.solve
 
     def solve(self, nlp, *arguments):
         if nlp.transcription.to_dict() != coarse[0].transcription:
             signal.raise_signal(signal.SIGINT)
         return plain(self, nlp, *arguments)
 
-    monkeypatch.setattr(Resolver, "solve", solve)
+    monkeypatch.setattr(PointSolver, "solve", solve)
     front = coarse.refine_mesh()
     assert front.stats["stopped"] == "interrupted"
     assert all("not solved on a finer mesh" in point.note and "timeout" not in point.note for point in front)
@@ -205,7 +205,7 @@ def test_what_has_no_mesh_of_ours_is_refused():
     with pytest.raises(ValueError, match="black box"):
         black_box().refine_mesh()
     with pytest.raises(ValueError, match="only meshes of DFET"):
-        flights(transcription=None).refine_mesh()
+        flights(transcriptions=None).refine_mesh()
 
 
 def test_a_search_may_refine_its_meshes_in_the_end():

@@ -11,10 +11,9 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
-from macs.gradients.polish import Solves, polish
+from macs.gradients.polish import CountedSolves, polish
 from macs.pareto.archive import Archive
 from macs.search.gradient_action import allowed
-from macs.search.loop import begin, conclude
 from macs.search.state import SearchState
 from problems import Problem, load
 from problems.cases import goddard, orbit_rise
@@ -43,7 +42,7 @@ class Circle(Evaluator):
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
         return Evaluation(Z.copy(), self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), 0
 
-    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
+    def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         angles = np.linspace(0.0, np.pi / 2, 20_001)
         curve = 1.0 - np.column_stack([np.cos(angles), np.sin(angles)])
         rows = []
@@ -58,7 +57,7 @@ class Circle(Evaluator):
 
 
 def state_of(evaluator: Circle, Z: np.ndarray) -> SearchState:
-    state = begin(MACS(agents=3), evaluator, 3, np.random.default_rng(0))
+    state = MACS(agents=3).begin(evaluator, 3, np.random.default_rng(0))
     state.archive = Archive(Z, evaluator.objectives(Z), np.zeros(len(Z)))
     return state
 
@@ -68,7 +67,7 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
     rng = np.random.default_rng(1)
     Z = np.column_stack([rng.uniform(0.8, 0.9, 10), np.sort(rng.uniform(0.2, 1.3, 10))])
     state = state_of(evaluator, Z)
-    archive = polish(state.archive, Solves(evaluator, 10_000), 10)
+    archive = polish(state.archive, CountedSolves(evaluator, 10_000), 10)
     assert len(archive) == 10 and archive.Z[:, 0] == pytest.approx(1.0)
     angles = np.sort(archive.Z[:, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
@@ -78,14 +77,14 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
 def test_a_polish_fills_empty_places() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.array([[0.9, 0.3], [0.9, 1.2]]))
-    state.archive = polish(state.archive, Solves(evaluator, 10_000), 6)
+    state.archive = polish(state.archive, CountedSolves(evaluator, 10_000), 6)
     assert len(state.archive) == 6
 
 
 def test_no_more_solves_than_allowed() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)]))
-    solves = Solves(evaluator, 3)
+    solves = CountedSolves(evaluator, 3)
     state.archive = polish(state.archive, solves, 5)
     assert evaluator.counts.gradient_solves == 3 and solves.left == 0
     assert 3 <= len(state.archive) <= 5
@@ -115,7 +114,7 @@ def test_few_solves_are_not_spent_on_a_crowd() -> None:
     evaluator = Circle()
     rng = np.random.default_rng(1)
     state = state_of(evaluator, np.column_stack([rng.uniform(0.8, 0.9, 30), np.linspace(0.7, 0.8, 30)]))
-    state.archive = polish(state.archive, Solves(evaluator, 20), 30)
+    state.archive = polish(state.archive, CountedSolves(evaluator, 20), 30)
     angles = np.sort(state.archive.Z[state.archive.Z[:, 0] == 1.0, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
     assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
@@ -134,7 +133,7 @@ class Sphere(Circle):
         x, a, b = Z.T
         return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
 
-    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
+    def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         angles = np.linspace(0.0, np.pi / 2, 101)
         grid = np.array([[1.0, a, b] for a in angles for b in angles])
         surface, rows = self.objectives(grid), []
@@ -160,7 +159,7 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
     for solves in (36, 200):
         sphere = Sphere()
         state = state_of(sphere, crowd)
-        state.archive = polish(state.archive, Solves(sphere, solves), 30)
+        state.archive = polish(state.archive, CountedSolves(sphere, solves), 30)
         assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
         assert uncovered(state.archive.F, sphere) < 0.3
 
@@ -178,10 +177,10 @@ class Asking:
         super().__init__()
         self.found: list[np.ndarray] = []
 
-    def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
+    def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
         if stopping():
             return Evaluation(starts[:0], references[:0], np.empty(0), np.empty(0, dtype=str)), 0
-        found, iterations = super()._refine(starts, references, weights, margins)  # type: ignore[misc]
+        found, iterations = super()._descend(starts, references, weights, margins)  # type: ignore[misc]
         self.found.extend(found.F)
         return found, iterations
 
@@ -209,16 +208,16 @@ def test_a_polish_that_is_stopped_loses_nothing_and_goes_on(kind, solves) -> Non
         return state, evaluator
 
     whole, thorough = beginning()
-    conclude(settings, whole, thorough)
+    settings.conclude(whole, thorough)
     assert len(thorough.found) > solves
     state, evaluator = beginning()
     with stopped_by(after(solves)):
-        conclude(settings, state, evaluator)
+        settings.conclude(state, evaluator)
     assert evaluator.counts.gradient_solves == len(evaluator.found) == solves and evaluator.counts.clocked
     # What was there, and what was found, is in the front, or something that is better.
     for F in [*evaluator.objectives(crowd), *evaluator.found]:
         assert (state.archive.F <= F + 1e-3).all(axis=1).any()
-    conclude(settings, state, evaluator)
+    settings.conclude(state, evaluator)
     assert evaluator.counts.gradient_solves == len(evaluator.found) == len(thorough.found)
     assert state.archive.Z.tobytes() == whole.archive.Z.tobytes() and state.archive.F.tobytes() == whole.archive.F.tobytes()
 
@@ -231,7 +230,7 @@ def test_gradient_solves_that_are_stopped_within_a_batch_are_kept() -> None:
         rng = np.random.default_rng(1)
         seen = evaluator.evaluate(evaluator.first_guess(evaluator.lower + rng.random((4, len(nlp.free))) * nlp.span[nlp.free]))
         with stopped_by(after(solves)):
-            return evaluator, evaluator.refine(seen.Z, seen.F, np.ones((4, 2)))
+            return evaluator, evaluator.descend(seen.Z, seen.F, np.ones((4, 2)))
 
     whole, everything = solved(4)
     assert whole.counts.gradient_solves == 4 and not whole.counts.clocked
@@ -255,15 +254,15 @@ def test_with_more_than_two_objectives_the_ends_are_sought_first_and_then_all_ov
 
 def test_what_is_worse_or_failed_is_not_taken() -> None:
     class Useless(Circle):
-        def _refine(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
-            found, count = super()._refine(starts, references, weights, margins)
+        def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
+            found, count = super()._descend(starts, references, weights, margins)
             status = np.where(np.arange(count) % 2, CONVERGED, "failed")
             return Evaluation(found.Z, found.F + 2.0, found.violation, status), count
 
     evaluator = Useless()
     Z = np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)])
     state = state_of(evaluator, Z)
-    state.archive = polish(state.archive, Solves(evaluator, 1000), 5)
+    state.archive = polish(state.archive, CountedSolves(evaluator, 1000), 5)
     assert np.array_equal(np.sort(state.archive.Z[:, 1]), Z[:, 1])
 
 

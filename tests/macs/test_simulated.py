@@ -97,7 +97,7 @@ def test_other_problems_are_refused_by_what_differs(front):
     phase.state("x", bounds=(0, 100), initial=0)
     phase.dynamics(x=phase.control("u", bounds=(0, 2)))
     problem.minimize("effort", phase.final(phase["x"]))
-    with pytest.raises(ValueError, match="'push' cannot be flown under 'pull': objectives are minimize effort"):
+    with pytest.raises(ValueError, match="'push' cannot be simulated under 'pull': objectives are minimize effort"):
         front.simulate(problem)
     with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* there and maximize distance \[m\]"):
         front.simulate(push(unit="ft"))

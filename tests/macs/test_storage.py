@@ -67,7 +67,7 @@ def mixed() -> Front:
         elements=[2, 5, 1, 3],
         decision=[np.arange(len(own), dtype=float) + 10 * i for i, own in enumerate(names)],
         variables=[[Variable(name, -1.0, 1.0, "km", 2.0) for name in own] for own in names],
-        transcription=[{"method": "DFET", "settings": {"elements": k}} for k in (2, 5, 2, 3)],
+        transcriptions=[{"method": "DFET", "settings": {"elements": k}} for k in (2, 5, 2, 3)],
         notes=["", "not as exact as it should be: 3e-5", None, ""],
     )
 

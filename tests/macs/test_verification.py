@@ -22,7 +22,7 @@ def altered(front: Front, **changes) -> Front:
     columns = {
         "F": front.F, "decision": front.decision, "violation": front.violation, "status": front.status, "goals": front.goals,
         "variables": front.variables, "trajectories": [p.trajectory for p in front], "problem": front.problem,
-        "transcription": front.transcriptions, "stats": front.stats, "sort": False, **changes,
+        "transcriptions": front.transcriptions, "stats": front.stats, "sort": False, **changes,
     }  # fmt: skip
     return Front(**columns)
 
@@ -73,10 +73,10 @@ def test_what_cannot_be_verified_says_why(front):
     with pytest.raises(ValueError, match="black box"):
         verify(black_box(), tolerance=1.0)
     with pytest.raises(ValueError, match="does not say how"):
-        verify(flights(transcription=None), tolerance=1.0)
+        verify(flights(transcriptions=None), tolerance=1.0)
     other = {"method": "DFET", "settings": {"elements": 3, "order": 4}}
     with pytest.raises(ValueError, match=r"decision vector of point 0 .* is not that of its transcription"):
-        verify(altered(front, transcription=other), tolerance=1.0)
+        verify(altered(front, transcriptions=other), tolerance=1.0)
 
 
 def test_objectives_that_only_the_mesh_believes_are_found():

@@ -13,12 +13,11 @@ from test_study import Inline
 
 from macs import Front
 from macs.fronts.provenance import Source
-from problems.catalogue import CASES
+from problems.catalogue import CASES, is_catalogued
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
 from runs.data import records
-from runs.data.addresses import is_catalogued
 
 MARK = "from pathlib import Path\nPath({mark!r}).touch()\ndef build(**data): Path({mark!r}).touch()\nreference = build\n"
 TOML = 'solvers = ["macs"]\nruns = 1\nseed = 1\nevaluations = 50\n'

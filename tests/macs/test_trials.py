@@ -7,7 +7,7 @@ import numpy as np
 from macs.evaluation.box import box_of
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.search.macs import MACS
-from macs.search.trials import Attempts
+from macs.search.trials import Trials
 
 
 class Sticky(Evaluator):
@@ -36,14 +36,14 @@ def prepared():
     agents.Z[:], agents.velocity[:] = [0.8, 0.8, 0.5], 0.0
     agents.F[:] = [0.8, 0.64]
     state.experience = np.empty((0, 2))
-    return box, state, Attempts(settings, state, box, box_of(box), 1000)
+    return box, state, Trials(settings, state, box, box_of(box), 1000)
 
 
 def test_velocity_and_experience_are_what_was_achieved():
-    _, state, attempts = prepared()
+    _, state, trials = prepared()
     rows = np.array([2, 5])
-    X = attempts.positions(rows)
-    success = attempts.try_out(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
+    X = trials.positions(rows)
+    success = trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
     assert success.tolist() == [True, False]
     assert np.allclose(state.agents.velocity[2], [-0.2, 0.0])
     assert np.allclose(state.experience, [[-0.2, 0.0]])
@@ -52,48 +52,48 @@ def test_velocity_and_experience_are_what_was_achieved():
 
 
 def test_without_velocity_a_success_leaves_its_agent_at_rest_and_a_failure_as_it_was():
-    _, state, attempts = prepared()
+    _, state, trials = prepared()
     rows = np.array([2, 5])
-    X = attempts.positions(rows)
+    X = trials.positions(rows)
     state.agents.velocity[:] = 0.1
-    attempts.try_out(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]), velocity=False)
+    trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]), velocity=False)
     assert np.allclose(state.agents.velocity[[2, 5, 6]], [[0.0, 0.0], [0.1, 0.1], [0.1, 0.1]])
 
 
 def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
-    box, state, attempts = prepared()
+    box, state, trials = prepared()
     before, rows = copy.deepcopy(state), np.array([2, 5, 6])
-    X = attempts.positions(rows)
-    looked, result = attempts.look(state.agents.Z[rows], X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
+    X = trials.positions(rows)
+    looked, result = trials.evaluate(state.agents.Z[rows], X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
     assert looked.tolist() == [0, 2]
     assert np.allclose(result.F[:, 0], [0.6, 0.5])
-    assert attempts.seen == [result]
+    assert trials.seen == [result]
     assert state.evaluations == box.counts.evaluations == before.evaluations + 2
     assert all(np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items())
     assert len(state.experience) == 0
 
 
 def test_a_step_that_was_mostly_undone_is_a_success_without_credit():
-    _, _, attempts = prepared()
+    _, _, trials = prepared()
     rows = np.array([0, 1])
-    X = attempts.positions(rows)
-    assert attempts.try_out(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
-    assert attempts.credited[:2].tolist() == [False, True]
+    X = trials.positions(rows)
+    assert trials.evaluate_and_accept(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
+    assert trials.credited[:2].tolist() == [False, True]
 
 
 def test_candidates_start_from_the_memory_of_their_own_agent():
-    box, _, attempts = prepared()
-    attempts.state.agents.Z[3, 0] = 0.123
+    box, _, trials = prepared()
+    trials.state.agents.Z[3, 0] = 0.123
     rows = np.array([3])
-    X = attempts.positions(rows)
-    attempts.try_out(rows, X, X - 0.1)
+    X = trials.positions(rows)
+    trials.evaluate_and_accept(rows, X, X - 0.1)
     assert box.started_from[-1].tolist() == [0.123]
     assert box.started_from[0].tolist() == [7.0] * 10
 
 
 def test_proposals_that_do_not_move_cost_nothing():
-    box, state, attempts = prepared()
+    box, state, trials = prepared()
     before = state.evaluations
-    X = attempts.positions()
-    assert not attempts.try_out(np.arange(10), X, X).any()
+    X = trials.positions()
+    assert not trials.evaluate_and_accept(np.arange(10), X, X).any()
     assert (state.evaluations, box.counts.evaluations) == (before, before)
