@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, fields
 from typing import Any
 
 import casadi as ca
@@ -86,8 +87,8 @@ def scale(value: Any, default: float, what: str) -> float:
 def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
     """A row lower <= expression <= upper, of which one side may be missing.
 
-    What counts as one in it is, unless told, the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
-    the limit's size: so at the usual tolerance of 1e-6 none has to hold to more than nine digits, which scaled solvers cannot reach.
+    What counts as one in it is by default the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
+    the limit's size: so at the usual tolerance of 1e-6 none has to be met to more than nine digits, which scaled solvers cannot reach.
     """
     low, high = one_sided(lower, upper, what)
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
@@ -173,14 +174,46 @@ def check_positive(name: str, value: Any) -> None:
         raise ValueError(f"{name} must be a positive number, not {value!r}")
 
 
+def check_interval(name: str, value: Any, interval: str) -> None:
+    """Raise ValueError unless `value` is a number in an interval such as "(0, 1]" or "[0, inf)"."""
+    lower, upper = map(float, interval[1:-1].split(","))
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not (number and lower <= value <= upper) or (value == lower and interval[0] == "(") or (value == upper and interval[-1] == ")"):
+        raise ValueError(f"{name} must be in {interval}, not {value!r}")
+
+
 def check_count(name: str, value: Any, least: int) -> None:
     """Raise ValueError unless `value` is a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
+def check_choice(name: str, value: Any, choices: Iterable[str]) -> None:
+    """Raise ValueError unless `value` is one of these words."""
+    words = [*choices]
+    if not isinstance(value, str) or value not in words:
+        shown = " or ".join(map(repr, words)) if len(words) == 2 else f"one of {', '.join(map(repr, words))}"
+        raise ValueError(f"{name} must be {shown}, not {value!r}")
+
+
 def unknown(what: str, word: Any, known: Iterable[str]) -> str:
-    """What to say of a word that is none of those known: the nearest, and all."""
+    """The message for a word that is none of those known: the nearest, and all."""
     words = [*known]
     near = difflib.get_close_matches(str(word), words, n=1)
     return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
+
+
+def settings_of(value: Any) -> list[Field[Any]]:
+    """The settings of a dataclass as its constructor takes them: those that are also positional first."""
+    return sorted((one for one in fields(value) if one.init), key=lambda one: bool(one.kw_only))
+
+
+def short_repr(value: Any) -> str:
+    """A dataclass of settings as its constructor is called, without those that have their default value."""
+    shown = [f"{one.name}={given!r}" for one in settings_of(value) if not _is_default(given := getattr(value, one.name), one)]
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+def _is_default(value: Any, setting: Field[Any]) -> bool:
+    default = setting.default if setting.default_factory is MISSING else setting.default_factory()
+    return value is default or (type(value) is type(default) and bool(value == default))

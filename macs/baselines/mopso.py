@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.box import Box, box_of
+from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
 from . import constraints as handlings
-from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
 WAITING = -1
 
@@ -117,8 +118,8 @@ class MOPSO(PopulationSolver):
         swarm = evaluate(evaluator, Z[: budget - evaluator.counts.evaluations], self.degree)
         state = FlightState(
             members=swarm,
-            archive=no_points(swarm),
-            closest=no_points(swarm),
+            archive=Archive.of(swarm, np.arange(0)),
+            closest=Archive.of(swarm, np.arange(0)),
             iteration=0,
             first_feasible=0,
             all_feasible=0,
@@ -147,14 +148,14 @@ class MOPSO(PopulationSolver):
         """Draw more first particles, at most `most`: the first that are feasible stay, and the least violated of the others."""
         count = len(state.members)
         seen = evaluate(evaluator, self._candidates(evaluator, np.empty((0, 0)), count, state.rng)[:most], self.degree)
-        every = state.members.join(seen)
+        every = state.members.joined(seen)
         cv = handlings.excess(every.F, every.violation, evaluator.tolerance, every.degree)
         state.members = state.best = every.take(np.argsort(cv, kind="stable")[:count])
         return seen
 
     def _flown(self, state: FlightState, evaluator: Evaluator, left: int, budget: int) -> Members:
         """Let the particles fly once, the first `left` of them if they are more."""
-        box, rng, tolerance, free = box_of(evaluator), state.rng, evaluator.tolerance, evaluator.free
+        box, rng, tolerance, free = evaluator.box, state.rng, evaluator.tolerance, evaluator.free
         swarm, d = len(state.members), len(free)
         share = (evaluator.counts.evaluations - state.launched) / (budget - state.launched)
         followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), swarm, rng)
@@ -167,18 +168,18 @@ class MOPSO(PopulationSolver):
 
         seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
         n = len(seen)
-        state.members = seen.join(state.members.take(np.arange(n, swarm)))
+        state.members = seen.joined(state.members.take(np.arange(n, swarm)))
         state.velocity = np.concatenate([V[:n], state.velocity[n:]])
         better = improved(self._goals(seen, tolerance), self._goals(state.best, tolerance)[:n], coin[:n])
         rows = np.arange(swarm)
         rows[np.flatnonzero(better)] += swarm
-        state.best = state.best.join(seen).take(rows)
+        state.best = state.best.joined(seen).take(rows)
         return seen
 
     def _learn(self, state: FlightState, seen: Members, evaluator: Evaluator, budget: int) -> None:
         """Offer what was seen to the archive; let the swarm fly from now on if it is complete."""
         tolerance = evaluator.tolerance
-        every = state.leaders.join(seen)
+        every = state.leaders.joined(seen)
         goals = self._goals(every, tolerance)
         rows = np.flatnonzero(nondominated(goals))
         if len(rows) > self.archive:

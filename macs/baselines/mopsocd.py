@@ -113,7 +113,7 @@ class MOPSOCD(Baseline):
         return SwarmState(**common, best=members, leaders=members.take(np.arange(0)), velocity=velocity)
 
     def _table(self, state: SwarmState) -> Members:
-        return state.members.join(state.best).join(state.leaders)
+        return state.members.joined(state.best).joined(state.leaders)
 
     def _restore(self, algorithm: Any, state: SwarmState, people: Any) -> None:
         from pymoo.util.archive import MultiObjectiveArchive

@@ -10,7 +10,6 @@ import numpy as np
 
 from problems.checks import check_count
 
-from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Archive, least_violated
 from ..pareto.dominance import nondominated
@@ -81,8 +80,8 @@ class PopulationSolver(Solver):
     penalty: float
     degree: str
 
-    def tells(self, state: State, tolerance: float) -> dict[str, Any]:
-        """See `Solver.tells`."""
+    def extra_stats(self, state: State, tolerance: float) -> dict[str, Any]:
+        """See `SearchMethod.extra_stats`."""
         members = state.members
         feasible = members.take(handlings.excess(members.F, members.violation, tolerance) == 0.0)
         return {
@@ -109,7 +108,7 @@ class PopulationSolver(Solver):
         Z = evaluator.first_guess(evaluator.opening(self._draw(evaluator, count, rng)))
         if len(given):
             Z[: len(given)] = given
-        Z[:, evaluator.free] = box_of(evaluator).confine(Z[:, evaluator.free])
+        Z[:, evaluator.free] = evaluator.box.confine(Z[:, evaluator.free])
         return Z
 
     def _check(self, counts: Mapping[str, int], ranges: Mapping[str, tuple[float, float]]) -> None:
@@ -139,47 +138,23 @@ def thinned(given: np.ndarray, size: int) -> np.ndarray:
     return given if len(given) <= size else given[np.linspace(0, len(given) - 1, size).round().astype(int)]
 
 
-def no_points(like: Members) -> Archive:
-    """An archive without points, of vectors and objectives as long as those of others."""
-    none = np.arange(0)
-    return Archive(like.Z[none], like.F[none], like.violation[none])
-
-
-@dataclass(frozen=True)
-class Members:
-    """Evaluated points, one a row, feasible or not.
+@dataclass(frozen=True, repr=False)
+class Members(Archive):
+    """Evaluated points of a population, feasible or not.
 
     Attributes
     ----------
     Z : array (n, D)
-        Full vectors, in the user's units, as they came back from the evaluator.
+        Full vectors, in the user's units, after the evaluation.
     F : array (n, m)
         Objectives, all minimised; NaN where the evaluation failed.
     violation : array (n,)
-        Infinite where the evaluation failed.
+        Largest scaled residual of any constraint; infinite where the evaluation failed.
     degree : array (n,)
-        The number that infeasible points are ranked by; see `degrees`.
+        Number by which infeasible points are ranked; see `constraints.degree`.
     """
 
-    Z: np.ndarray
-    F: np.ndarray
-    violation: np.ndarray
     degree: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.F)
-
-    def take(self, rows: np.ndarray) -> Members:
-        """The points of `rows` (indices or mask)."""
-        return Members(*(values[rows] for values in self._fields))
-
-    def join(self, others: Members) -> Members:
-        """These, then the others."""
-        return Members(*(np.concatenate(pair) for pair in zip(self._fields, others._fields, strict=True)))
-
-    @property
-    def _fields(self) -> tuple[np.ndarray, ...]:
-        return self.Z, self.F, self.violation, self.degree
 
 
 def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:
@@ -198,7 +173,7 @@ def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.nd
     usable = np.flatnonzero(np.isfinite(members.violation))
     if members.Z.shape[1] == len(free) or not usable.size:
         return evaluator.first_guess(X)
-    box, Z = box_of(evaluator), members.Z[usable]
+    box, Z = evaluator.box, members.Z[usable]
     vectors = Z[box.squared_distances(box.to_unit(X), box.to_unit(Z[:, free])).argmin(axis=1)]
     vectors[:, free] = X
     return vectors
@@ -209,6 +184,5 @@ def shown(tolerance: float, *groups: Members) -> Archive | None:
     for group in groups:
         feasible = group.take((group.violation <= tolerance) & np.isfinite(group.F).all(axis=1))
         if len(feasible):
-            best = feasible.take(nondominated(feasible.F))
-            return Archive(best.Z, best.F, best.violation)
+            return Archive.of(feasible, nondominated(feasible.F))
     return None

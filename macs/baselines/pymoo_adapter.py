@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
-from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
+from ..pareto.archive import Archive
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
 
 class Baseline(PopulationSolver):
@@ -101,12 +101,12 @@ class Baseline(PopulationSolver):
         Z = self._candidates(evaluator, given[done:], size - done, rng)[: budget - evaluator.counts.evaluations]
         if len(Z):
             first = evaluate(evaluator, Z, self.degree)
-            members = first if members is None else members.join(first)
+            members = first if members is None else members.joined(first)
         assert members is not None
         self.check_objectives(members.F.shape[1])
         if len(given):
             members = self._place(members, evaluator)
-        none = no_points(members)
+        none = Archive.of(members, np.arange(0))
         common = {"members": members, "archive": none, "closest": none, "iteration": 0, "first_feasible": 0, "all_feasible": 0, "rng": rng}
         state = self._first(members, common, evaluator)
         algorithm, table = self._set_up(evaluator, members.F.shape[1], rng), self._table(state)
@@ -139,7 +139,7 @@ class Baseline(PopulationSolver):
             bred = evaluate(evaluator, full_vectors(evaluator, state.members, X), self.degree)
             left = budget - evaluator.counts.evaluations
             self._tell(offspring, bred, len(table), evaluator)
-            table = table.join(bred)
+            table = table.joined(bred)
             with warnings.catch_warnings():
                 algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
@@ -173,7 +173,7 @@ class Baseline(PopulationSolver):
 
     def _tell(self, people: Any, points: Members, row: int, evaluator: Evaluator) -> None:
         """Write points into pymoo's individuals, who learn their rows, from `row` on, in the table of all points."""
-        X = box_of(evaluator).confine(points.Z[:, evaluator.free])
+        X = evaluator.box.confine(points.Z[:, evaluator.free])
         F, cv = self._told(points, evaluator.tolerance)
         for i, one in enumerate(people):
             one.X, one.F, one.CV = X[i].copy(), F[i].copy(), cv[i : i + 1].copy()

@@ -233,7 +233,7 @@ def test_objectives_that_are_in_no_conflict_have_one_point() -> None:
     problem.minimize("effort", run.integral(u**2))
     problem.minimize("path", run.integral(x**2))
     front = sweep(problem, MESH, points=6)
-    assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or alike" in front.message
+    assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or equal" in front.message
 
 
 @pytest.mark.parametrize("tool", TOOLS)

@@ -132,7 +132,7 @@ def test_if_nothing_holds_the_front_says_so():
     front = MACS(archive=1).solve(gust(), DFET(2, 1), evaluations=40, seed=1)
     assert len(front)
     empty = front.polished(DFET(2, 1), solves=2, verify=VERIFY)
-    assert not len(empty) and empty.message == "no point misses less than 0.0001 when simulated"
+    assert not len(empty) and empty.message == "no point violates less than 0.0001 when simulated"
     assert "0.0001" in empty.table() and len(front.polished(DFET(2, 1), solves=2, verify=1.0))
 
 
