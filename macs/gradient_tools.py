@@ -24,7 +24,7 @@ from transcription.nlp.scaling import objective_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import nearest_misses, vectors_points
+from .fronts.builders import nearest_violation, vectors_points
 from .fronts.points import Point
 from .fronts.provenance import costs
 from .gradients.multistart import MultistartSolver
@@ -242,7 +242,7 @@ class _Job:
         good = [solved for solved in found if solved.status == CONVERGED]
         if not good:
             nearest = self.front([min(found, key=lambda solved: solved.violation)], None)[0]
-            return self.front([], None, message=f"no solve converged; {nearest_misses(nearest)}", closest=nearest)
+            return self.front([], None, message=f"no solve converged; {nearest_violation(nearest)}", closest=nearest)
         F = np.array([solved.F for solved in good])
         # Rounded to the accuracy of the solves: otherwise one of two equal points might dominate the other.
         kept = distinct(F, self._unit(ranges))

@@ -56,20 +56,10 @@ class Progress:
 
 
 class SearchDisplay(Display):
-    """Display of the `Progress` of a search.
+    """Display of the `Progress` of a search; see `Display`."""
 
-    Parameters
-    ----------
-    shown : bool
-    stream : text stream, optional
-        Default: stderr.
-    title : str
-        Name of the problem.
-    """
-
-    def __init__(self, shown: bool = True, stream: TextIO | None = None, title: str = "") -> None:
+    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
         super().__init__(shown, stream)
-        self._title = title
         self._last: Progress | None = None
         self._shown_last: Progress | None = None
 
@@ -89,10 +79,8 @@ class SearchDisplay(Display):
             self._write(self.line())
 
     def line(self) -> str:
-        """Title, counts, time, archive and failures in one line."""
-        if self._last is None:
-            return ""
-        return ", ".join(word for word in [self._title, count(self._last), clock(self._last), *found(self._last)] if word)
+        """Counts, time, archive and failures in one line."""
+        return ", ".join([count(self._last), clock(self._last), *found(self._last)]) if self._last else ""
 
     def render(self) -> Any:
         """The state of the search with a bar."""
@@ -102,10 +90,10 @@ class SearchDisplay(Display):
         from rich.text import Text
 
         if self._last is None:
-            return Text(f"{self._title}: beginning")
+            return Text("beginning")
         line = Table.grid(padding=(0, 2), expand=False)
         bar = ProgressBar(total=self._last.budget, completed=self._last.evaluations, width=30)
-        line.add_row(Text(self._title, style="bold"), bar, Text(count(self._last)), Text(clock(self._last), style="dim"))
+        line.add_row(bar, Text(count(self._last)), Text(clock(self._last), style="dim"))
         return Group(line, Text(", ".join(found(self._last)), overflow="ellipsis", no_wrap=True))
 
     def _write(self, line: str) -> None:
@@ -130,6 +118,6 @@ def found(progress: Progress) -> list[str]:
     """Size of the archive, its best value of each objective, and the number of failures by status."""
     words = [f"archive {progress.archive}", *(f"{name} {value:.6g}" for name, value in progress.ideal.items())]
     if not progress.archive:
-        words = ["nothing feasible yet"]
+        words = ["no feasible point yet"]
     failures = [f"{number:,} {status}".replace(",", " ") for status, number in progress.failures.items() if number]
     return [*words, *failures]

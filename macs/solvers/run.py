@@ -67,7 +67,7 @@ class SearchRun:
         callback: Callable[[Progress], Any] | None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """The front of the search, which begins anew or continues from its checkpoint, until the budget is spent or the search is stopped.
+        """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped.
 
         Returns
         -------

@@ -267,7 +267,7 @@ def test_where_nothing_is_feasible_the_nearest_is_told(settings: Any, what: str)
 
     front = settings.minimize(function, [(-2, 2)] * 3, evaluations=120, seed=3)
     assert len(front) == 0
-    assert front.message.startswith("nothing feasible in 120 evaluations")
+    assert front.message.startswith("no feasible point in 120 evaluations")
     assert front.closest is not None
     if what == "infeasible":
         assert front.closest.violation == min(seen)
@@ -371,7 +371,7 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: NSGA2(population=None), "NSGA2: population must be a whole number of at least 2, not None"),  # type: ignore[arg-type]
         (lambda: NSGA2(handling="death"), "NSGA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
         (lambda: NSGA2(crossover=1.5), r"NSGA2: crossover must be in \[0, 1\], not 1.5"),
-        (lambda: NSGA2(penalty=-1.0), "NSGA2: penalty must be a number of at least 0"),
+        (lambda: NSGA2(penalty=-1.0), r"NSGA2: penalty must be in \[0, inf\), not -1.0"),
         (lambda: NSGA3(divisions=0), "NSGA3: divisions"),
         (lambda: NSGA3(whole=1), "NSGA3: whole must be True or False, not 1"),  # type: ignore[arg-type]
         (lambda: NSGA3(mutation_eta="x"), "NSGA3: mutation_eta"),  # type: ignore[arg-type]
@@ -385,7 +385,7 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: MOPSO(archive=0), "MOPSO: archive must be a whole number of at least 1"),
         (lambda: MOPSO(cells=2.5), "MOPSO: cells must be a whole number of at least 1, not 2.5"),  # type: ignore[arg-type]
         (lambda: MOPSO(search=1.5), r"MOPSO: search must be in \[0, 1\], not 1.5"),
-        (lambda: MOPSO(final_inertia=-1), "MOPSO: final_inertia must be a number of at least 0"),
+        (lambda: MOPSO(final_inertia=-1), r"MOPSO: final_inertia must be in \[0, inf\), not -1"),
         (lambda: MOPSO(handling="death"), "MOPSO: handling must be one of"),
     ],
 )

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from macs import MOPSO, NSGA2, NSGA3
-from macs.baselines.constraints import DEGREES, degree, excess, problem_type, told
+from macs.baselines.constraints import DEGREES, degree, excess, presented, problem_type
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.blackbox import BlackBox
 from problems import Problem, load
@@ -61,9 +61,9 @@ def test_problem_types_of_algorithm_1() -> None:
 
 def test_what_algorithms_are_told_has_the_degree_in_place_of_the_violation() -> None:
     F, violation, degrees = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0.0, 0.5]), np.array([0.0, 0.75])
-    assert told("feasible-first", 10, F, violation, 1e-6, degrees)[1].tolist() == [0, 0.75]
-    assert told("penalty", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2], [10.5, 11.5]]
-    assert told("objective", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2, 0], [3, 4, 0.75]]
+    assert presented("feasible-first", 10, F, violation, 1e-6, degrees)[1].tolist() == [0, 0.75]
+    assert presented("penalty", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2], [10.5, 11.5]]
+    assert presented("objective", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2, 0], [3, 4, 0.75]]
 
 
 # Each constraint's own violation

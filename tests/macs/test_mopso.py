@@ -200,7 +200,7 @@ def test_where_nobody_asks_for_feasible_particles_none_are_searched(more) -> Non
 def test_nothing_feasible_is_told() -> None:
     front = MOPSO(particles=10).minimize(lambda X: (schaffer(X), X[:, :1] + 3), [(-2, 2)] * 2, evaluations=200, seed=1)
     assert not len(front)
-    assert front.message == "nothing feasible in 200 evaluations; the nearest violates the constraints by 1"
+    assert front.message == "no feasible point in 200 evaluations; the nearest violates the constraints by 1"
     assert front.closest.decision[0] == -2
 
 

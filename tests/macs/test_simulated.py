@@ -97,9 +97,9 @@ def test_other_problems_are_refused_by_what_differs(front):
     phase.state("x", bounds=(0, 100), initial=0)
     phase.dynamics(x=phase.control("u", bounds=(0, 2)))
     problem.minimize("effort", phase.final(phase["x"]))
-    with pytest.raises(ValueError, match="'push' cannot be simulated under 'pull': objectives are minimize effort"):
+    with pytest.raises(ValueError, match="'push' cannot be simulated with 'pull': its objectives are minimize effort"):
         front.simulate(problem)
-    with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* there and maximize distance \[m\]"):
+    with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* not maximize distance \[m\]"):
         front.simulate(push(unit="ft"))
     with pytest.raises(ValueError, match="tolerance must not be negative"):
         front.simulate(tolerance=-1.0)
