@@ -45,7 +45,7 @@ class State:
     rng: np.random.Generator
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: generation {self.iteration + 1}, {len(self.members)} members, {len(self.archive)} on the front>"
+        return f"<{type(self).__name__}: generation {self.iteration + 1}; {self.members}, {self.archive}>"
 
     def note(self, tolerance: float) -> None:
         """Update `first_feasible` and `all_feasible` by the population of this generation; see `constraints.problem_type`."""

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import short_repr
 from transcription.inner.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
+from ..io.text import counted
 from .box import Box
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
@@ -57,8 +59,8 @@ class Evaluation:
         return self.violation[:, None] if self.itemise is None else self.itemise()
 
     def __repr__(self) -> str:
-        counted = ", ".join(f"{number} {status}" for status, number in Counter(self.status.tolist()).items())
-        return f"<Evaluation of {len(self.F)} points: {counted or 'none'}>"
+        by_status = ", ".join(f"{number} {status}" for status, number in Counter(self.status.tolist()).items())
+        return f"<Evaluation: {counted(len(self.F), 'point')}{by_status and f'; {by_status}'}>"
 
 
 @dataclass
@@ -82,6 +84,8 @@ class Counts:
     fallbacks: int = 0
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
+
+    __repr__ = short_repr
 
     def add_solves(self, count: int, status: Iterable[str], iterations: int, clocked: int) -> None:
         """Count gradient solves with their statuses and iterations; `clocked` of them were ended early by a time limit."""

@@ -11,6 +11,7 @@ from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
+from ..io.text import counted
 from .decision_table import Decisions
 from .provenance import STATS, Source, versions
 
@@ -193,7 +194,7 @@ class Points:
 
     def __repr__(self) -> str:
         name = self.source.name if self.source else "black box"
-        return f"<{type(self).__name__} of {name}: {len(self)} points, {len(self.goals)} objectives>"
+        return f"<{type(self).__name__}: {name}: {counted(len(self), 'point')}, {counted(len(self.goals), 'objective')}>"
 
     def __iter__(self) -> Iterator[Point]:
         return (Point(self, i) for i in range(len(self)))

@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..io.text import counted
 from .dominance import extremes, nondominated
 
 HUGE = 1e9
@@ -40,7 +41,7 @@ class Archive:
         return len(self.F)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {len(self)} points, {self.F.shape[1]} objectives>"
+        return f"<{type(self).__name__}: {counted(len(self), 'point')}, {counted(self.F.shape[1], 'objective')}>"
 
     def columns(self) -> list[np.ndarray]:
         """The arrays of all fields, in their order."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..gradients.polish import PolishLog
+from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from .settings import Settings
@@ -117,8 +118,8 @@ class SearchState:
     polishing: PolishLog | None = None
 
     def __repr__(self) -> str:
-        counts = f"{self.iteration} iterations, {self.evaluations} evaluations, {self.refinements} gradient solves"
-        return f"<SearchState: {counts}; {len(self.agents)} agents, {len(self.archive)} points in the archive>"
+        counts = {"iteration": self.iteration, "evaluation": self.evaluations, "gradient solve": self.refinements}
+        return f"<SearchState: {', '.join(counted(number, what) for what, number in counts.items())}; {self.agents}, {self.archive}>"
 
 
 def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator) -> None:
