@@ -83,7 +83,7 @@ class MOEAD(Baseline):
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError for a single objective, and for a number of directions other than that of individuals."""
-        m += self.handling == "objective"
+        m = self._presented_count(m)
         check_directions("MOEAD", m, self.population, self.divisions)
         made = population_size(m, None, self.divisions)
         if None not in (self.population, self.divisions) and made != self.population:
@@ -93,7 +93,7 @@ class MOEAD(Baseline):
             )
 
     def _size(self, m: int | None) -> int | None:
-        return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
+        return population_size(m and self._presented_count(m), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import moead
@@ -119,7 +119,7 @@ class MOEAD(Baseline):
         return members.take(rows[np.argsort(places)])
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> DecomposedState:
-        return DecomposedState(**common, ideal=np.full(members.F.shape[1] + (self.handling == "objective"), np.inf))
+        return DecomposedState(**common, ideal=np.full(self._presented_count(members.F.shape[1]), np.inf))
 
     def _restore(self, algorithm: Any, state: DecomposedState, individuals: Any) -> None:
         algorithm.pop, algorithm.ideal = individuals, state.ideal

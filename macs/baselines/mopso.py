@@ -115,8 +115,7 @@ class MOPSO(PopulationSolver):
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> ParticleState:
         """The state after a first swarm has been evaluated; see `SearchMethod.begin`."""
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        evaluator.check_budget(budget)
         Z = self._candidates(evaluator, thinned(distinct(start), self.particles), self.particles, rng)
         swarm = evaluate(evaluator, Z[: budget - evaluator.counts.evaluations], self.degree)
         state = ParticleState(

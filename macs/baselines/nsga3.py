@@ -77,10 +77,10 @@ class NSGA3(Baseline):
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError for a single objective, and for directions that do not match the population."""
-        check_directions("NSGA3", m + (self.handling == "objective"), self.population, self.divisions)
+        check_directions("NSGA3", self._presented_count(m), self.population, self.divisions)
 
     def _size(self, m: int | None) -> int | None:
-        return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
+        return population_size(m and self._presented_count(m), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import nsga3
@@ -97,7 +97,7 @@ class NSGA3(Baseline):
         )
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:
-        m = members.F.shape[1] + (self.handling == "objective")
+        m = self._presented_count(members.F.shape[1])
         return NormalisedState(**common, ideal=np.full(m, np.inf), worst=np.full(m, -np.inf), extreme_points=np.empty((0, m)))
 
     def _best(self, algorithm: Any) -> Any:

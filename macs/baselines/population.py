@@ -103,6 +103,10 @@ class PopulationSolver(Solver):
         F, cv = constraints.presented(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
         return (F, cv) if self._compares_violations else (constraints.by_objectives(F, cv), np.zeros(len(cv)))
 
+    def _presented_count(self, m: int) -> int:
+        """Number of objectives as presented to the algorithm, for a problem with m."""
+        return m + (self.handling == "objective")
+
     def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
         """Candidates (count, d) drawn uniformly from the box, as pymoo does."""
         return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))

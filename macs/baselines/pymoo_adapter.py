@@ -83,8 +83,7 @@ class Baseline(PopulationSolver):
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
         """The state after a first population has been evaluated; see `SearchMethod.begin`."""
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        evaluator.check_budget(budget)
         given = distinct(start)
         m, members = evaluator.m_known, None
         if m is not None:
@@ -155,7 +154,7 @@ class Baseline(PopulationSolver):
         from pymoo.core.termination import NoTermination
 
         Config.warnings["not_compiled"] = False  # it would print
-        m += self.handling == "objective"
+        m = self._presented_count(m)
         algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._compares_violations)
         problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
         algorithm.setup(problem, termination=NoTermination(), evaluator=VoidEvaluator(value=None), seed=0)

@@ -139,6 +139,11 @@ class Evaluator(ABC):
         """Continue with the counts of an earlier run, which had m objectives."""
         self.counts = counts
 
+    def check_budget(self, budget: int) -> None:
+        """Raise ValueError if no evaluation is left in the budget."""
+        if budget <= self.counts.evaluations:
+            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+
     def opening(self, candidates: np.ndarray) -> np.ndarray:
         """First candidates (k, d) of a search, made from candidates (k, d) drawn uniformly from the box; by default the same."""
         return candidates

@@ -55,8 +55,7 @@ class MACS(Settings, Solver):
         ValueError
             If the archive is smaller than the number of objectives, or the budget leaves nothing to evaluate.
         """
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        evaluator.check_budget(budget)
         box = evaluator.box
         missing = self.points_to_sample(budget) - (0 if start is None else len(start))
         batches = [] if start is None else [np.asarray(start, dtype=float)]
