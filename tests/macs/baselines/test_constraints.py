@@ -1,4 +1,4 @@
-"""What algorithms are told of constraints, against the definition of constrained dominance."""
+"""Constraints as presented to algorithms, against the definition of constrained dominance."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ VIOLATIONS = st.sampled_from([0.0, 1e-9, 1e-6, 2e-6, 0.5, 0.5000001, 3.0, 1e9, n
 
 
 @given(arrays(float, (6, 2), elements=VALUES), arrays(float, 6, elements=VIOLATIONS))
-def test_objectives_that_say_all_dominate_as_feasible_first_does(F, violation):
+def test_objectives_that_include_the_violation_dominate_as_feasible_first_does(F, violation):
     F[np.isinf(violation)] = np.nan
     G = by_objectives(*presented("feasible-first", 0.0, F, violation, 1e-6))
     assert np.isfinite(G).all()

@@ -240,7 +240,7 @@ def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
 
 
 @pytest.mark.parametrize("settings", HANDLED, ids=named)
-def test_failures_and_constraints_stop_nobody(settings: Any) -> None:
+def test_failures_and_constraints_stop_no_solver(settings: Any) -> None:
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         F, G = constrained(X)
         F[X[:, 0] > 0.8] = np.nan
@@ -257,7 +257,7 @@ def test_failures_and_constraints_stop_nobody(settings: Any) -> None:
 
 @pytest.mark.parametrize("settings", HANDLED, ids=named)
 @pytest.mark.parametrize("what", ["infeasible", "failed"])
-def test_where_nothing_is_feasible_the_nearest_is_told(settings: Any, what: str) -> None:
+def test_without_feasible_points_the_message_has_the_nearest(settings: Any, what: str) -> None:
     seen: list[float] = []
 
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -420,7 +420,7 @@ def test_objectives_that_only_an_evaluation_tells_are_checked_then() -> None:
             settings.minimize(lambda X: X.sum(axis=1), [(0, 1)] * 4, evaluations=50)
 
 
-def test_numbers_of_individuals_that_depend_on_objectives_nobody_told() -> None:
+def test_numbers_of_individuals_that_depend_on_an_unknown_number_of_objectives() -> None:
     function, bounds, _ = dtlz(2, 3)
     rows = []
 
@@ -429,7 +429,7 @@ def test_numbers_of_individuals_that_depend_on_objectives_nobody_told() -> None:
         return function(X)
 
     NSGA3(divisions=4).minimize(counted, bounds, evaluations=30, seed=1)
-    assert rows == [1, 14, 15]  # the first of the fifteen tells how many there are to be
+    assert rows == [1, 14, 15]  # the first of the fifteen gives the number of objectives
 
 
 def test_pymoo_s_changes_of_warnings_do_not_stay() -> None:

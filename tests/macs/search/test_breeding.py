@@ -78,7 +78,7 @@ def test_differences_take_the_short_way_round():
     assert np.abs(steps).max() == pytest.approx(0.05)
 
 
-def test_drawing_anew_changes_one_coordinate_and_reaches_everywhere():
+def test_redrawing_changes_one_coordinate_and_reaches_everywhere():
     X = np.full((5000, 3), 0.1)
     trial = breeding.redraw_coordinate(box(3), X, np.stack([X] * 3), np.random.default_rng(0))
     assert ((trial != X).sum(axis=1) == 1).all()

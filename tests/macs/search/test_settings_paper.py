@@ -1,4 +1,4 @@
-"""What `MACS.paper()` promises: the directions, social actions, velocities and the first re-seeding of the authors."""
+"""Settings of `MACS.paper()`: the directions, social actions, velocities and first re-seeding of the authors."""
 
 import copy
 
@@ -50,7 +50,7 @@ def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
 @pytest.mark.parametrize(
     ("overrides", "expected"), [({"agents": 20}, 20), ({"social": 0.5}, 5), ({"social": 0.0}, 1), ({"directions": 40}, 40)]
 )
-def test_there_are_as_many_directions_as_social_agents_unless_told(overrides, expected):
+def test_there_are_as_many_directions_as_social_agents_unless_overridden(overrides, expected):
     assert MACS.paper(**overrides).directions == expected
     assert MACS.paper(directions=None).directions is None
 
@@ -112,7 +112,7 @@ def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_d
     assert np.flatnonzero((state.agents.Z == 0.0).all(axis=1)).tolist() == ([1] if settings == MACS.paper() else [])
 
 
-def test_nothing_feasible_moves_nobody():
+def test_without_feasible_points_no_agent_moves():
     box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = MACS.paper().begin(box, 100, np.random.default_rng(0))
     before = state.agents.Z.copy()

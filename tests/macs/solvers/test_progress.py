@@ -48,7 +48,7 @@ def test_a_terminal_sees_it_live():
     assert "1 200 / 10 000" in shown and "flight time 109.1" in shown and "2 failed" in shown
 
 
-def test_times_and_counts_are_for_people():
+def test_times_and_counts_in_words():
     assert [minutes(s) for s in (0, 59.6, 61, 7205)] == ["0:00", "1:00", "1:01", "2:00:05"]
     assert clock(standing(0)) == "0:12" and clock(standing(5000)) == "0:12, 0:12 left" and clock(standing(10_000)) == "0:12"
     assert count(standing()) == "1 200 / 10 000 evaluations"
