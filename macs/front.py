@@ -1,4 +1,4 @@
-"""A front: points of a problem, each of them a trajectory, with all that can be done with them."""
+"""Front: points of one problem, with methods to simulate, polish, refine, show and store them."""
 
 from __future__ import annotations
 
@@ -24,11 +24,22 @@ if TYPE_CHECKING:
 
 
 class Front(Points):
-    """A set of points of one problem: the columns of `Points`, and what can be done with them."""
+    """Points of one problem, usually its Pareto front as found by a solver; sorted by the first objective.
+
+    `front[3]` is a `Point`, `front[:5]` or `front[mask]` a smaller front; `len(front)` and iteration work as for a list. The data are
+    columns with one entry for each point: `objectives` (in the user's units and senses), `F` (all minimised), `violation`, `status`,
+    `trajectories` and more, see `Points`. `stats` has the costs and the seed. If no feasible point was found, the front is empty: `message`
+    says why, and `closest` is the least infeasible point.
+
+    - See: `table()`, `plot()`, `front[i].plot()`
+    - Verify: `simulate()`, `front[i].simulate()`
+    - Improve: `polished()`, `refine_mesh()`
+    - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
+    """
 
     @classmethod
     def of(cls, points: Points) -> Self:
-        """The same columns, as a front."""
+        """A front with the same columns."""
         front = cls.__new__(cls)
         front.__dict__.update(points.__dict__)
         return front
@@ -37,36 +48,36 @@ class Front(Points):
         return f"<Front: {headline(self)}>"
 
     def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool = False) -> Front:
-        """The front with each point solved anew on a mesh of its own, refined until what the point promises can be flown.
+        """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
-        Errors are estimated by integration element by element, by looking at states, controls and path constraints between the nodes, and
-        by the objectives as flown. Elements are split where a solution is not smooth, and get a higher order where it is; controls that
-        leave their bounds between nodes are written by their Bernstein coefficients, which bound them. A point keeps its place along the
-        front: from its old objectives it is solved along the front's ranges (Pascoletti and Serafini); the best point of each objective is
-        that of the refined front.
+        Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, and by the
+        simulated objectives. Elements are split where the solution is not smooth; elsewhere they get a higher order. Controls that leave
+        their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a point is solved
+        from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along the front; the
+        best point of each objective remains the best.
 
         Parameters
         ----------
         tolerance : float
-            Largest defect. Ten times this, in ranges of the front, is by how much objectives may still change from mesh to mesh, or when
-            flown. Controls may not leave their bounds at all, states and path constraints by the front's own tolerance.
+            Largest defect of a state, in spans of its bounds. In ranges of the front, the objectives may change by ten times this from mesh
+            to mesh, and when simulated. Controls may not leave their bounds at all; states and path constraints by the front's tolerance.
         limit : int
-            How many meshes are tried for each point.
+            Largest number of meshes for each point.
         time_limit : float, optional
-            Seconds after which the work ends with what there is; looked at, like Ctrl-C, before each solve.
+            Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool
-            Tell on the terminal how it stands.
+            Show the progress on the terminal.
 
         Returns
         -------
         Front
-            As many points. Those that do not meet the tolerance say why (`Point.note`), and `message` says how many do. Ctrl-C ends the
-            work with what there is.
+            The same number of points. `Point.note` says why a point does not meet the tolerance; `message` says how many do. Costs are
+            added to those of the front. After Ctrl-C, points are on the meshes reached by then.
 
         Raises
         ------
         ValueError
-            For a black box, a problem that cannot be found, another transcription than DFET, and arguments that make no sense.
+            For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, and invalid arguments.
         """
         return Front.of(refine_mesh(self, tolerance, limit, time_limit, progress))
 
@@ -80,40 +91,40 @@ class Front(Points):
         time_limit: float | None = None,
         progress: bool = False,
     ) -> Front:
-        """The front brought down to the Pareto front by gradient solves, whichever solver found it on whichever transcription.
+        """The front moved to the Pareto front by gradient solves on another transcription.
 
-        A search wants candidates that are scored quickly, such as those of single shooting; gradients want a sparse problem, such as that
-        of DFET. The solves begin from the front's trajectories, interpolated: first the best of each objective, then places all over the
-        front, or along it; see `MACS`. Points that no solve came to better remain what they are, on their own transcription. Without any
-        points, they begin from what is `closest` to one.
+        It works for fronts of any solver and transcription. A search needs candidates that are evaluated quickly, as in single shooting;
+        gradient solves need a sparse problem, such as that of DFET. The solves start from the front's trajectories, interpolated: first the
+        best point of each objective, then points along the front; see `MACS`. Points that no solve improved stay on their own
+        transcription. For an empty front, the solve starts from `closest`.
 
         Parameters
         ----------
         transcription : Transcription
-            On which to solve.
+            Transcription of the gradient solves.
         solves : int, optional
-            How many gradient solves there may be. Default: as many as there are points, or one.
+            Largest number of gradient solves. Default: the number of points, at least 1.
         limit : int, optional
-            Most points of the result, well spread. Default: as many as there are.
+            Largest number of points of the result, well spread. Default: the number of points.
         verify : float, optional
-            By how much, in their scales, constraints may be missed when a point is flown. Points that miss more are solved once more, three
-            times at most, inside of their limits by what they missed; these solves come beside, and `Point.note` tells of them. What still
-            misses more then, also of the front's own points, is left out. Default: what the mesh says is believed.
+            Largest violation, in the constraints' scales, of a point when simulated. A point with more is solved again, at most three
+            times, with its limits tightened by the excess; these solves are additional, and `Point.note` reports them. Points that are
+            still infeasible when simulated are left out, also those of the front itself. Default: points are not simulated.
         time_limit : float, optional
-            Seconds after which the work ends with what there is; looked at, like Ctrl-C, before each solve.
+            Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool
-            Tell on the terminal how it stands.
+            Show the progress on the terminal.
 
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points; those that were solved for have their `optimality`, unless they were moved inside.
-            Costs are added to those of the search. Ctrl-C ends the work with what there is.
+            Feasible, mutually non-dominated points. New points have their `optimality`, except those solved with tightened limits. Costs
+            are added to those of the front.
 
         Raises
         ------
         ValueError
-            For a black box, a problem that cannot be found, peaks that gradient tools refuse, and arguments that make no sense.
+            For a black box, a problem that cannot be found, peaks without derivatives, and invalid arguments.
         """
         return Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
 
@@ -126,46 +137,46 @@ class Front(Points):
         atol: float = 1e-7,
         method: str = "DOP853",
     ) -> Front:
-        """The same points as an independent integrator flies them: `Point.simulate` for all of them at once, as a front.
+        """The same points as simulated by an independent integrator: `Point.simulate` for all points at once.
 
         Parameters
         ----------
         problem : Problem or CompiledProblem, optional
-            Fly them under other data, such as another mass: a problem with the same phases, variables and objectives. Each flight begins
-            where it began here, and its controls are as functions of time what they were. Default: the front's own.
+            Problem with other data, such as another mass, but the same phases, variables and objectives. Initial states, and controls as
+            functions of time, are those of the front. Default: the problem of the front.
         tolerance : float
-            How much a flight may violate, in the constraints' scales, and still count as converged; times, initial states, parameters and
-            controls at the nodes included, which may be outside the bounds of another problem.
+            Largest violation, in the constraints' scales, of a simulated point whose status is "converged". The bounds of times, initial
+            states, parameters and controls at the nodes are checked too, since another problem may have other bounds.
         rtol, atol, method
-            Of the integrator; see `Point.simulate`.
+            Settings of the integrator; see `Point.simulate`.
 
         Returns
         -------
         Front
-            In the same order, with `objectives`, `violation`, `status` and trajectories as simulated.
-            `Front.merge([front.simulate()])` are those that are feasible when simulated, without what is dominated.
+            The points in the same order, with `objectives`, `violation`, `status` and trajectories as simulated.
+            `Front.merge([front.simulate()])` has those that are feasible when simulated and non-dominated.
 
         Raises
         ------
         ValueError
-            For a black box, a problem that cannot be found, and one of which the points cannot be.
+            For a black box, a problem that cannot be found, and a problem with other phases, variables or objectives.
         """
         return Front.of(simulated(self, problem, tolerance, rtol, atol, method))
 
     def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
-        """The front as plain text: a headline, a row for each point, and what there is to beware of.
+        """The front as plain text: a headline, a row for each point, and warnings.
 
         Parameters
         ----------
         defects : n floats, optional
-            Largest defect of each point's simulation, for a column of its own.
+            Largest defect of each simulated point, shown as a column.
         columns : mapping, optional
-            More columns: header -> n values.
+            Further columns: header -> n values.
         """
         return front_table(self, defects, columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the objectives: two as a scatter, three with the third as colour, more as parallel coordinates. Returns the Axes."""
+        """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates."""
         from .fronts.front_plot import draw_front
 
         return draw_front(self, ax)
@@ -211,13 +222,14 @@ class Front(Points):
 
     @staticmethod
     def merge(fronts: Sequence[Front]) -> Front:
-        """The non-dominated feasible points of several fronts of one problem; what they cost is summed.
+        """The non-dominated feasible points of several fronts of one problem; costs are summed.
 
-        Points of different meshes are taken at their word: a coarse mesh may promise more than can be flown, and so push out better points.
+        Points are compared by the objectives on their own meshes. On a coarse mesh these may be too good, so that such a point removes
+        others; `simulate` first to compare simulated objectives.
 
         Raises
         ------
         ValueError
-            If there is none, or they differ in problem or objectives, or black boxes in variables.
+            If there are no fronts, or they differ in problem or objectives or, for black boxes, in variables.
         """
         return Front.of(merge(fronts))

@@ -1,6 +1,6 @@
 """Gradient tools: single optima, the ends of a front, and sweeps along it, by exact derivatives on one mesh.
 
-They are exact where the problem is smooth, and local: the result depends on the start.
+Results are local optima: they depend on the start.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from transcription.nlp.scaling import nlp_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import nearest_misses, vectors_points
+from .fronts.builders import nearest_violation, vectors_points
 from .fronts.points import Point
 from .fronts.provenance import costs
 from .gradients.multistart import MultistartSolver
@@ -33,11 +33,11 @@ from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
 ROUNDS = 3
-"""How often points of a sweep, or its ends, are solved anew because another one turned out to be better for their purpose."""
+"""Largest number of times that points or ends of a sweep are solved again from a better start that another point gave."""
 
 
 NO_RANGE, NOTHING = 1e-8, 1e-10
-"""An objective that differs between the ends by less than these fractions of its size there, or of its scale, is in no conflict."""
+"""An objective whose values at the ends differ by less than these fractions of its size, or of its scale, is in no conflict."""
 
 
 def optimize(
@@ -50,33 +50,32 @@ def optimize(
     seed: int | None = 0,
     tolerance: float = 1e-6,
 ) -> Point:
-    """Minimise, or maximise, one objective and ignore the others.
+    """The local optimum of one objective; the others are ignored.
 
     Parameters
     ----------
     problem : Problem
     transcription : Transcription
     objective : str, optional
-        Its name; the first one by default.
+        Name of the objective. Default: the first one.
     start : Front, Points or array (k, n), optional
-        Decisions to begin with, all variables or the free ones only; the best of them is taken.
+        Decisions to begin with, all variables or the free ones only; the best of them is used.
     starts : int
-        From how many vectors to try, `start` or the problem's guess being the first, random ones the others; the best is kept.
+        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned.
     seed : int, optional
-        Of the random ones. None draws one, which `stats` record.
+        Seed of the random starts. None draws one, which is recorded in `stats`.
     tolerance : float
         Largest scaled residual of a feasible point.
 
     Returns
     -------
     Point
-        With `optimality`. Where nothing converged, the least infeasible vector that was met, with the status that says why.
+        With its `optimality`. If no solve converged, the least infeasible point, with its status.
 
     Raises
     ------
     ValueError
-        If the problem is stated wrongly, an argument makes no sense, or a peak is used otherwise than minimised or bounded above; before
-        any work.
+        If the problem is not stated correctly, an argument is not valid, or a peak is neither minimised nor bounded above; before any work.
     """
     job = _Job("optimize", problem, transcription, start, starts, seed, tolerance, objective=objective)
     names = [goal.name for goal in job.nlp.problem.goals]
@@ -96,7 +95,7 @@ def payoff(
     seed: int | None = 0,
     tolerance: float = 1e-6,
 ) -> Front:
-    """The ends of the front: for each objective its best value, and the best of the others that go with it, in their order.
+    """The ends of the front: for each objective its best value, and for that the best values of the others, in their order.
 
     Parameters
     ----------
@@ -106,12 +105,12 @@ def payoff(
     Returns
     -------
     Front
-        Exactly one point an objective, in the order in which they were declared; what did not converge has its status.
+        Exactly one point for each objective, in the order of their declaration. The `status` of a point says whether it converged.
 
     Raises
     ------
     ValueError
-        As `optimize`.
+        As for `optimize`.
     """
     job = _Job("payoff", problem, transcription, start, starts, seed, tolerance)
     ends = job.ends()
@@ -129,28 +128,28 @@ def sweep(
     seed: int | None = 0,
     tolerance: float = 1e-6,
 ) -> Front:
-    """A front of solves along it, each beginning where the nearest one ended.
+    """A front by gradient solves along it, each from the best point found before.
 
     Parameters
     ----------
     problem, transcription, start, starts, seed, tolerance
-        As for `optimize`; `starts` holds for every point.
+        As for `optimize`; each point is solved from so many `starts`.
     points : int
-        How many, the ends included; with three objectives or more, at most.
+        Number of points, the ends included; with three or more objectives, the largest number.
     method : "pascoletti-serafini" or "epsilon"
-        From points evenly spread over the line, or simplex, between the ends, straight down to the front, all objectives falling in
-        proportion to their ranges: which spreads the points evenly (Pascoletti and Serafini 1984; Das and Dennis 1998). Or the first
-        objective at evenly spread limits of the others (Haimes, Lasdon and Wismer 1971).
+        "pascoletti-serafini": from evenly spread points on the line, or simplex, between the ends, all objectives are decreased in
+        proportion to their ranges, which spreads the points evenly (Pascoletti and Serafini 1984; Das and Dennis 1998). "epsilon": the
+        first objective is optimised at evenly spread limits of the others (Haimes, Lasdon and Wismer 1971).
 
     Returns
     -------
     Front
-        Points that converged, mutually non-dominated. `message` says what was left out, and why it is empty if nothing converged.
+        Points that converged, mutually non-dominated. `message` says how many were left out and, if none converged, why.
 
     Raises
     ------
     ValueError
-        As `optimize`; for an unknown method, or fewer points than objectives; and for a problem with one objective.
+        As for `optimize`; also for an unknown method, fewer points than objectives, and a problem with one objective.
     """
     check_count("points", points, 2)
     if method not in METHODS:
@@ -168,7 +167,7 @@ def sweep(
 
 
 class _Job:
-    """One call: its NLP, its solves, and how they become a front."""
+    """One call of a gradient tool: its NLP, its solver, and the front made of its results."""
 
     def __init__(
         self,
@@ -199,10 +198,10 @@ class _Job:
         return [self.solver.lexicographic(i) for i in range(len(self.nlp.problem.goals))]
 
     def along(self, tasks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Solved]:
-        """One solve, or as many as there are starts, for each reference and weights; in their order.
+        """The results of all tasks (reference, weights), in their order.
 
-        Whatever is better for another task than its own answer becomes a start for it; so does the answer next to it on the way back, if
-        several starts are wanted.
+        A result that is better for another task than that task's own result becomes a start for it. With several `starts`, each task is
+        also solved from the result of the next one.
         """
         solver = self.solver
         found = [solver.solve(*task) for task in tasks]
@@ -223,13 +222,13 @@ class _Job:
         return found
 
     def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
-        """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other, and so has none."""
+        """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other."""
         F = np.array([end.F for end in ends])
         ranges, sizes = np.ptp(F, axis=0), np.abs(F).max(axis=0)
         return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * nlp_scales(self.nlp)), ranges, 0.0)
 
     def surpassed(self, ends: Sequence[Solved], found: Sequence[Solved]) -> bool:
-        """Whether a sweep found an objective to be better than at its end, which then is a local optimum only."""
+        """Whether a sweep found a better value of an objective than its end, which then is only a local optimum."""
         F = np.array([solved.F for solved in found if solved.status == CONVERGED]).reshape(-1, len(ends))
         best = np.array([end.F[i] for i, end in enumerate(ends)])
         return bool((best - F > BETTER * self._unit(self.ranges(ends))).any())
@@ -239,21 +238,21 @@ class _Job:
         return scales if ranges is None else np.where(ranges > 0, ranges, scales)
 
     def sifted(self, found: Sequence[Solved], ranges: np.ndarray | None = None) -> Front:
-        """The front of what converged, without points that are dominated or come twice."""
+        """The front of the results that converged, without dominated and equal points."""
         good = [solved for solved in found if solved.status == CONVERGED]
         if not good:
             nearest = self.front([min(found, key=lambda solved: solved.violation)], None)[0]
-            return self.front([], None, message=f"no solve converged; {nearest_misses(nearest)}", closest=nearest)
+            return self.front([], None, message=f"no solve converged; {nearest_violation(nearest)}", closest=nearest)
         F = np.array([solved.F for solved in good])
-        # To as many digits as the solves have; with all of them, of two equal points the one or the other might dominate.
+        # Rounded to the accuracy of the solves: otherwise one of two equal points might dominate the other.
         kept = distinct(F, self._unit(ranges))
-        left = {"did not converge": len(found) - len(good), "dominated or alike": int(np.count_nonzero(~kept))}
+        left = {"did not converge": len(found) - len(good), "dominated or equal": int(np.count_nonzero(~kept))}
         message = ", ".join(f"{count} {word}" for word, count in left.items() if count)
         chosen = [solved for solved, keep in zip(good, kept, strict=True) if keep]
         return self.front(chosen, ranges, message=message and f"of {len(found)} points left out: {message}")
 
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
-        """Solves as a front, certified; objectives in `ranges` (m,)."""
+        """The results as a front, with their optimality; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         certificates = [optimality(self.nlp, z, ranges) for z in Z]
         stats = costs(
@@ -275,7 +274,7 @@ Task = tuple[np.ndarray, np.ndarray]
 
 
 def check_points(points: int, m: int) -> None:
-    """Raise ValueError for a number of points with which m objectives make no front."""
+    """Raise ValueError if so many points are too few for a front of m objectives."""
     if m == 1:
         raise ValueError("a problem with one objective has no front to sweep; use optimize")
     if points < m:
@@ -283,43 +282,43 @@ def check_points(points: int, m: int) -> None:
 
 
 def targets(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> list[Task]:
-    """Problems whose answers, with the ends, make a front of at most `points` points.
+    """Scalarised problems whose solutions, with the ends, make a front of at most `points` points.
 
     Parameters
     ----------
     ends : array (m, m)
-        Objectives, minimised, of the end that is best in each of them.
+        Objectives, all minimised; row i is the end that is best in objective i.
     ranges : array (m,)
-        Of the objectives between the ends; 0 for one that is in conflict with no other.
+        Ranges of the objectives between the ends; 0 for one that is in conflict with no other.
     points : int
-        Ends included.
+        Number of points, the ends included.
     method : "pascoletti-serafini" or "epsilon"
 
     Returns
     -------
     list of (reference (m,), weights (m,))
-        Neighbours in the list are neighbours on the front, as far as there is such an order. Empty if the objectives are not in conflict.
+        With two objectives in the order along the front. Empty if the objectives are not in conflict.
     """
     if np.count_nonzero(ranges) < 2:
         return []
-    return (_down if method == "pascoletti-serafini" else _limited)(ends, ranges, points)
+    return (_from_simplex if method == "pascoletti-serafini" else _at_limits)(ends, ranges, points)
 
 
-def _down(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
-    """From a lattice on the simplex between the ends, all ranges at once."""
+def _from_simplex(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """Tasks from a lattice on the simplex between the ends, with the ranges as weights."""
     m = len(ends)
     inner = [share for share in simplex_lattice(m, divisions_below(m, points)) if share.max() < 1.0]
-    # An objective without a range has no weight, so that the least value is its limit.
+    # An objective with zero range has weight 0: its reference is a hard limit.
     level = np.where(ranges > 0, ends, ends.max(axis=0))
     return [(share @ level, ranges) for share in inner]
 
 
-def _limited(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
-    """The first objective that is in conflict, at all combinations of evenly spread limits of the others."""
+def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
+    """Tasks for the first objective that is in conflict, at all combinations of evenly spread limits of the others."""
     m = len(ends)
     first, *others = np.flatnonzero(ranges > 0)
     levels = int((points - m) ** (1.0 / len(others)) + 1e-9)
-    # Of two objectives, the loosest limit gives an end; of more, combinations with it are new.
+    # With two objectives the loosest limit gives an end; with more, combinations with it are new points.
     shares = np.arange(1, levels + 1) / (levels + (len(others) == 1))
     tasks = []
     for combination in product(shares, repeat=len(others)):

@@ -174,6 +174,14 @@ def check_positive(name: str, value: Any) -> None:
         raise ValueError(f"{name} must be a positive number, not {value!r}")
 
 
+def check_interval(name: str, value: Any, interval: str) -> None:
+    """Raise ValueError unless `value` is a number in an interval such as "(0, 1]" or "[0, inf)"."""
+    lower, upper = map(float, interval[1:-1].split(","))
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not (number and lower <= value <= upper) or (value == lower and interval[0] == "(") or (value == upper and interval[-1] == ")"):
+        raise ValueError(f"{name} must be in {interval}, not {value!r}")
+
+
 def check_count(name: str, value: Any, least: int) -> None:
     """Raise ValueError unless `value` is a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:

@@ -1,4 +1,4 @@
-"""The field's algorithms under the contract of this floor, on our evaluations, counters and seeds: pymoo's, asked and told, and a MOPSO."""
+"""Other multi-objective algorithms as solvers, with the same evaluations, counts and seeds: those of pymoo, and a MOPSO."""
 
 from .moead import MOEAD
 from .mopso import MOPSO

@@ -1,4 +1,4 @@
-"""MOEA/D: one scalar problem for each reference direction, solved together with those beside it."""
+"""MOEA/D: one scalar sub-problem for each reference direction, solved together with neighbouring ones."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import check_choice
+
 from ..evaluation.evaluator import Evaluator
 from ..pareto.directions import check_directions, pair_up, population_size, reference_directions, tchebycheff
-from . import constraints as handlings
 from .population import Members, State
 from .pymoo_adapter import Baseline
 
 
 @dataclass
 class DecomposedState(State):
-    """With what scalarisations refer to: member i is the best for direction i.
+    """State of MOEA/D. Member i is the best for direction i.
 
     Attributes
     ----------
     ideal : array (m,)
-        The best value of each objective seen, as the algorithm is told them.
+        Best value of each objective so far, as presented to the algorithm.
     """
 
     ideal: np.ndarray
@@ -29,36 +30,36 @@ class DecomposedState(State):
 
 @dataclass(frozen=True)
 class MOEAD(Baseline):
-    """MOEA/D (Zhang and Li 2007), that of pymoo; see `Baseline`. For two objectives or more.
+    """MOEA/D (Zhang and Li 2007), pymoo's implementation; see `Baseline`. For two or more objectives.
 
-    It knows nothing of constraints; they are handled here, before it is told of a point. It asks for one candidate at a time, so that the
-    inner level cannot work on many at once: see `batch`. Given points of a `start` are sent to the directions that they serve best.
+    MOEA/D compares objectives only, so constraints become part of them, see `handling`. It asks for one candidate at a time, so that the
+    inner level cannot evaluate several at once; see `batch`. Points of a `start` are assigned to the directions for which they are best.
 
     Parameters
     ----------
     population : int, optional
-        Number of individuals, of offspring in a generation and of reference directions: any, at least as many as objectives; those of a
-        simplex lattice where one has so many, evenly spread otherwise.
+        Number of individuals, of offspring in a generation and of reference directions; any number not less than that of objectives. The
+        directions are a simplex lattice, if one has so many, and evenly spread otherwise.
     divisions : int, optional
-        Of the simplex lattice (Das and Dennis 1998) that gives the reference directions. Default: of the finest lattice with no more than
-        100 directions (2 objectives: 100, 3: 91).
+        Divisions of the simplex lattice (Das and Dennis 1998) of reference directions. Default: the finest lattice with at most 100
+        directions (2 objectives: 100, 3: 91).
     neighbors : int, default 20
-        How many of the nearest directions share parents and offspring, at least 2.
+        Number of nearest directions that share parents and offspring, at least 2.
     neighbor_mating : float, default 0.9
         Probability that parents are neighbours.
     decomposition : {"tchebycheff", "pbi"}, optional
-        Scalarisation. Default: Tchebycheff's with two objectives, penalty boundary intersection with more.
+        Scalarisation. Default: Tchebycheff with two objectives, penalty boundary intersection with more.
     batch : bool, default False
-        Evaluate the offspring of a whole generation in one batch, and let them replace others afterwards (pymoo's ParallelMOEAD).
+        Evaluate all offspring of a generation in one batch, and do the replacement afterwards (pymoo's ParallelMOEAD).
     crossover_eta, mutation_eta : float, default 20
         Distribution indices of simulated binary crossover and of polynomial mutation, in [1, 100].
     handling, penalty, degree
-        As for `NSGA2`. With "objective", directions are of one more objective.
+        As for `NSGA2`. With "objective", the directions have one objective more.
 
     Raises
     ------
     ValueError
-        Where a setting is out of its range, and, once the number of objectives is known, where population and divisions contradict.
+        If a setting is outside its range or, once the number of objectives is known, if population and divisions do not match.
     """
 
     population: int | None = None
@@ -72,29 +73,27 @@ class MOEAD(Baseline):
     handling: str = "feasible-first"
     penalty: float = 1000.0
     degree: str = "largest"
-    _knows_constraints = False
+    _compares_violations = False
 
     def __post_init__(self) -> None:
         counts = {"population": 2, "divisions": 1, "neighbors": 2}
-        self._check(counts, {"neighbor_mating": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})
-        if self.decomposition not in (None, "tchebycheff", "pbi"):
-            raise ValueError(f"MOEAD: decomposition must be 'tchebycheff', 'pbi' or None, not {self.decomposition!r}")
-        if not isinstance(self.batch, bool | np.bool_):
-            raise ValueError(f"MOEAD: batch must be True or False, not {self.batch!r}")
+        self._check(counts, {"neighbor_mating": "[0, 1]", "crossover_eta": "[1, 100]", "mutation_eta": "[1, 100]"}, ("batch",))
+        if self.decomposition is not None:
+            check_choice("MOEAD: decomposition", self.decomposition, ("tchebycheff", "pbi"))
 
     def check_objectives(self, m: int) -> None:
-        """Refuse one objective, and directions that are not as many as individuals."""
-        m += self.handling == "objective"
+        """Raise ValueError for a single objective, and for a number of directions other than that of individuals."""
+        m = self._presented_count(m)
         check_directions("MOEAD", m, self.population, self.divisions)
         made = population_size(m, None, self.divisions)
         if None not in (self.population, self.divisions) and made != self.population:
             raise ValueError(
                 f"MOEAD: divisions={self.divisions} makes {made} reference directions with {m} objectives, and population="
-                f"{self.population} asks for others; leave one of the two out"
+                f"{self.population} needs as many; leave one of the two out"
             )
 
     def _size(self, m: int | None) -> int | None:
-        return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
+        return population_size(m and self._presented_count(m), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import moead
@@ -113,21 +112,17 @@ class MOEAD(Baseline):
             mutation=PM(eta=self.mutation_eta, prob_var=None),
         )
 
-    def _told(self, points: Members, tolerance: float) -> handlings.Told:
-        F, cv = super()._told(points, tolerance)
-        return handlings.by_objectives(F, cv), np.zeros(len(cv))
-
     def _place(self, members: Members, evaluator: Evaluator) -> Members:
-        F = self._told(members, evaluator.tolerance)[0]
+        F = self._presented(members, evaluator.tolerance)[0]
         directions = reference_directions(F.shape[1], self.population, self.divisions)[: len(F)]
         rows, places = pair_up(tchebycheff(F[:, None], directions, F.min(axis=0), F.max(axis=0)))
         return members.take(rows[np.argsort(places)])
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> DecomposedState:
-        return DecomposedState(**common, ideal=np.full(members.F.shape[1] + (self.handling == "objective"), np.inf))
+        return DecomposedState(**common, ideal=np.full(self._presented_count(members.F.shape[1]), np.inf))
 
-    def _restore(self, algorithm: Any, state: DecomposedState, people: Any) -> None:
-        algorithm.pop, algorithm.ideal = people, state.ideal
+    def _restore(self, algorithm: Any, state: DecomposedState, individuals: Any) -> None:
+        algorithm.pop, algorithm.ideal = individuals, state.ideal
 
     def _keep(self, algorithm: Any, state: DecomposedState, table: Members) -> None:
         state.ideal = algorithm.ideal

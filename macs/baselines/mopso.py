@@ -1,4 +1,4 @@
-"""MOPSO: a swarm led by points of thinly populated hypercubes of an archive."""
+"""MOPSO: a swarm whose leaders are points in sparsely populated hypercubes of an archive."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.box import Box, box_of
+from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
-from . import constraints as handlings
-from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
+from .constraints import excess
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
 WAITING = -1
+"""In place of a number of evaluations, as long as the swarm is not complete."""
 
 
-@dataclass
-class FlightState(State):
-    """The members are the particles, in their order.
+@dataclass(repr=False)
+class ParticleState(State):
+    """State of MOPSO. The members are the particles, in their order.
 
     Attributes
     ----------
     best : Members
-        The best point that each particle has been at.
+        Best position of each particle.
     leaders : Members
-        What the swarm may follow: the algorithm's own archive.
+        Archive of the algorithm, from which leaders are drawn.
     velocity : array (n, d)
         In spans of the variables.
     launched : int
-        After how many evaluations the swarm was complete and began to fly; -1 as long as first particles are sought.
+        Number of evaluations after which the swarm was complete and began to move; -1 as long as first particles are drawn.
     """
 
     best: Members
@@ -42,44 +44,44 @@ class FlightState(State):
 class MOPSO(PopulationSolver):
     """MOPSO after Coello Coello, Pulido and Lechuga (2004), in the variant of Armellin and Lavagna (2008), section 4.1.
 
-    Each particle is drawn to the best place where it has been and to a point of the archive, which a roulette prefers from thinly populated
-    hypercubes of an adaptive grid; of a full archive, points of the fullest hypercubes are left out. Inertia decreases linearly. Their
-    velocity formula, eq. (22), has a slip of sign, which is mended here; see `particles`. For any number of objectives.
+    Each particle is attracted by its own best position and by a leader, a point of the archive. A roulette draws leaders, with preference
+    for sparsely populated hypercubes of an adaptive grid; a full archive drops points of the most populated ones. The inertia decreases
+    linearly. A wrong sign in the velocity formula of the paper, eq. (22), is corrected; see `velocities`. For any number of objectives.
 
-    Feasible solutions are preserved (with handling="feasible-first"): the swarm begins with feasible particles only, for which candidates
-    are drawn, a swarm at a time, until there are enough. Each of these counts as an evaluation, and no more than `search` of the budget
-    is spent on it: then the least violated ones fly too, towards less violation, until they are feasible. A feasible place is never given
-    up for an infeasible one. If nothing feasible is found at all, the front is empty; its `message` and `closest` say what is nearest.
+    With handling="feasible-first", the swarm begins with feasible particles only: candidates are drawn, one swarm at a time, until there
+    are enough. They count as evaluations, and use at most the fraction `search` of the budget. After that, the least violated candidates
+    become particles too, and move towards less violation until they are feasible. A feasible best position is never replaced by an
+    infeasible one. If no feasible point is found, the front is empty; see its `message` and `closest`.
 
-    Beyond that, as for the other baselines: a failed evaluation counts as infeasible, behind all others; where the evaluator moves
-    candidates, particles take the points that come back; of a last flight for which the budget is too small, the first particles fly;
-    `start` takes the first places of the swarm. Periodic variables are closed: particles fly through their bounds, and the short way round.
+    As for the other baselines: a failed evaluation counts as infeasible, behind all others. If the evaluator moves candidates, particles
+    take the new positions. If the budget is too small for the last iteration, only the first particles move. Points of a `start` are the
+    first particles. Periodic variables wrap around at their bounds.
 
     Parameters
     ----------
     particles : int, default 100
-        At least 1.
+        Number of particles, at least 1.
     archive : int, default 100
-        Largest number of points in the archive, and so on the front.
+        Largest number of points in the archive, and so on the front, at least 1.
     cells : int, default 30
-        Into how many parts the grid divides each objective.
+        Number of parts into which the grid divides each objective, at least 1.
     inertia, final_inertia : float, default 0.4 and 0
-        Weight of a particle's velocity, when the swarm begins to fly and when the budget is spent; at least 0. With the paper's 1.4 and
-        0.4, see `paper`, a swarm of many variables flies from bound to bound for most of its time.
+        Weight of the velocity when the swarm begins to move, and when the budget is spent; at least 0. With 1.4 and 0.4, as in the paper
+        (see `paper`), particles with many variables move from bound to bound most of the time.
     cognitive, social : float, default 2
-        Weights of the step to a particle's own best place and of that to its leader, each times a random number; at least 0.
+        Weights of the steps to a particle's own best position and to its leader, each times a random number; at least 0.
     max_velocity : float, default 1
         Largest step in a variable, in spans of it, in (0, 1].
     search : float, default 0.2
-        Share of the budget, in [0, 1], that may be spent in search of feasible first particles, the first swarm included. 0: that one is
-        taken as it is drawn.
+        Fraction of the budget, in [0, 1], that may be spent on feasible first particles, the first swarm included. 0: the first swarm is
+        used as it is drawn.
     handling, penalty, degree
-        As for `NSGA2`. With "penalty" and "objective", the first swarm is taken as it is drawn.
+        As for `NSGA2`. With "penalty" and "objective", the first swarm is used as it is drawn.
 
     Raises
     ------
     ValueError
-        Where a setting is out of its range; the message names it.
+        If a setting is outside its range; the message names it.
     """
 
     particles: int = 100
@@ -94,31 +96,32 @@ class MOPSO(PopulationSolver):
     handling: str = "feasible-first"
     penalty: float = 1000.0
     degree: str = "largest"
+    _compares_violations = False
 
     def __post_init__(self) -> None:
-        weights = dict.fromkeys(("inertia", "final_inertia", "cognitive", "social"), (0.0, np.inf))
+        weights = dict.fromkeys(("inertia", "final_inertia", "cognitive", "social"), "[0, inf)")
         counts = {"particles": 1, "archive": 1, "cells": 1}
-        self._check(counts, {**weights, "max_velocity": (1e-9, 1), "search": (0, 1)})
+        self._check(counts, {**weights, "max_velocity": "(0, 1]", "search": "[0, 1]"})
 
     @classmethod
     def paper(cls, **overrides: Any) -> MOPSO:
-        """The settings of Armellin and Lavagna: 20 particles, an archive of 100, inertia from 1.4 to 0.4; `overrides` as for MOPSO itself.
+        """The settings of Armellin and Lavagna: 20 particles, an archive of 100, inertia from 1.4 to 0.4. `overrides` are settings of
+        MOPSO.
 
-        What stays different: it spends its budget, where theirs also ends when the mean of the front stands still; and theirs knows no
-        limit of the search for feasible first particles, nor of velocities.
+        Differences that remain: theirs also ends when the mean of the front no longer changes, and limits neither the search for feasible
+        first particles nor the velocities.
         """
         return cls(**({"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4} | overrides))
 
-    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> FlightState:
-        """Evaluate a first swarm; see `Solver.begin`."""
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> ParticleState:
+        """The state after a first swarm has been evaluated; see `SearchMethod.begin`."""
+        evaluator.check_budget(budget)
         Z = self._candidates(evaluator, thinned(distinct(start), self.particles), self.particles, rng)
         swarm = evaluate(evaluator, Z[: budget - evaluator.counts.evaluations], self.degree)
-        state = FlightState(
+        state = ParticleState(
             members=swarm,
-            archive=no_points(swarm),
-            closest=no_points(swarm),
+            archive=Archive.of(swarm, np.arange(0)),
+            closest=Archive.of(swarm, np.arange(0)),
             iteration=0,
             first_feasible=0,
             all_feasible=0,
@@ -128,33 +131,33 @@ class MOPSO(PopulationSolver):
             velocity=np.zeros((len(swarm), len(evaluator.free))),
             launched=WAITING,
         )
-        self._learn(state, swarm, evaluator, budget)
+        self._update(state, swarm, evaluator, budget)
         return state
 
-    def advance(self, state: FlightState, evaluator: Evaluator, budget: int) -> None:
-        """One flight, or one more draw of first particles, within the budget of evaluations; changes `state`."""
+    def advance(self, state: ParticleState, evaluator: Evaluator, budget: int) -> None:
+        """Move the swarm once, or draw more first particles, within the budget of evaluations; changes `state`."""
         left = budget - evaluator.counts.evaluations
         if left <= 0:
             return
         if state.launched == WAITING:
-            seen = self._drawn(state, evaluator, min(left, int(self.search * budget) - evaluator.counts.evaluations))
+            seen = self._draw_more(state, evaluator, min(left, int(self.search * budget) - evaluator.counts.evaluations))
         else:
-            seen = self._flown(state, evaluator, left, budget)
+            seen = self._move(state, evaluator, left, budget)
         state.iteration += 1
-        self._learn(state, seen, evaluator, budget)
+        self._update(state, seen, evaluator, budget)
 
-    def _drawn(self, state: FlightState, evaluator: Evaluator, most: int) -> Members:
-        """Draw more first particles, at most `most`: the first that are feasible stay, and the least violated of the others."""
+    def _draw_more(self, state: ParticleState, evaluator: Evaluator, most: int) -> Members:
+        """Draw and evaluate at most `most` more first particles; the swarm keeps the feasible ones, then the least violated ones."""
         count = len(state.members)
         seen = evaluate(evaluator, self._candidates(evaluator, np.empty((0, 0)), count, state.rng)[:most], self.degree)
-        every = state.members.join(seen)
-        cv = handlings.excess(every.F, every.violation, evaluator.tolerance, every.degree)
+        every = state.members.joined(seen)
+        cv = excess(every.F, every.violation, evaluator.tolerance, every.degree)
         state.members = state.best = every.take(np.argsort(cv, kind="stable")[:count])
         return seen
 
-    def _flown(self, state: FlightState, evaluator: Evaluator, left: int, budget: int) -> Members:
-        """Let the particles fly once, the first `left` of them if they are more."""
-        box, rng, tolerance, free = box_of(evaluator), state.rng, evaluator.tolerance, evaluator.free
+    def _move(self, state: ParticleState, evaluator: Evaluator, left: int, budget: int) -> Members:
+        """Move and evaluate the particles, at most the first `left`."""
+        box, rng, tolerance, free = evaluator.box, state.rng, evaluator.tolerance, evaluator.free
         swarm, d = len(state.members), len(free)
         share = (evaluator.counts.evaluations - state.launched) / (budget - state.launched)
         followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), swarm, rng)
@@ -167,18 +170,18 @@ class MOPSO(PopulationSolver):
 
         seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
         n = len(seen)
-        state.members = seen.join(state.members.take(np.arange(n, swarm)))
+        state.members = seen.joined(state.members.take(np.arange(n, swarm)))
         state.velocity = np.concatenate([V[:n], state.velocity[n:]])
         better = improved(self._goals(seen, tolerance), self._goals(state.best, tolerance)[:n], coin[:n])
         rows = np.arange(swarm)
         rows[np.flatnonzero(better)] += swarm
-        state.best = state.best.join(seen).take(rows)
+        state.best = state.best.joined(seen).take(rows)
         return seen
 
-    def _learn(self, state: FlightState, seen: Members, evaluator: Evaluator, budget: int) -> None:
-        """Offer what was seen to the archive; let the swarm fly from now on if it is complete."""
+    def _update(self, state: ParticleState, seen: Members, evaluator: Evaluator, budget: int) -> None:
+        """Offer evaluated points to the archive, and note the number of evaluations once the swarm is complete."""
         tolerance = evaluator.tolerance
-        every = state.leaders.join(seen)
+        every = state.leaders.joined(seen)
         goals = self._goals(every, tolerance)
         rows = np.flatnonzero(nondominated(goals))
         if len(rows) > self.archive:
@@ -192,14 +195,15 @@ class MOPSO(PopulationSolver):
             state.launched = spent
 
     def _goals(self, points: Members, tolerance: float) -> np.ndarray:
-        """What is minimised (n, m): objectives that say all, also of constraints; see `handling.by_objectives`."""
-        return handlings.by_objectives(*self._told(points, tolerance))
+        """Objectives (n, m) that include the violation; see `constraints.by_objectives`."""
+        return self._presented(points, tolerance)[0]
 
 
 def hypercubes(F: np.ndarray, cells: int) -> np.ndarray:
-    """The hypercube of each of the points F (n, m), (n,) of int: those that are occupied are numbered from 0.
+    """Number of the hypercube (n,) of each of the points F (n, m); occupied hypercubes are numbered from 0.
 
-    Each objective's range is cut into `cells` equal parts; the greatest value belongs to the last. An objective that does not vary has one.
+    The range of each objective is divided into `cells` equal parts; the largest value belongs to the last one. An objective that does not
+    vary has one part.
     """
     low, span = F.min(axis=0), np.ptp(F, axis=0)
     share = np.divide(F - low, span, out=np.zeros_like(F), where=span > 0.0)
@@ -208,9 +212,9 @@ def hypercubes(F: np.ndarray, cells: int) -> np.ndarray:
 
 
 def roulette(cube: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw `count` points, with repetitions, by their hypercubes (n,): rows (count,).
+    """Rows (count,) of points drawn, with repetition, by their hypercubes (n,).
 
-    A hypercube is drawn in inverse proportion to the points in it, then one of these, all alike.
+    A hypercube is drawn with probability inverse to the number of its points, then one of these points uniformly.
     """
     occupancy = np.bincount(cube)
     wheel = np.cumsum(1.0 / occupancy)
@@ -221,10 +225,10 @@ def roulette(cube: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarr
 
 
 def thin_out(cube: np.ndarray, limit: int, rng: np.random.Generator) -> np.ndarray:
-    """Which of the points in hypercubes (n,) to keep, (n,) of bool, `limit` of them.
+    """Mask (n,) of `limit` points to keep, by their hypercubes (n,).
 
-    One at a time is left out, any of those in the fullest hypercube, which is drawn if there are several. (A roulette by occupancy would
-    give every point the same chance, whatever its neighbours.)
+    Points are left out one at a time, each drawn from the most populated hypercube, which is drawn if there are several. (A roulette by
+    occupancy would give all points the same probability.)
     """
     keep, occupancy = np.ones(len(cube), dtype=bool), np.bincount(cube)
     for _ in range(len(cube) - limit):
@@ -235,7 +239,7 @@ def thin_out(cube: np.ndarray, limit: int, rng: np.random.Generator) -> np.ndarr
 
 
 def inertia(share: float, first: float, last: float) -> float:
-    """The weight w of the old velocity when this share of the search is over: on a line from `first` to `last`."""
+    """Weight w of the old velocity after this share of the search, linear from `first` to `last`."""
     return first + (last - first) * min(max(share, 0.0), 1.0)
 
 
@@ -250,21 +254,21 @@ def velocities(
     chance: np.ndarray,
     largest: float,
 ) -> np.ndarray:
-    """New velocities, for an interval of 1: w V + c1 r1 (best - X) + c2 r2 (leaders - X).
+    """New velocities (n, d): w V + c1 r1 (best - X) + c2 r2 (leaders - X), for a time step of 1.
 
-    Eq. (22), which is printed with a slip: its differences have the opposite sign, and particles would flee what they are to follow.
+    This is eq. (22) with the sign of its differences corrected; with the printed sign, particles would move away from what attracts them.
 
     Parameters
     ----------
     box : Box
     X, V, best, leaders : arrays (n, d)
-        Positions and velocities of the particles, the best place of each, and the point of the archive that each follows. Across periodic
-        bounds differences go the short way round.
+        Positions and velocities of the particles, their best positions, and their leaders. Differences of periodic variables go the shorter
+        way.
     weights : (w, c1, c2)
     chance : array (2, n, d)
         r1 and r2, in [0, 1].
     largest : float
-        In each coordinate; faster ones are slowed down to it.
+        Limit of each component of the velocity.
     """
     w, c1, c2 = weights
     V = w * V + c1 * chance[0] * box.difference(best, X) + c2 * chance[1] * box.difference(leaders, X)
@@ -272,10 +276,10 @@ def velocities(
 
 
 def moved(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and velocities (n, d) after an interval of 1.
+    """Positions and velocities (n, d) after a time step of 1.
 
-    A coordinate that leaves the box is set to the bound, and its velocity is multiplied by a number of `rebound` (n, d), in [-1, 0]. One
-    that is periodic comes in at the other end, and keeps its velocity.
+    A coordinate that leaves the box is set to the bound, and its velocity is multiplied by `rebound` (n, d), in [-1, 0]. A periodic
+    coordinate re-enters at the other bound with its velocity unchanged.
     """
     there = X + V
     out = ((there < 0.0) | (there > 1.0)) & ~box.wraps
@@ -283,8 +287,8 @@ def moved(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[
 
 
 def improved(F: np.ndarray, best: np.ndarray, coin: np.ndarray) -> np.ndarray:
-    """Whether particles (n,) take F (n, m) for their best instead of `best` (n, m): if it dominates; by `coin` (n,) if neither does.
+    """Mask (n,) of the particles whose new objectives F (n, m) replace the old `best` (n, m), eq. (20).
 
-    Eq. (20).
+    They do if they dominate; if neither dominates, `coin` (n,) decides.
     """
     return dominates(F, best) | (~dominates(best, F) & coin)

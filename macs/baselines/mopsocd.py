@@ -1,4 +1,4 @@
-"""MOPSO-CD: a swarm led by the least crowded points of an archive."""
+"""MOPSO-CD: a swarm whose leaders are the least crowded points of an archive."""
 
 from __future__ import annotations
 
@@ -8,21 +8,20 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from . import constraints as handlings
 from .population import Members, State
 from .pymoo_adapter import Baseline, rows_of
 
 
-@dataclass
+@dataclass(repr=False)
 class SwarmState(State):
-    """The members are the particles, in their order.
+    """State of MOPSO-CD. The members are the particles, in their order.
 
     Attributes
     ----------
     best : Members
-        The best point that each particle has been at.
+        Best position of each particle.
     leaders : Members
-        What the swarm may follow: the algorithm's own archive, in its order.
+        Archive of the algorithm, in its order, from which leaders are drawn.
     velocity : array (n, d)
         In the user's units.
     """
@@ -34,25 +33,25 @@ class SwarmState(State):
 
 @dataclass(frozen=True)
 class MOPSOCD(Baseline):
-    """MOPSO-CD (Raquel and Naval 2005), that of pymoo; see `Baseline`. For any number of objectives.
+    """MOPSO-CD (Raquel and Naval 2005), pymoo's implementation; see `Baseline`. For any number of objectives.
 
-    It knows nothing of constraints; they are handled here, before it is told of a point. The front is its archive. Two things differ from
-    pymoo's, neither in the points that it flies through:
+    MOPSO-CD compares objectives only, so constraints become part of them, see `handling`. The front is its archive. There are two
+    differences from pymoo; neither changes the positions of the particles:
 
-    - pymoo evaluates a swarm that it then throws away, and counts it. Here it is drawn, for the sake of the same random numbers, but
-      neither evaluated nor counted: n generations cost fewer evaluations, by as many as there are particles.
-    - pymoo offers the archive once more what crowding has just kept out of it, and if it overflows by that, throws out a random half of
-      it, which no seed governs. Here these points stay out. So the two are equal as long as the archive has room; beyond that pymoo's is
-      not even equal to itself.
+    - pymoo evaluates and counts a first swarm that it does not use. Here that swarm is drawn, for the same random numbers, but neither
+      evaluated nor counted: n generations need fewer evaluations, by the number of particles.
+    - pymoo offers the archive a second time the points that crowding has just rejected. If the archive overflows by that, pymoo drops a
+      random half of it, independent of any seed. Here these points stay out. So the results are equal until the archive is full; from then
+      on those of pymoo are not reproducible.
 
     Parameters
     ----------
     particles : int, default 100
-        At least 2.
+        Number of particles, at least 2.
     archive : int, default 200
-        Largest number of points in the archive, and so on the front.
+        Largest number of points in the archive, and so on the front, at least 1.
     inertia, cognitive, social : float, default 0.6, 2 and 2
-        Weights of a particle's velocity, of the step to its own best point and of that to its leader; at least 0.
+        Weights of the velocity, of the step to a particle's own best position and of that to its leader; at least 0.
     max_velocity : float, default 0.5
         Largest step in a variable, in spans of it, in (0, 1].
     handling, penalty, degree
@@ -61,7 +60,7 @@ class MOPSOCD(Baseline):
     Raises
     ------
     ValueError
-        Where a setting is out of its range; the message names it.
+        If a setting is outside its range; the message names it.
     """
 
     particles: int = 100
@@ -73,11 +72,11 @@ class MOPSOCD(Baseline):
     handling: str = "feasible-first"
     penalty: float = 1000.0
     degree: str = "largest"
-    _knows_constraints = False
+    _compares_violations = False
 
     def __post_init__(self) -> None:
-        weights = dict.fromkeys(("inertia", "cognitive", "social"), (0.0, np.inf))
-        self._check({"particles": 2, "archive": 1}, {**weights, "max_velocity": (1e-9, 1)})
+        weights = dict.fromkeys(("inertia", "cognitive", "social"), "[0, inf)")
+        self._check({"particles": 2, "archive": 1}, {**weights, "max_velocity": "(0, 1]"})
 
     def _size(self, m: int | None) -> int | None:
         return self.particles
@@ -95,12 +94,8 @@ class MOPSOCD(Baseline):
             callback=_keep_out,
         )
 
-    def _told(self, points: Members, tolerance: float) -> handlings.Told:
-        F, cv = super()._told(points, tolerance)
-        return handlings.by_objectives(F, cv), np.zeros(len(cv))
-
     def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
-        super()._draw(evaluator, count, rng)  # the swarm that pymoo throws away
+        super()._draw(evaluator, count, rng)  # the swarm that pymoo does not use
         self._velocity(evaluator, count, rng)
         return super()._draw(evaluator, count, rng)
 
@@ -113,13 +108,13 @@ class MOPSOCD(Baseline):
         return SwarmState(**common, best=members, leaders=members.take(np.arange(0)), velocity=velocity)
 
     def _table(self, state: SwarmState) -> Members:
-        return state.members.join(state.best).join(state.leaders)
+        return state.members.joined(state.best).joined(state.leaders)
 
-    def _restore(self, algorithm: Any, state: SwarmState, people: Any) -> None:
+    def _restore(self, algorithm: Any, state: SwarmState, individuals: Any) -> None:
         from pymoo.util.archive import MultiObjectiveArchive
 
         n = len(state.members)
-        algorithm.pop, algorithm.pbest, leaders = people[:n], people[n : 2 * n], people[2 * n :]
+        algorithm.pop, algorithm.pbest, leaders = individuals[:n], individuals[n : 2 * n], individuals[2 * n :]
         algorithm.pbest_f = algorithm.pbest.get("F")
         algorithm.archive = MultiObjectiveArchive(individuals=leaders, max_size=self.archive)
         algorithm.velocities = state.velocity.copy()
@@ -130,5 +125,5 @@ class MOPSOCD(Baseline):
 
 
 def _keep_out(algorithm: Any) -> None:
-    """Called before pymoo offers the archive, once more, the points just evaluated: if they are too many, those already in it stay."""
+    """Set the truncation of pymoo's archive: if the points that are offered a second time are too many, those already in it stay."""
     algorithm.archive.truncation = lambda points, count: points[: algorithm.archive_size]

@@ -12,17 +12,19 @@ from .population import Members, State
 from .pymoo_adapter import Baseline
 
 UNRANKED = -1
+"""In place of the rank of an infeasible member."""
 
 
-@dataclass
+@dataclass(repr=False)
 class RankedState(State):
-    """With what tournaments look at.
+    """State of NSGA-II, with the quantities that tournaments compare.
 
     Attributes
     ----------
     rank : array (n,) of int
-        Of each member's front, 0 the best; -1 for infeasible ones, which have none.
+        Rank of each member's front, 0 for the best; -1 for an infeasible member.
     crowding : array (n,)
+        Crowding distances.
     """
 
     rank: np.ndarray
@@ -31,31 +33,32 @@ class RankedState(State):
 
 @dataclass(frozen=True)
 class NSGA2(Baseline):
-    """NSGA-II (Deb, Pratap, Agarwal and Meyarivan 2002), that of pymoo; see `Baseline`.
+    """NSGA-II (Deb, Pratap, Agarwal and Meyarivan 2002), pymoo's implementation; see `Baseline`.
 
-    For any number of objectives; its crowding distances serve two or three.
+    For any number of objectives; crowding distances work well with two or three.
 
     Parameters
     ----------
     population : int, default 100
         Number of individuals, and of offspring in a generation, at least 2.
     crossover : float, default 0.9
-        Probability of simulated binary crossover.
+        Probability of simulated binary crossover, in [0, 1].
     crossover_eta, mutation_eta : float, default 15 and 20
-        Distribution indices of crossover and of polynomial mutation, in [1, 100]: the higher, the nearer are children to their parents.
+        Distribution indices of crossover and of polynomial mutation, in [1, 100]; a higher index puts children nearer to their parents.
     handling : {"feasible-first", "penalty", "objective"}, default "feasible-first"
-        Feasible points are superior to others, of which the less violated are superior; or `penalty` times the violation is added to each
-        objective; or the violation is one more objective.
+        Constraint handling. "feasible-first": feasible points are better than infeasible ones, and these are compared by their violation.
+        "penalty": `penalty` times the violation is added to each objective. "objective": the violation is an additional objective.
     penalty : float, default 1000
-        For handling="penalty": in units of the objectives.
+        Factor for handling="penalty", in units of the objectives, at least 0.
     degree : {"largest", "sum", "log", "printed"}, default "largest"
-        What counts as the violation of an infeasible point: its largest one, the sum of those of all constraints or of their logarithms, or
-        the sum of all, none of which counts as more than 1; see `degrees`. Feasible is what violates nothing, whatever the degree.
+        Violation by which infeasible points are compared: the largest of all constraints, the sum over the constraints, the sum of
+        log(1 + violation), or the sum with each violation at most 1 (Chai and others 2020, as printed). It does not change which points are
+        feasible.
 
     Raises
     ------
     ValueError
-        Where a setting is out of its range; the message names it.
+        If a setting is outside its range; the message names it.
     """
 
     population: int = 100
@@ -67,7 +70,7 @@ class NSGA2(Baseline):
     degree: str = "largest"
 
     def __post_init__(self) -> None:
-        self._check({"population": 2}, {"crossover": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})
+        self._check({"population": 2}, {"crossover": "[0, 1]", "crossover_eta": "[1, 100]", "mutation_eta": "[1, 100]"})
 
     def _size(self, m: int | None) -> int | None:
         return self.population
@@ -83,16 +86,16 @@ class NSGA2(Baseline):
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> RankedState:
         return RankedState(**common, rank=np.full(len(members), UNRANKED), crowding=np.full(len(members), np.nan))
 
-    def _restore(self, algorithm: Any, state: RankedState, people: Any) -> None:
-        people.set("rank", state.rank, "crowding", state.crowding)
-        algorithm.pop = people
+    def _restore(self, algorithm: Any, state: RankedState, individuals: Any) -> None:
+        individuals.set("rank", state.rank, "crowding", state.crowding)
+        algorithm.pop = individuals
 
     def _keep(self, algorithm: Any, state: RankedState, table: Members) -> None:
         state.rank = _numbers(algorithm.pop, "rank", UNRANKED).astype(int)
         state.crowding = _numbers(algorithm.pop, "crowding", np.nan)
 
 
-def _numbers(people: Any, key: str, missing: float) -> np.ndarray:
-    """What individuals know of themselves, (n,), and `missing` where they know nothing."""
-    values = [one.get(key) for one in people]
+def _numbers(individuals: Any, key: str, missing: float) -> np.ndarray:
+    """Values (n,) of an attribute of individuals; `missing` for an individual without it."""
+    values = [one.get(key) for one in individuals]
     return np.array([missing if value is None else value for value in values], dtype=float)

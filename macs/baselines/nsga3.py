@@ -13,16 +13,16 @@ from .population import Members, State
 from .pymoo_adapter import Baseline
 
 
-@dataclass
+@dataclass(repr=False)
 class NormalisedState(State):
-    """With what objectives are normalised by, as the algorithm is told them.
+    """State of NSGA-III, with the points by which objectives, as presented to the algorithm, are normalised.
 
     Attributes
     ----------
     ideal, worst : arrays (m,)
-        The best and the worst value of each objective that ever competed; infinite before there are any.
+        Best and worst value of each objective so far; infinite before the first population.
     extreme_points : array (m, m) or (0, m)
-        The points that span the hyperplane; none before there are any.
+        Points that span the hyperplane; none before the first population.
     """
 
     ideal: np.ndarray
@@ -32,32 +32,33 @@ class NormalisedState(State):
 
 @dataclass(frozen=True)
 class NSGA3(Baseline):
-    """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), that of pymoo; see `Baseline`. For two objectives or more.
+    """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), pymoo's implementation; see `Baseline`. For two or more
+    objectives.
 
-    The front are the non-dominated points nearest to the reference directions, or with `whole` all there are. Where two infeasible
-    candidates tie, the winner is drawn from the run's own generator; pymoo's draws from one that no seed governs.
+    The front has the non-dominated points nearest to the reference directions, or, with `whole`, all non-dominated points. If two
+    infeasible candidates tie, the winner is drawn by the generator of the run; in pymoo this draw is independent of the seed.
 
     Parameters
     ----------
     population : int, optional
-        Number of individuals, and of offspring in a generation. Without `divisions`, also the number of reference directions: any, at least
-        as many as objectives; those of a simplex lattice where one has so many, evenly spread otherwise. Default: as many as directions.
+        Number of individuals, and of offspring in a generation. Without `divisions`, also the number of reference directions, not less than
+        that of objectives: a simplex lattice, if one has so many, and evenly spread otherwise. Default: the number of directions.
     divisions : int, optional
-        Of the simplex lattice (Das and Dennis 1998) that gives the reference directions. With `population`, these may be fewer than the
-        individuals, by half at most. Default: of the finest lattice with no more than 100 directions (2 objectives: 100, 3: 91).
+        Divisions of the simplex lattice (Das and Dennis 1998) of reference directions. With `population`, there may be fewer directions
+        than individuals, but at least half as many. Default: the finest lattice with at most 100 directions (2 objectives: 100, 3: 91).
     crossover : float, default 1
-        Probability of simulated binary crossover.
+        Probability of simulated binary crossover, in [0, 1].
     crossover_eta, mutation_eta : float, default 30 and 20
-        Distribution indices of crossover and of polynomial mutation, in [1, 100]: the higher, the nearer are children to their parents.
+        Distribution indices of crossover and of polynomial mutation, in [1, 100]; a higher index puts children nearer to their parents.
     handling, penalty, degree
-        As for `NSGA2`. With "objective", directions are of one more objective.
+        As for `NSGA2`. With "objective", the directions have one objective more.
     whole : bool, default False
-        Whether the front is everything in the population that no other dominates. It changes nothing of how the population evolves.
+        Whether the front has all non-dominated points of the population. It does not change the search.
 
     Raises
     ------
     ValueError
-        Where a setting is out of its range, and, once the number of objectives is known, where population and directions do not match.
+        If a setting is outside its range or, once the number of objectives is known, if population and directions do not match.
     """
 
     population: int | None = None
@@ -71,17 +72,15 @@ class NSGA3(Baseline):
     whole: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.whole, bool):
-            raise ValueError(f"NSGA3: whole must be True or False, not {self.whole!r}")
         counts = {"population": 2, "divisions": 1}
-        self._check(counts, {"crossover": (0, 1), "crossover_eta": (1, 100), "mutation_eta": (1, 100)})
+        self._check(counts, {"crossover": "[0, 1]", "crossover_eta": "[1, 100]", "mutation_eta": "[1, 100]"}, ("whole",))
 
     def check_objectives(self, m: int) -> None:
-        """Refuse one objective, and directions that do not match the population."""
-        check_directions("NSGA3", m + (self.handling == "objective"), self.population, self.divisions)
+        """Raise ValueError for a single objective, and for directions that do not match the population."""
+        check_directions("NSGA3", self._presented_count(m), self.population, self.divisions)
 
     def _size(self, m: int | None) -> int | None:
-        return population_size(m and m + (self.handling == "objective"), self.population, self.divisions)
+        return population_size(m and self._presented_count(m), self.population, self.divisions)
 
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import nsga3
@@ -98,14 +97,14 @@ class NSGA3(Baseline):
         )
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:
-        m = members.F.shape[1] + (self.handling == "objective")
+        m = self._presented_count(members.F.shape[1])
         return NormalisedState(**common, ideal=np.full(m, np.inf), worst=np.full(m, -np.inf), extreme_points=np.empty((0, m)))
 
     def _best(self, algorithm: Any) -> Any:
         return algorithm.pop if self.whole else algorithm.opt
 
-    def _restore(self, algorithm: Any, state: NormalisedState, people: Any) -> None:
-        algorithm.pop = people
+    def _restore(self, algorithm: Any, state: NormalisedState, individuals: Any) -> None:
+        algorithm.pop = individuals
         norm = algorithm.survival.norm
         norm.ideal_point, norm.worst_point = state.ideal, state.worst
         norm.extreme_points = state.extreme_points if len(state.extreme_points) else None
@@ -118,7 +117,7 @@ class NSGA3(Baseline):
 
 
 def less_violated(pop: Any, P: np.ndarray, random_state: np.random.Generator, **kwargs: Any) -> np.ndarray:
-    """Winners (n, 1) of tournaments between the pairs P (n, 2): the less violated, any of two that are equal."""
+    """Winners (n, 1) of tournaments between the pairs P (n, 2): the less violated one; of two equal ones a random one."""
     winners = np.empty((len(P), 1), dtype=int)
     for i, (a, b) in enumerate(P):
         of_a, of_b = pop[a].CV[0], pop[b].CV[0]

@@ -1,41 +1,38 @@
-"""What all solvers with a population share, whoever moves it: constraints and degrees, first candidates, and how feasible it is."""
+"""Base of all solvers with a population: its state, constraint handling, first candidates, evaluation and statistics."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from problems.checks import check_count
+from problems.checks import check_choice, check_count, check_interval
 
-from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Archive, least_violated
 from ..pareto.dominance import nondominated
 from ..solvers.solver import Solver
-from . import constraints as degrees
-from . import constraints as handlings
-from .constraints import DEGREES
+from . import constraints
 
 
-@dataclass
+@dataclass(repr=False)
 class State:
-    """What every such solver knows between two iterations; each adds what is its own.
+    """State of a solver with a population between two iterations. Each solver adds its own fields.
 
     Attributes
     ----------
     members : Members
         The population.
     archive : Archive
-        The front as it is now: feasible, mutually non-dominated, no two alike.
+        The present front: feasible, mutually non-dominated and different points.
     closest : Archive
-        The least violated point seen, one row, as long as the archive is empty; no row afterwards.
+        The least violated point evaluated, one row, as long as the archive is empty; no row afterwards.
     iteration : int
-        Generations done after the first population.
+        Generations after the first population.
     first_feasible, all_feasible : int
-        The first generation in which one member, and in which all were feasible; the first population is generation 1. 0: none so far.
+        First generation with one feasible member, and with all members feasible; the first population is generation 1. 0: none so far.
     rng : numpy.random.Generator
     """
 
@@ -47,18 +44,21 @@ class State:
     all_feasible: int
     rng: np.random.Generator
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: generation {self.iteration + 1}; {self.members}, {self.archive}>"
+
     def note(self, tolerance: float) -> None:
-        """Note how feasible the population of this generation is; see `handling.problem_type`."""
-        kind = handlings.problem_type(handlings.excess(self.members.F, self.members.violation, tolerance))
+        """Update `first_feasible` and `all_feasible` by the population of this generation; see `constraints.problem_type`."""
+        kind = constraints.problem_type(constraints.excess(self.members.F, self.members.violation, tolerance))
         if kind > 0.0 and not self.first_feasible:
             self.first_feasible = self.iteration + 1
         if kind == 1.0 and not self.all_feasible:
             self.all_feasible = self.iteration + 1
 
     def show(self, tolerance: float, seen: Members, *groups: Members) -> None:
-        """Let the archive be what is `shown` of the first of the groups that has feasible points.
+        """Update the archive to the front of the first group with feasible points; see `shown`.
 
-        If none has, it is what it last was; if that is nothing, what is feasible of the points just `seen`.
+        If no group has any, the archive stays; if it is empty, it becomes the front of the points just `seen`, or `closest` is updated.
         """
         found = shown(tolerance, *groups)
         if found is None and not len(self.archive):
@@ -70,21 +70,23 @@ class State:
 
 
 class PopulationSolver(Solver):
-    """A solver with a population, and with `handling`, `penalty` and `degree` among its settings.
+    """Solver with a population, and with `handling`, `penalty` and `degree` among its settings.
 
-    `stats["population"]` of its fronts tell, beside the number of `generations`, with the first population as the first, the `size` of the
-    last one, how many of it were `feasible`, how many of these `nondominated`, and the first generations with one feasible member,
-    `first_feasible`, and with none that was not, `all_feasible`; None where there was none.
+    `stats["population"]` of its fronts has the number of `generations`, the first population included; the `size` of the last population,
+    and how many of its members were `feasible`, and of these `nondominated`; and the first generation with one feasible member,
+    `first_feasible`, and with all members feasible, `all_feasible` (None if there was none).
     """
 
     handling: str
     penalty: float
     degree: str
+    _compares_violations = True
+    """Whether the algorithm compares violations itself; otherwise they are included in the objectives presented to it."""
 
-    def tells(self, state: State, tolerance: float) -> dict[str, Any]:
-        """See `Solver.tells`."""
+    def extra_stats(self, state: State, tolerance: float) -> dict[str, Any]:
+        """See `SearchMethod.extra_stats`."""
         members = state.members
-        feasible = members.take(handlings.excess(members.F, members.violation, tolerance) == 0.0)
+        feasible = members.take(constraints.excess(members.F, members.violation, tolerance) == 0.0)
         return {
             "population": {
                 "generations": state.iteration + 1,
@@ -96,119 +98,97 @@ class PopulationSolver(Solver):
             }
         }
 
-    def _told(self, points: Members, tolerance: float) -> handlings.Told:
-        """What the algorithm is told of points."""
-        return handlings.told(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
+    def _presented(self, points: Members, tolerance: float) -> constraints.Presented:
+        """Objectives and violations of points as presented to the algorithm."""
+        F, cv = constraints.presented(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
+        return (F, cv) if self._compares_violations else (constraints.by_objectives(F, cv), np.zeros(len(cv)))
+
+    def _presented_count(self, m: int) -> int:
+        """Number of objectives as presented to the algorithm, for a problem with m."""
+        return m + (self.handling == "objective")
 
     def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
-        """`count` candidates (count, d), drawn evenly from the box, as pymoo draws them."""
+        """Candidates (count, d) drawn uniformly from the box, as pymoo does."""
         return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))
 
     def _candidates(self, evaluator: Evaluator, given: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Full vectors (count, D) to begin with: the given ones, and drawn ones in the places that are left."""
+        """First full vectors (count, D): the given ones, then drawn ones."""
         Z = evaluator.first_guess(evaluator.opening(self._draw(evaluator, count, rng)))
         if len(given):
             Z[: len(given)] = given
-        Z[:, evaluator.free] = box_of(evaluator).confine(Z[:, evaluator.free])
+        Z[:, evaluator.free] = evaluator.box.confine(Z[:, evaluator.free])
         return Z
 
-    def _check(self, counts: Mapping[str, int], ranges: Mapping[str, tuple[float, float]]) -> None:
-        """Raise ValueError for settings that make no sense: `counts` gives the least of each, `ranges` the closed interval."""
+    def _check(self, counts: Mapping[str, int], intervals: Mapping[str, str], flags: Sequence[str] = ()) -> None:
+        """Raise ValueError for settings outside their ranges: least values of `counts`, intervals of numbers, and flags."""
         name = type(self).__name__
         for setting, least in counts.items():
             if getattr(self, setting) is not None or getattr(type(self), setting) is not None:  # None only where that is the default
                 check_count(f"{name}: {setting}", getattr(self, setting), least)
-        for setting, (low, high) in {**ranges, "penalty": (0.0, np.inf)}.items():
-            value = getattr(self, setting)
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value <= high or np.isinf(value):
-                wanted = f"in [{low:g}, {high:g}]" if np.isfinite(high) else f"a number of at least {low:g}"
-                raise ValueError(f"{name}: {setting} must be {wanted}, not {value!r}")
-        for setting, words in (("handling", handlings.HANDLINGS), ("degree", DEGREES)):
-            if getattr(self, setting) not in words:
-                known = ", ".join(f"'{word}'" for word in words)
-                raise ValueError(f"{name}: {setting} must be one of {known}, not {getattr(self, setting)!r}")
+        for setting, interval in {**intervals, "penalty": "[0, inf)"}.items():
+            check_interval(f"{name}: {setting}", getattr(self, setting), interval)
+        for setting in flags:
+            if not isinstance(getattr(self, setting), bool | np.bool_):
+                raise ValueError(f"{name}: {setting} must be True or False, not {getattr(self, setting)!r}")
+        check_choice(f"{name}: handling", self.handling, constraints.HANDLINGS)
+        check_choice(f"{name}: degree", self.degree, constraints.DEGREES)
 
 
 def distinct(start: np.ndarray | None) -> np.ndarray:
-    """The vectors of a `start` (k, D), or of none, without repetitions."""
+    """The different vectors of a `start` (k, D), in their order; empty for None."""
     return np.empty((0, 0)) if start is None else start[np.sort(np.unique(start, axis=0, return_index=True)[1])]
 
 
 def thinned(given: np.ndarray, size: int) -> np.ndarray:
-    """The vectors `given` (k, D); of more than `size`, so many evenly spaced ones."""
+    """The vectors `given` (k, D); if they are more than `size`, so many evenly spaced ones."""
     return given if len(given) <= size else given[np.linspace(0, len(given) - 1, size).round().astype(int)]
 
 
-def no_points(like: Members) -> Archive:
-    """An archive without points, of vectors and objectives as long as those of others."""
-    none = np.arange(0)
-    return Archive(like.Z[none], like.F[none], like.violation[none])
-
-
-@dataclass(frozen=True)
-class Members:
-    """Evaluated points, one a row, feasible or not.
+@dataclass(frozen=True, repr=False)
+class Members(Archive):
+    """Evaluated points of a population, feasible or not.
 
     Attributes
     ----------
     Z : array (n, D)
-        Full vectors, in the user's units, as they came back from the evaluator.
+        Full vectors, in the user's units, after the evaluation.
     F : array (n, m)
         Objectives, all minimised; NaN where the evaluation failed.
     violation : array (n,)
-        Infinite where the evaluation failed.
+        Largest scaled residual of any constraint; infinite where the evaluation failed.
     degree : array (n,)
-        The number that infeasible points are ranked by; see `degrees`.
+        Number by which infeasible points are ranked; see `constraints.degree`.
     """
 
-    Z: np.ndarray
-    F: np.ndarray
-    violation: np.ndarray
     degree: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.F)
-
-    def take(self, rows: np.ndarray) -> Members:
-        """The points of `rows` (indices or mask)."""
-        return Members(*(values[rows] for values in self._fields))
-
-    def join(self, others: Members) -> Members:
-        """These, then the others."""
-        return Members(*(np.concatenate(pair) for pair in zip(self._fields, others._fields, strict=True)))
-
-    @property
-    def _fields(self) -> tuple[np.ndarray, ...]:
-        return self.Z, self.F, self.violation, self.degree
 
 
 def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:
-    """Evaluate full vectors (k, D), with the degree of violation named `by`.
+    """The evaluated full vectors Z (k, D), with the degree of violation named `by`.
 
-    A point is where the evaluator moved it; a failure that brought nothing back, where it was sent.
+    Each has the position to which the evaluator moved it; after a failure without a result, its original position.
     """
     seen = evaluator.evaluate(Z)
-    degree = degrees.degree(by, seen.violation, lambda: seen.violations, evaluator.tolerance)
+    degree = constraints.degree(by, seen.violation, lambda: seen.violations, evaluator.tolerance)
     return Members(np.where(np.isfinite(seen.Z), seen.Z, Z), seen.F, seen.violation, degree)
 
 
 def full_vectors(evaluator: Evaluator, members: Members, X: np.ndarray) -> np.ndarray:
-    """Full vectors (k, D) for candidates X (k, d): the rest is that of the nearest member, in spans, whose evaluation did not fail."""
+    """Full vectors (k, D) for candidates X (k, d); the other entries are those of the nearest member, in spans, that did not fail."""
     free = evaluator.free
     usable = np.flatnonzero(np.isfinite(members.violation))
     if members.Z.shape[1] == len(free) or not usable.size:
         return evaluator.first_guess(X)
-    box, Z = box_of(evaluator), members.Z[usable]
+    box, Z = evaluator.box, members.Z[usable]
     vectors = Z[box.squared_distances(box.to_unit(X), box.to_unit(Z[:, free])).argmin(axis=1)]
     vectors[:, free] = X
     return vectors
 
 
 def shown(tolerance: float, *groups: Members) -> Archive | None:
-    """The feasible, mutually non-dominated points, no two alike, of the first group that has feasible ones; None if none has."""
+    """The feasible, mutually non-dominated, different points of the first group with feasible points; None if no group has any."""
     for group in groups:
         feasible = group.take((group.violation <= tolerance) & np.isfinite(group.F).all(axis=1))
         if len(feasible):
-            best = feasible.take(nondominated(feasible.F))
-            return Archive(best.Z, best.F, best.violation)
+            return Archive.of(feasible, nondominated(feasible.F))
     return None

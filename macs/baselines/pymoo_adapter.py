@@ -1,7 +1,8 @@
-"""What the baselines share: a pymoo algorithm is made anew for each iteration from the state, asked, told, and read back into the state.
+"""Adapter of pymoo's algorithms: in each iteration an algorithm is built from the state, used by ask and tell, and read back into the
+state.
 
-So the state is plain data, and the algorithm goes on as if it had never been away: it draws from the state's generator, and every random
-draw, comparison and sum is pymoo's own. pymoo never evaluates anything, and knows of no termination.
+So the state is plain data, and all random draws, comparisons and sums are pymoo's own, by the generator of the state. pymoo evaluates
+nothing and does not decide when to stop.
 """
 
 from __future__ import annotations
@@ -13,85 +14,82 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluator
-from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, no_points, thinned
+from ..pareto.archive import Archive
+from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
 
 class Baseline(PopulationSolver):
-    """A solver that drives an algorithm of pymoo's.
+    """Solver that runs an algorithm of pymoo.
 
-    On an unconstrained problem, the same seed and as many evaluations as are a whole number of generations, its points are those of
+    On an unconstrained problem, with the same seed and evaluations for a whole number of generations, its points are those of
     `pymoo.optimize.minimize` to the last bit. Beyond that:
 
-    - The front is what the algorithm returns, without the infeasible points and without repetitions: the non-dominated ones of its
-      population, its niches or its archive. Where constraints are a penalty or an objective, that may hold nothing feasible any more: then
-      it is what it last was.
-    - Of a last generation for which the budget is too small, the first offspring are evaluated, and compete as usual.
+    - The front is the result of the algorithm (the non-dominated points of its population, its niches or its archive) without infeasible
+      and repeated points. With constraints as a penalty or an objective, this may no longer contain feasible points; then the last front
+      with any is kept.
+    - If the budget is too small for the last generation, its first offspring are evaluated, and compete as usual.
     - A failed evaluation counts as infeasible, behind all others.
-    - Where the evaluator moves candidates, the population takes the points that come back. Their next neighbours start from there.
-    - `start` takes the first places of the population: of too many, evenly spaced ones.
-    - Periodic variables are plain intervals to it.
+    - If the evaluator moves candidates, the population takes the new positions, and inner solves of near candidates start there.
+    - Points of a `start` are the first members of the population; if they are too many, evenly spaced ones are used.
+    - Periodic variables are treated as plain intervals.
 
-    An implementation is a frozen dataclass of settings, with those of a `PopulationSolver` among them, and the hooks below.
+    An implementation is a frozen dataclass of settings, those of a `PopulationSolver` included, with the hooks below.
     """
-
-    _knows_constraints = True
 
     # The hooks
 
     @abstractmethod
     def _size(self, m: int | None) -> int | None:
-        """How many individuals there are; None as long as the number of objectives is not known but has to be."""
+        """Number of individuals; None if it depends on the number m of objectives, which is not known."""
 
     @abstractmethod
     def _algorithm(self, m: int) -> Any:
-        """A new pymoo algorithm, for m objectives as it is told them."""
+        """A new pymoo algorithm for m objectives, as they are presented to it."""
 
     @abstractmethod
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> State:
-        """The state of the first population, before the algorithm has seen it; `common` are the fields that all states have."""
+        """The state of the first population, before it is presented to the algorithm; `common` are the fields of all states."""
 
     @abstractmethod
-    def _restore(self, algorithm: Any, state: Any, people: Any) -> None:
-        """Give the algorithm what it knew; `people` are pymoo's individuals of `_table(state)`."""
+    def _restore(self, algorithm: Any, state: Any, individuals: Any) -> None:
+        """Restore the algorithm from the state; `individuals` are pymoo's individuals of `_table(state)`."""
 
     @abstractmethod
     def _keep(self, algorithm: Any, state: Any, table: Members) -> None:
-        """Take over into the state what is its own, for points whose rows in `table` their individuals know."""
+        """Update the fields of the state that belong to this algorithm; its individuals know their rows in `table`."""
 
     def _table(self, state: Any) -> Members:
-        """All points of the state that have to become individuals, the population first."""
+        """All points of the state that become individuals, the population first."""
         return state.members
 
     def _place(self, members: Members, evaluator: Evaluator) -> Members:
-        """The first population, of which some were given, each in a place that suits it."""
+        """The first population, in a suitable order if points of a `start` are in it."""
         return members
 
     def _best(self, algorithm: Any) -> Any:
-        """Which of its individuals are the front, as far as they are feasible and not dominated."""
+        """Individuals that form the front, if they are feasible and not dominated."""
         return algorithm.opt
 
     def _cut(self, algorithm: Any, count: int) -> None:
-        """Prepare the algorithm for being told of only the first `count` of those that it has asked for."""
+        """Prepare the algorithm for the results of only the first `count` of the candidates that it asked for."""
 
     # The contract
 
     @property
     def makes_state(self) -> Callable[..., Any]:
-        """See `Solver.makes_state`."""
+        """See `SearchMethod.makes_state`."""
         return self._first
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """Evaluate a first population; see `Solver.begin`."""
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+        """The state after a first population has been evaluated; see `SearchMethod.begin`."""
+        evaluator.check_budget(budget)
         given = distinct(start)
         m, members = evaluator.m_known, None
         if m is not None:
             self.check_objectives(m)
         size = self._size(m)
-        if size is None:  # one point tells how many objectives there are
+        if size is None:  # the number of objectives is known after one evaluation
             members = evaluate(evaluator, self._candidates(evaluator, given[:1], 1, rng), self.degree)
             self.check_objectives(members.F.shape[1])
             size = self._size(members.F.shape[1])
@@ -101,35 +99,35 @@ class Baseline(PopulationSolver):
         Z = self._candidates(evaluator, given[done:], size - done, rng)[: budget - evaluator.counts.evaluations]
         if len(Z):
             first = evaluate(evaluator, Z, self.degree)
-            members = first if members is None else members.join(first)
+            members = first if members is None else members.joined(first)
         assert members is not None
         self.check_objectives(members.F.shape[1])
         if len(given):
             members = self._place(members, evaluator)
-        none = no_points(members)
+        none = Archive.of(members, np.arange(0))
         common = {"members": members, "archive": none, "closest": none, "iteration": 0, "first_feasible": 0, "all_feasible": 0, "rng": rng}
         state = self._first(members, common, evaluator)
         algorithm, table = self._set_up(evaluator, members.F.shape[1], rng), self._table(state)
-        people = self._people(table, evaluator)
-        self._restore(algorithm, state, people)
+        individuals = self._individuals(table, evaluator)
+        self._restore(algorithm, state, individuals)
         with warnings.catch_warnings():  # pymoo changes the filters
-            algorithm.tell(infills=people[: len(members)])
+            algorithm.tell(infills=individuals[: len(members)])
         self._remember(algorithm, state, table, members, evaluator)
         state.note(evaluator.tolerance)
         return state
 
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
-        """One generation, within the budget of evaluations; changes `state`."""
+        """Do one generation within the budget of evaluations; changes `state`."""
         left = budget - evaluator.counts.evaluations
         if left <= 0:
             return
         table = self._table(state)
         algorithm = self._set_up(evaluator, table.F.shape[1], state.rng)
-        self._restore(algorithm, state, self._people(table, evaluator))
+        self._restore(algorithm, state, self._individuals(table, evaluator))
         algorithm.is_initialized, algorithm.n_iter, algorithm.opt = True, state.iteration + 1, ()
         while algorithm.n_iter == state.iteration + 1 and left > 0:  # some ask for one candidate at a time
             asked = algorithm.ask()
-            if asked is None:  # nothing could be bred that is not there already
+            if asked is None:  # no new offspring could be made
                 break
             alone = not hasattr(asked, "__len__")
             offspring = [asked] if alone else asked[:left]
@@ -138,8 +136,8 @@ class Baseline(PopulationSolver):
             X = np.array([one.X for one in offspring])
             bred = evaluate(evaluator, full_vectors(evaluator, state.members, X), self.degree)
             left = budget - evaluator.counts.evaluations
-            self._tell(offspring, bred, len(table), evaluator)
-            table = table.join(bred)
+            self._present(offspring, bred, len(table), evaluator)
+            table = table.joined(bred)
             with warnings.catch_warnings():
                 algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
@@ -149,43 +147,43 @@ class Baseline(PopulationSolver):
     # Between the two
 
     def _set_up(self, evaluator: Evaluator, m: int, rng: np.random.Generator) -> Any:
-        """The algorithm, ready for use on the evaluator's variables and for m objectives; it draws from `rng` from now on."""
+        """The algorithm, set up for the variables of the evaluator and m objectives; its random numbers are drawn from `rng`."""
         from pymoo.config import Config
         from pymoo.core.evaluator import VoidEvaluator
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
 
         Config.warnings["not_compiled"] = False  # it would print
-        m += self.handling == "objective"
-        algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._knows_constraints)
+        m = self._presented_count(m)
+        algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._compares_violations)
         problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
         algorithm.setup(problem, termination=NoTermination(), evaluator=VoidEvaluator(value=None), seed=0)
         algorithm.random_state = rng
         return algorithm
 
-    def _people(self, points: Members, evaluator: Evaluator) -> Any:
-        """A pymoo Population of points."""
+    def _individuals(self, points: Members, evaluator: Evaluator) -> Any:
+        """A pymoo Population of the points."""
         from pymoo.core.population import Population
 
-        people = Population.empty(len(points))
-        self._tell(people, points, 0, evaluator)
-        return people
+        individuals = Population.empty(len(points))
+        self._present(individuals, points, 0, evaluator)
+        return individuals
 
-    def _tell(self, people: Any, points: Members, row: int, evaluator: Evaluator) -> None:
-        """Write points into pymoo's individuals, who learn their rows, from `row` on, in the table of all points."""
-        X = box_of(evaluator).confine(points.Z[:, evaluator.free])
-        F, cv = self._told(points, evaluator.tolerance)
-        for i, one in enumerate(people):
+    def _present(self, individuals: Any, points: Members, row: int, evaluator: Evaluator) -> None:
+        """Write points into pymoo's individuals, with their rows, from `row` on, in the table of all points."""
+        X = evaluator.box.confine(points.Z[:, evaluator.free])
+        F, cv = self._presented(points, evaluator.tolerance)
+        for i, one in enumerate(individuals):
             one.X, one.F, one.CV = X[i].copy(), F[i].copy(), cv[i : i + 1].copy()
             one.set("row", row + i)
 
     def _remember(self, algorithm: Any, state: Any, table: Members, seen: Members, evaluator: Evaluator) -> None:
-        """Read the algorithm back into the state."""
+        """Update the state from the algorithm, after the points `seen` were presented to it."""
         state.members = table.take(rows_of(algorithm.pop))
         self._keep(algorithm, state, table)
         state.show(evaluator.tolerance, seen, table.take(rows_of(self._best(algorithm))), state.members)
 
 
-def rows_of(people: Any) -> np.ndarray:
-    """The rows (n,), in the table of all points, of pymoo's individuals."""
-    return np.array([one.data["row"] for one in people], dtype=int)
+def rows_of(individuals: Any) -> np.ndarray:
+    """Rows (n,) of pymoo's individuals in the table of all points."""
+    return np.array([one.data["row"] for one in individuals], dtype=int)

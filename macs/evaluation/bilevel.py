@@ -1,4 +1,4 @@
-"""An optimal control problem as an evaluator: the inner level makes each candidate feasible before its objectives count."""
+"""Evaluator of an optimal control problem: the inner level makes each candidate feasible before its objectives are evaluated."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from transcription.smooth import Smooth
 from .evaluator import Counts, Evaluation, Evaluator
 
 PATIENCE = 100
-"""Iterations after which a gradient solve is given up: most take some tens, and for the time of one that wanders others find more."""
+"""Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
 
 
 class Bilevel(Evaluator):
     """The two-level problem of Ricciardi, Vasile and Maddock (IEEE CEC 2016), eq. (13).
 
-    The full vector is that of the NLP; free are parameters, times, free initial states and controls; the other entries, the states, are
-    where the inner solve starts from: those of the point from which a candidate was made.
+    The full vector is that of the NLP. Free are the parameters, times, free initial states and controls. The other entries are the states,
+    from which the inner solve starts: those of the point that the candidate was made from.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Bilevel(Evaluator):
     tolerance : float
         Largest scaled residual of a feasible point.
     start : Smooth, optional
-        Shape of the first candidates of a search. Default: each variable drawn by itself.
+        Shape of the first candidates of a search. Default: each variable is drawn independently.
     """
 
     def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float, start: Smooth | None = None) -> None:
@@ -41,7 +41,7 @@ class Bilevel(Evaluator):
         try:
             refuse_peaks(nlp.problem)
             self.has_gradients = True
-        except ValueError:  # a peak that is maximised, say: the search goes on without derivatives
+        except ValueError:  # for example a peak that is maximised: the search uses no derivatives
             self.has_gradients = False
 
     def opening(self, candidates: np.ndarray) -> np.ndarray:

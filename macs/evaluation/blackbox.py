@@ -1,4 +1,4 @@
-"""Black boxes: plain vector functions, and pymoo's problems, as something whose points can be evaluated."""
+"""Evaluator of a black box: a plain vector function or a problem of pymoo."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Outputs = np.ndarray | tuple[np.ndarray, np.ndarray]
 
 
 class BlackBox(Evaluator):
-    """A plain function of several variables with several values.
+    """Evaluator of a plain vector function.
 
     Parameters
     ----------
     function : callable or pymoo Problem
         `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN is a failed evaluation.
     bounds : sequence of d pairs, pair of arrays (d,), or dict of pairs by name; None for a pymoo problem
-        Two sequences of more than two numbers are (lower, upper); everything else is a list of pairs.
+        Two sequences of more than two numbers each are (lower, upper); all else is a list of pairs.
     constraints : callable, optional
-        `constraints(X: (n, d)) -> G: (n, c)`; G <= 0 is feasible. Its columns follow those of the function's own G, if any.
+        `constraints(X: (n, d)) -> G: (n, c)`; G <= 0 is feasible. Its columns come after those of the function's own G.
     names, units : sequences of m str, optional
         Of the objectives. Default: "f1", "f2", ..., and no units.
     senses : sequence of m of "minimize" or "maximize", optional
@@ -41,13 +41,13 @@ class BlackBox(Evaluator):
 
     Notes
     -----
-    The number of objectives `m` is told by `names`, `units` or `senses`, by a pymoo problem, or else by the first batch that is evaluated.
-    Asking for it before that costs one evaluation, of the middle of the box, which is counted.
+    The number of objectives `m` is known from `names`, `units` or `senses`, from a pymoo problem, or from the first batch. Reading `m`
+    before that costs one evaluation, of the centre of the box, which is counted.
 
     Raises
     ------
     ValueError
-        Where an argument, or what a function returns, cannot be what is meant; the message names it.
+        If an argument, or the result of a function, has the wrong type or shape; the message names it.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class BlackBox(Evaluator):
             if sense not in SENSES:
                 raise ValueError(f"senses: must be 'minimize' or 'maximize', not {sense!r}")
         if self._names and len(set(self._names)) < len(self._names):
-            raise ValueError(f"names: {', '.join(self._names)} holds a name twice")
+            raise ValueError(f"names: {', '.join(self._names)} has a name twice")
         for name, labels in (("names", self._names), ("units", self._units), ("senses", self._senses)):
             if labels is not None:
                 self._learn(len(labels), f"{name} has {len(labels)}")
@@ -111,12 +111,12 @@ class BlackBox(Evaluator):
         return self._senses or ("minimize",) * self.m
 
     def resume(self, counts: Counts, m: int) -> None:
-        """See `Evaluator.resume`. Raises ValueError if the number of objectives is known to be another."""
+        """See `Evaluator.resume`. Raises ValueError if the function has another number of objectives."""
         super().resume(counts, m)
         self._learn(m, f"the checkpoint has {m}")
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
-        """The candidates (k, d): a black box has no other variables."""
+        """The candidates (k, d) themselves: all variables of a black box are free."""
         return np.array(candidates, dtype=float)
 
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
@@ -136,7 +136,7 @@ class BlackBox(Evaluator):
         return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, itemise=lambda: violations), 0
 
     def _learn(self, count: int, source: str) -> None:
-        """Take the number of objectives from `source`, or find that it contradicts what is known."""
+        """Set the number of objectives from `source`. Raises ValueError if it is known to be another."""
         if self.m_known is None and count > 0:
             self.m_known = count
         if self.m_known != count:
@@ -149,7 +149,7 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     Raises
     ------
     ValueError
-        Where they are no pairs, not finite, reversed or empty; the message names the variable.
+        If they are not pairs, not finite, reversed or empty; the message names the variable.
     """
     if bounds is None:
         raise ValueError("bounds: missing")
@@ -177,7 +177,7 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
 
 
 def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:
-    """The labels as a tuple; a lone string is no sequence of them."""
+    """The labels as a tuple; a single string is refused."""
     if labels is None:
         return None
     if isinstance(labels, str) or not all(isinstance(label, str) for label in labels):
@@ -186,11 +186,11 @@ def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:
 
 
 def _rows(what: str, values: Any, count: int) -> np.ndarray:
-    """A new array (count, k) of what a user's function returned for `count` points; (count,) is taken for one column."""
+    """Copy (count, k) of the values that a user's function returned for `count` points; (count,) counts as one column."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what} are no array of numbers but {type(values).__name__}") from None
+        raise ValueError(f"{what} must be an array of numbers, not {type(values).__name__}") from None
     if array.shape == (count,):
         array = array[:, None]
     if array.ndim != 2 or len(array) != count:
@@ -199,21 +199,21 @@ def _rows(what: str, values: Any, count: int) -> np.ndarray:
 
 
 def _is_pymoo(function: Any) -> bool:
-    """Whether this looks like a pymoo Problem; pymoo itself need not be imported to tell."""
+    """Whether this is a pymoo Problem, by its attributes, without importing pymoo."""
     return all(hasattr(function, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
 
 
 def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
-    """Pairs of bounds of a pymoo Problem of real variables."""
+    """Pairs of bounds of a pymoo Problem with real variables."""
     lower, upper = problem.xl, problem.xu
     if lower is None or upper is None or isinstance(lower, dict):
-        raise ValueError(f"bounds: pymoo problem {type(problem).__name__} has none of real variables")
+        raise ValueError(f"bounds: pymoo problem {type(problem).__name__} has no bounds of real variables")
     lower, upper = np.broadcast_to(lower, problem.n_var), np.broadcast_to(upper, problem.n_var)
     return list(zip(lower.tolist(), upper.tolist(), strict=True))
 
 
 def _pymoo_function(problem: Any) -> Callable[[np.ndarray], Outputs]:
-    """A pymoo Problem, vectorised or elementwise, as (F, G); its equality constraints join the inequalities by their absolute values."""
+    """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); of equality constraints G has the absolute values."""
 
     def function(X: np.ndarray) -> Outputs:
         out = problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)

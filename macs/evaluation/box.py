@@ -1,4 +1,4 @@
-"""The box a search moves in: a unit cube, each side the span of a free variable, some of whose sides close on themselves."""
+"""Box of the free variables, scaled to the unit cube; periodic variables wrap around."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from .evaluator import Evaluator
-
 
 @dataclass(frozen=True)
 class Box:
     """Bounds of the free variables, and the arithmetic of points and steps inside them.
 
-    Points are rows X in unit coordinates: 0 at the lower bound, 1 at the upper one. So a distance is in units of span, and no variable
-    weighs more than another for being measured in smaller units.
+    Points are rows X in unit coordinates: 0 at the lower bound, 1 at the upper one. So distances are in spans, whatever the units of the
+    variables.
 
     Attributes
     ----------
     lower, upper : arrays (d,)
         Bounds in the user's units.
     wraps : array (d,) of bool
-        Where the variable is periodic: its bounds are one period wide, and a point that leaves at one comes in at the other.
+        True for a periodic variable: its bounds are one period wide, and a point that leaves through one re-enters through the other.
     """
 
     lower: np.ndarray
@@ -35,7 +33,7 @@ class Box:
         return self.upper - self.lower
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
-        """Unit coordinates of values (..., d) in the user's units; values outside the bounds are put back."""
+        """Unit coordinates (..., d) of values in the user's units; values outside the bounds are put back."""
         return self.put_back((values - self.lower) / self.span)
 
     def to_values(self, X: np.ndarray) -> np.ndarray:
@@ -43,7 +41,7 @@ class Box:
         return np.clip(self.lower + X * self.span, self.lower, self.upper)
 
     def confine(self, values: np.ndarray) -> np.ndarray:
-        """The values (..., d), in the user's units, with those outside the bounds put back; the others keep all their bits."""
+        """The values (..., d), in the user's units, with those outside the bounds put back; the others are unchanged to the last bit."""
         outside = (values < self.lower) | (values > self.upper)
         return np.where(outside, self.to_values(self.to_unit(values)), values)
 
@@ -53,12 +51,12 @@ class Box:
         return np.where(self.wraps, X - np.floor(X), inside) if self.wraps.any() else inside
 
     def difference(self, X: np.ndarray, origin: np.ndarray) -> np.ndarray:
-        """The step (..., d) from `origin` to X, the short way round where periodic."""
+        """The step (..., d) from `origin` to X; periodic variables take the shorter way."""
         step = X - origin
         return np.where(self.wraps, step - np.round(step), step) if self.wraps.any() else step
 
     def squared_distances(self, X: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """From each of X (k, d) to each of `others` (n, d), the short way round where periodic: (k, n), 0 between equal points."""
+        """Squared distances (k, n) of X (k, d) to `others` (n, d), the shorter way in periodic variables; 0 between equal points."""
         even = ~self.wraps
         squares = cdist(X[:, even], others[:, even], "sqeuclidean") if even.any() else np.zeros((len(X), len(others)))
         if self.wraps.any():
@@ -68,12 +66,12 @@ class Box:
         return squares
 
     def stop_outward(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """`step` (..., d) without the components that push a point on a bound out of the box."""
+        """The step (..., d) without the components that lead from a bound out of the box."""
         outward = ((X <= 0.0) & (step < 0.0)) | ((X >= 1.0) & (step > 0.0))
         return np.where(outward & ~self.wraps, 0.0, step)
 
     def reach(self, X: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """The largest fraction (...,), at most 1, of `step` (..., d) that stays in the box; periodic variables do not shorten it."""
+        """Largest fraction (...,), at most 1, of the step (..., d) that stays in the box; periodic variables do not limit it."""
         bound = np.where(step > 0.0, 1.0 - X, X)
         size = np.abs(step)
         limited = (size > 0.0) & ~self.wraps
@@ -81,11 +79,6 @@ class Box:
         return np.clip(fraction.min(axis=-1, initial=1.0), 0.0, 1.0)
 
     def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """A Latin hypercube of `count` points, (count, d) (McKay, Beckman and Conover 1979)."""
+        """Latin hypercube of `count` points, (count, d) (McKay, Beckman and Conover 1979)."""
         strata = rng.permuted(np.tile(np.arange(count), (len(self.lower), 1)), axis=1).T
         return (strata + rng.random(strata.shape)) / count
-
-
-def box_of(evaluator: Evaluator) -> Box:
-    """The box of an evaluator's free variables."""
-    return Box(evaluator.lower, evaluator.upper, evaluator.period > 0.0)

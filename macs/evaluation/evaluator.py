@@ -1,7 +1,7 @@
-"""The contract of what can be searched: candidates in, evaluated points out, every evaluation and solve counted.
+"""Contract of an evaluator: it evaluates candidates for a search, and counts evaluations and gradient solves.
 
-A search has full vectors. Of their D entries it alters only the *free* ones (d of them). The others belong to the evaluator: for a
-trajectory, the states from which the next inner solve starts. A black box has none.
+A search works with full vectors of D entries, and changes only d of them, the *free* ones. The others belong to the evaluator: for a
+trajectory, the states from which the next inner solve starts. A black box has no others.
 """
 
 from __future__ import annotations
@@ -14,31 +14,35 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import short_repr
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+
+from ..io.text import counted
+from .box import Box
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Evaluation:
-    """A batch of k evaluated points.
+    """Batch of k evaluated points.
 
     Attributes
     ----------
     Z : array (k, D)
-        Full vectors, in the user's units, as they came back: the nearest feasible points, where there was something to make feasible.
+        Full vectors, in the user's units, after the evaluation: for trajectories, the nearest feasible points that were found.
     F : array (k, m)
         Objectives, all minimised. NaN in a row whose evaluation failed.
     violation : array (k,)
-        Largest scaled residual of any constraint, 0 where there is none, infinite where the evaluation failed.
+        Largest scaled residual of any constraint; 0 without constraints, infinite if the evaluation failed.
     status : array (k,) of str
         "converged" (feasible within the tolerance), "infeasible", "failed" or "timeout".
     clocked : bool
-        Whether a clock ended any of the work: the same vectors need not give the same batch again.
+        Whether a time limit ended any of the work: then the same vectors may give other results next time.
     fallbacks : int
-        Vectors that a faster inner level left to a slower one.
+        Number of vectors that the fast inner level passed to the slow one.
     itemise : callable, optional
-        Returns `violations`; called only where they are needed.
+        Function that returns `violations`; called only when they are needed.
     """
 
     Z: np.ndarray
@@ -51,8 +55,12 @@ class Evaluation:
 
     @property
     def violations(self) -> np.ndarray:
-        """Largest scaled residual of each constraint (k, c), at least 0; one column (k, 1) where constraints are not told apart."""
+        """Largest scaled residual of each constraint (k, c), at least 0; a single column (k, 1) if only the largest of all is known."""
         return self.violation[:, None] if self.itemise is None else self.itemise()
+
+    def __repr__(self) -> str:
+        by_status = ", ".join(f"{number} {status}" for status, number in Counter(self.status.tolist()).items())
+        return f"<Evaluation: {counted(len(self.F), 'point')}{by_status and f'; {by_status}'}>"
 
 
 @dataclass
@@ -63,11 +71,11 @@ class Counts:
     ----------
     evaluations, inner_iterations, gradient_solves : int
     fallbacks : int
-        Candidates that a faster inner level left to a slower one.
+        Number of candidates that the fast inner level passed to the slow one.
     failures : Counter
-        Evaluations and gradient solves that did not converge, by status.
+        Number of evaluations and gradient solves that did not converge, by status.
     clocked : int
-        Batches and solves that a clock, not a count, ended early.
+        Number of batches and solves that a time limit ended early.
     """
 
     evaluations: int = 0
@@ -77,8 +85,10 @@ class Counts:
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
 
+    __repr__ = short_repr
+
     def add_solves(self, count: int, status: Iterable[str], iterations: int, clocked: int) -> None:
-        """Count gradient solves that ended with these statuses."""
+        """Count gradient solves with their statuses and iterations; `clocked` of them were ended early by a time limit."""
         self.gradient_solves += count
         self.failures.update(one for one in status if one != CONVERGED)
         self.inner_iterations += iterations
@@ -86,27 +96,28 @@ class Counts:
 
 
 class Evaluator(ABC):
-    """A problem whose points can be evaluated.
+    """Problem whose points can be evaluated.
 
-    An implementation sets the attributes below and defines `first_guess` and `_evaluate`; this class counts.
+    An implementation sets the attributes below and defines `first_guess` and `_evaluate`; with gradients, also `_descend`. Counting is done
+    here.
 
     Attributes
     ----------
     free : array (d,) of int
-        Indices, in the full vector, of the variables that a search may alter.
+        Indices, in the full vector, of the variables that a search may change.
     lower, upper : arrays (d,)
         Finite bounds of the free variables, in the user's units; `lower < upper`.
     period : array (d,)
-        Length of the period of a free variable that wraps around at its bounds, which are one period wide; 0 where it does not.
+        Period of a periodic free variable, whose bounds are one period wide; 0 for other variables.
     tolerance : float
         A point whose violation is at most this is feasible.
     has_gradients : bool
         Whether `descend` works.
     m_known : int or None
-        Number of objectives; None as long as only an evaluation could tell.
+        Number of objectives; None if it is not known before the first evaluation.
     counts : Counts
     before_batch : callable
-        Called without arguments before each batch; it may end the search by raising an exception.
+        Function without arguments that is called before each batch; it ends the search by raising an exception.
     """
 
     free: np.ndarray
@@ -119,12 +130,22 @@ class Evaluator(ABC):
     counts: Counts
     before_batch: Callable[[], Any] = staticmethod(lambda: None)
 
+    @property
+    def box(self) -> Box:
+        """Box of the free variables."""
+        return Box(self.lower, self.upper, self.period > 0.0)
+
     def resume(self, counts: Counts, m: int) -> None:
-        """Continue the counts of an earlier run, in which there were m objectives."""
+        """Continue with the counts of an earlier run, which had m objectives."""
         self.counts = counts
 
+    def check_budget(self, budget: int) -> None:
+        """Raise ValueError if no evaluation is left in the budget."""
+        if budget <= self.counts.evaluations:
+            raise ValueError(f"evaluations: the budget of {budget} leaves none")
+
     def opening(self, candidates: np.ndarray) -> np.ndarray:
-        """First candidates (k, d) of a search, from candidates (k, d) drawn uniformly from the box; by default these."""
+        """First candidates (k, d) of a search, made from candidates (k, d) drawn uniformly from the box; by default the same."""
         return candidates
 
     @abstractmethod
@@ -133,10 +154,10 @@ class Evaluator(ABC):
 
     @abstractmethod
     def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
-        """Evaluate full vectors (k, D), k > 0; also returns the inner iterations spent."""
+        """The evaluation of full vectors (k, D), k > 0, and the number of inner iterations."""
 
     def evaluate(self, Z: np.ndarray) -> Evaluation:
-        """Evaluate full vectors (k, D): their free entries are the candidates, the others what to start from. Each row counts as one."""
+        """Evaluate full vectors (k, D): free entries are the candidates, the inner solve starts from the others. Counts k evaluations."""
         self.before_batch()
         evaluation, iterations = self._evaluate(Z)
         self.counts.evaluations += len(Z)
@@ -147,22 +168,24 @@ class Evaluator(ABC):
         return evaluation
 
     def descend(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None = None) -> Evaluation:
-        """Gradient solves, each to the least alpha with F - reference <= alpha weights; they are counted beside evaluations.
+        """Results of k gradient solves: each minimises alpha subject to F - reference <= alpha weights (Pascoletti and Serafini 1984).
+
+        Gradient solves are counted separately from evaluations.
 
         Parameters
         ----------
         starts : array (k, D)
-            Full vectors to begin with.
+            Full vectors to start from.
         references, weights : arrays (k, m)
-            Weight 0: a hard limit at the reference. Reference +inf: the objective does not matter.
+            Weight 0: the reference is a hard limit. Reference +inf: the objective is ignored.
         margins : array (k, r), optional
-            By how much, in their scales, the rows of the constraints are to stay inside their limits. Default: not at all.
+            Distances, in scales, that the rows of the constraints keep from their limits. Default: 0.
 
         Returns
         -------
         Evaluation
-            "converged" where a local optimum was found that is feasible. If the work is to end early (`transcription.stopping`), only of
-            the first rows, which were solved by then; only these are counted.
+            Status "converged" for a feasible local optimum. If asked to end early (`transcription.stopping`), only the rows solved until
+            then are returned and counted.
         """
         self.before_batch()
         found, iterations = self._descend(starts, references, weights, margins)
@@ -172,5 +195,5 @@ class Evaluator(ABC):
     def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
     ) -> tuple[Evaluation, int]:
-        """Solve the rows in order, where there are gradients, until the work is to end; also returns the iterations spent."""
+        """The results of the rows in their order, until asked to end early, and the number of iterations."""
         raise NotImplementedError(f"{type(self).__name__} has no gradients")

@@ -1,1 +1,1 @@
-"""Fronts as data, and functions of them: tables, files, pictures, verification."""
+"""Data of fronts, and functions of them: tables, files, figures, simulation, verification."""

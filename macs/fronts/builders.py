@@ -1,4 +1,4 @@
-"""Points from vectors of an NLP, and from the archive of a search."""
+"""Points made from vectors of an NLP, and from the archive of a search."""
 
 from __future__ import annotations
 
@@ -28,40 +28,40 @@ def trajectory_points(
     *,
     certified: bool,
 ) -> Points:
-    """The trajectories of an archive, `certified` with their optimality; objectives count in the ranges of the archive there."""
+    """Points with the trajectories of an archive; if `certified`, with their optimality, for objectives in ranges of the archive."""
     if len(archive):
         found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
         return vectors_points(nlp, archive.Z, solver, stats, optimality=found)
     nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
-    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_misses(nearest)}", closest=nearest)
+    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
 
 
 def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
-    """The optimality of vectors (k, n), objectives counting in `ranges` (m,); None of those for which the work is to end early."""
+    """Optimality of vectors (k, n), for objectives in `ranges` (m,); None for those left when the work is asked to end early."""
     return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
 
 
 def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:
-    """Points from vectors (k, n) of an NLP; `more` is for `Points`.
+    """Points from vectors (k, n) of an NLP; `more` are further arguments of `Points`.
 
-    Objectives and violations are computed anew from the NLP; so is the status, unless it is given.
+    Objectives and violations are evaluated by the NLP, and so is the status, unless it is given.
     """
-    # Without any point, too, the variables are recorded.
+    # The variables are recorded even without points.
     given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
     return Points(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
 
 
-def nearest_misses(nearest: Point) -> str:
-    """Which constraint the least infeasible point violates most, and by how much."""
+def nearest_violation(nearest: Point) -> str:
+    """Text with the constraint that the least infeasible point violates most, and its violation."""
     label, amount = max(nearest.violations.items(), key=lambda item: item[1])
-    return f"the nearest misses {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
+    return f"the nearest violates {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
-    """Columns of `Points` for vectors (k, n) of one NLP: k entries each."""
+    """Columns of `Points`, of k entries each, for vectors (k, n) of one NLP."""
     k = len(Z)
     F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
-    flights = [nlp.unpack(z) for z in Z]
+    trajectories = [nlp.unpack(z) for z in Z]
     return {
         "F": F,
         "decision": Z,
@@ -69,8 +69,8 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
         "status": _status(violation, tolerance),
         "variables": [nlp.variables] * k,
         "violations": [nlp.violations(z) for z in Z],
-        "trajectories": flights,
-        "excursions": [excursions(nlp.problem, flight) for flight in flights],
+        "trajectories": trajectories,
+        "excursions": [excursions(nlp.problem, trajectory) for trajectory in trajectories],
         "transcriptions": [nlp.transcription.to_dict()] * k,
     }
 
@@ -83,7 +83,7 @@ def black_box_points(
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
 ) -> Points:
-    """The archive of a black box as points."""
+    """Points with the archive of a black box."""
 
     def of(points: Archive, **more: Any) -> Points:
         return Points(
@@ -101,7 +101,7 @@ def black_box_points(
     if len(archive) or not len(closest):
         return of(archive, message="" if len(archive) else _nothing(stats))
     nearest, violation = of(closest)[0], closest.violation[0]
-    why = f"the nearest violates the constraints by {violation:.2g}" if np.isfinite(violation) else "every one of them failed"
+    why = f"the nearest violates the constraints by {violation:.2g}" if np.isfinite(violation) else "all of them failed"
     return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
 
 
@@ -110,4 +110,4 @@ def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
-    return f"nothing feasible in {counted(stats['evaluations'], 'evaluation')}"
+    return f"no feasible point in {counted(stats['evaluations'], 'evaluation')}"

@@ -1,4 +1,4 @@
-"""Picture of one trajectory: its states, controls and path constraints over time."""
+"""Figure of one trajectory: states, controls and path constraints over time."""
 
 from __future__ import annotations
 
@@ -16,31 +16,27 @@ if TYPE_CHECKING:
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
 DENSE = np.linspace(-1.0, 1.0, 41)
-"""Where a polynomial is drawn, on each element."""
+"""Points in [-1, 1] of each element at which its polynomials are drawn."""
 
 
-def draw_flight(flight: Trajectory, title: str, figure: Any = None) -> np.ndarray:
-    """Draw a trajectory: a panel for each state, then control, then path constraint, all phases on one axis of time.
+def draw_flight(trajectory: Trajectory, title: str, figure: Any = None) -> np.ndarray:
+    """Axes, one for each panel: a panel for each state, control and path constraint, with all phases on one time axis.
 
-    Lines are the method's own polynomials, element by element, so that jumps show; dots are its nodes; dashes are bounds, where they are
-    near enough to be drawn without flattening what is between them. Panels name them always.
+    Lines are the polynomials of the transcription on each element, so that jumps are visible; dots are its nodes. Dashed lines are bounds,
+    if they are not too far from the values; the text above each panel always gives them.
 
     Parameters
     ----------
-    flight : Trajectory
+    trajectory : Trajectory
     title : str
-        Stands above the panels.
+        Text above the panels.
     figure : matplotlib Figure, optional
-        An empty one to draw into.
-
-    Returns
-    -------
-    array of Axes, one for each panel
+        Empty figure to draw into. Default: a new one.
     """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        panels = quantities(flight)
+        panels = quantities(trajectory)
         columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
         rows = -(-len(panels) // columns)
         if figure is None:
@@ -49,25 +45,25 @@ def draw_flight(flight: Trajectory, title: str, figure: Any = None) -> np.ndarra
             figure.set_size_inches(3.6 * columns + 0.4, 1.75 * rows + 0.6)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for ax, (name, kind) in zip(grid, panels, strict=False):
-            _draw_panel(ax, flight, name, kind)
+            _draw_panel(ax, trajectory, name, kind)
         for ax in grid[len(panels) :]:
             ax.remove()
-        _finish(figure, grid[: len(panels)], columns, flight, title)
+        _finish(figure, grid[: len(panels)], columns, trajectory, title)
     return grid[: len(panels)]
 
 
-def quantities(flight: Trajectory) -> list[tuple[str, str]]:
-    """Names of all states, then controls, then path constraints, each once, and what they are."""
+def quantities(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Names of all states, then controls, then path constraints, each once, with their kind: "state", "control" or "path"."""
     kinds = {
-        "state": [v.name for phase in flight.phases for v in phase.state_variables],
-        "control": [v.name for phase in flight.phases for v in phase.control_variables],
-        "path": [limit.name for phase in flight.phases for limit in phase.path_limits],
+        "state": [v.name for phase in trajectory.phases for v in phase.state_variables],
+        "control": [v.name for phase in trajectory.phases for v in phase.control_variables],
+        "path": [limit.name for phase in trajectory.phases for limit in phase.path_limits],
     }
     return [(name, kind) for kind, names in kinds.items() for name in dict.fromkeys(names)]
 
 
 def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of a state or control along every element, with gaps (NaN) between them; of a path constraint at the nodes."""
+    """Times and values of a state or control along every element, with gaps (NaN) between elements; of a path constraint at the nodes."""
     for variables, on_element in ((phase.state_variables, phase.state.on_element), (phase.control_variables, phase.controls_on)):
         for index, variable in enumerate(variables):
             if variable.name == name:
@@ -75,10 +71,10 @@ def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
     return phase.time, phase[name]
 
 
-def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
+def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str) -> None:
     drawn: list[np.ndarray] = []
     limits: list[tuple[PhaseTrajectory, Variable | Limit]] = []
-    for k, phase in enumerate(flight.phases):
+    for k, phase in enumerate(trajectory.phases):
         owners: dict[str, Sequence[Variable | Limit]] = {
             "state": phase.state_variables,
             "control": phase.control_variables,
@@ -103,7 +99,7 @@ def _draw_panel(ax: Any, flight: Trajectory, name: str, kind: str) -> None:
 def _dense(
     edges: np.ndarray, on_element: Callable[[int, np.ndarray], np.ndarray], index: int, period: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values along every element, with a gap (NaN) where one ends and the next begins, and where a periodic value wraps."""
+    """Times and values along every element, with gaps (NaN) between elements and where a periodic value wraps around."""
     gap = np.array([np.nan])
     times: list[np.ndarray] = []
     values: list[np.ndarray] = []
@@ -117,7 +113,7 @@ def _dense(
 
 
 def _bounds(ax: Any, values: np.ndarray, limits: list[tuple[PhaseTrajectory, Variable | Limit]]) -> None:
-    """Dashes at the bounds that are within one range of the values."""
+    """Draw dashed lines at the bounds that are at most one range of the values away from them."""
     values = values[np.isfinite(values)]
     low, high = (values.min(), values.max()) if len(values) else (0.0, 1.0)
     reach = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
@@ -135,7 +131,7 @@ def _bounds(ax: Any, values: np.ndarray, limits: list[tuple[PhaseTrajectory, Var
 
 
 def _range(limit: Variable | Limit) -> str:
-    """The bounds in words of mathematics: [0, 40], or the one that is finite."""
+    """The bounds as text: in [0, 40], = 3, or the finite one alone."""
     low, high = (f"{value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}") for value in (limit.lower, limit.upper))
     if np.isinf(limit.lower):
         return f"\N{LESS-THAN OR EQUAL TO} {high}"
@@ -144,20 +140,20 @@ def _range(limit: Variable | Limit) -> str:
     return f"= {low}" if limit.lower == limit.upper else f"in [{low}, {high}]"
 
 
-def _finish(figure: Any, axes: np.ndarray, columns: int, flight: Trajectory, title: str) -> None:
-    """Times, the borders and names of the phases, and the title."""
-    unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flight.phases))
+def _finish(figure: Any, axes: np.ndarray, columns: int, trajectory: Trajectory, title: str) -> None:
+    """Draw the time axis, the boundaries and names of the phases, and the title."""
+    unit = " | ".join(dict.fromkeys(phase.time_unit for phase in trajectory.phases))
     for i, ax in enumerate(axes):
-        for phase in flight.phases[1:]:
+        for phase in trajectory.phases[1:]:
             ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
         ax.tick_params(labelbottom=i >= len(axes) - columns)
     figure.supxlabel(label("time", unit), fontsize=9)
     ax = axes[0]
-    first, last = flight.phases[0].t0, max(phase.tf for phase in flight.phases)
+    first, last = trajectory.phases[0].t0, max(phase.tf for phase in trajectory.phases)
     ax.set_xlim(first - 0.015 * (last - first), last + 0.015 * (last - first))
-    if len(flight) > 1:
+    if len(trajectory) > 1:
         from matplotlib.lines import Line2D
 
-        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(flight)]
+        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(trajectory)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
     figure.suptitle(title, fontsize=9, x=0.01, ha="left")

@@ -1,4 +1,4 @@
-"""Drawing fronts. Works without a display: pyplot is only asked for a figure when the caller gives no Axes."""
+"""Figures of fronts. They need no display: pyplot is used only if the caller gives no Axes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def save_picture(what: Points | Point, path: str | PathLike[str]) -> None:
-    """Draw a front, or the flight of a point, into a file whose suffix says its kind."""
+    """Draw a front, or the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
     figure = blank_figure()
@@ -43,20 +43,16 @@ def _size(front: Points) -> tuple[float, float]:
 
 
 def draw_front(front: Points, ax: Axes | None = None) -> Axes:
-    """Draw the objectives of a front.
+    """Axes with the objectives of a front.
 
-    One objective: against the point's number. Two: a scatter. Three: the third as colour (or in space, on 3-D Axes). More: parallel
-    coordinates. Points that did not converge are hollow.
+    One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
+    Axes), more as parallel coordinates. Points that did not converge are hollow.
 
     Parameters
     ----------
     front : Points
     ax : Axes, optional
-        Where to draw; a new figure's otherwise.
-
-    Returns
-    -------
-    Axes
+        Axes to draw into. Default: those of a new figure.
     """
     import matplotlib
 
@@ -102,7 +98,7 @@ def _scatter(front: Points, ax: Any) -> None:
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:
-    """Ring the best point of each of two objectives, and name them in a legend."""
+    """Mark the best point of each of two objectives, with a legend."""
     F = np.where((front.status == "converged")[:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
@@ -114,7 +110,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
 
 
 def _parallel(front: Points, ax: Any) -> None:
-    """One upright axis for each objective, better at the top, a line for each point, coloured by the first objective."""
+    """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point."""
     import matplotlib
 
     F, values = front.F, front.objectives

@@ -1,4 +1,4 @@
-"""Several fronts of one problem as one: the union of their points, without the dominated ones."""
+"""Merge of several fronts of one problem: the union of their points, without dominated ones."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.dominance import nondominated
+from .builders import nearest_violation
 from .points import Point, Points
 from .provenance import merged_stats
 
@@ -33,12 +34,13 @@ def merge(fronts: Sequence[Points]) -> Points:
 def _nearest(closest: Point | None) -> str:
     """The message of a merged front without a feasible point."""
     if closest is None or not closest.violations:
-        return "nothing feasible"
-    label, amount = max(closest.violations.items(), key=lambda item: item[1])
-    return f"nothing feasible; the nearest violates {label} by {amount:.2g} of its scale"
+        return "no feasible point"
+    return f"no feasible point; {nearest_violation(closest)}"
 
 
 def _check(one: Points, other: Points) -> None:
+    """Raise ValueError if two fronts are of different problems."""
+
     def problem(front: Points) -> str:
         return f"'{front.source.name}'" if front.source else "a black box"
 
@@ -63,7 +65,7 @@ def _closest(fronts: Sequence[Points]) -> Point | None:
 
 
 def _solver(fronts: Sequence[Points]) -> dict[str, Any]:
-    """The solver that made all of them; else the names of those that did."""
+    """The common solver of the fronts; else the names of all their solvers."""
     first = fronts[0].solver
     if all(front.solver == first for front in fronts):
         return first

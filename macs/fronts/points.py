@@ -1,4 +1,4 @@
-"""Points of a front as columns, and one point as a view of a row. Nothing here knows of files, tables, pictures or solvers."""
+"""Points of a front as columns, and one point as a view of a row; independent of files, tables, figures and solvers."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
+from ..io.text import counted
 from .decision_table import Decisions
 from .provenance import STATS, Source, versions
 
 
 class Points:
-    """Points of one problem as columns, one entry a point.
+    """Points of one problem as columns with one entry for each point.
 
     Parameters
     ----------
@@ -29,30 +30,31 @@ class Points:
     goals : tuple of Objective
         The m objectives as the user stated them.
     variables : tuple of Variable, or n of them
-        The entries of the decision vectors: the same for all points, or for each its own.
+        Variables of the decision vectors: the same for all points, or one tuple for each point.
     violations : n dicts, optional
         Scaled residual by constraint.
     trajectories : n Trajectories, optional
-        None for black boxes; an entry may be None where a point has none.
+        None for black boxes, and for a point without a trajectory.
     excursions : n dicts or None, optional
-        By how much, scaled, a quantity leaves its bounds between nodes, by name.
+        Excess, scaled, of quantities that leave their bounds between nodes, by name.
     optimality : n floats or None, optional
+        Scaled residual of the conditions of Pareto optimality.
     notes : n str, optional
-        Remarks, such as why a mesh could not be refined enough.
+        Remarks, for example why a mesh could not be refined enough.
     transcriptions : dict, or n of them, optional
-        `{"method": ..., "settings": {...}}`: how the problem was transcribed for all points, or for each; None for black boxes.
+        `{"method": ..., "settings": {...}}`: the transcription of all points, or one for each; None for black boxes.
     problem : CompiledProblem or Source, optional
         None for black boxes.
     solver : dict, optional
         `{"name": ..., "settings": {...}}`.
     stats : dict, optional
-        What the points cost; missing entries of `STATS` are added.
+        Costs of the points; missing entries of `STATS` are added.
     message : str
-        Of an empty front: why, with the most violated constraint.
+        For an empty front: the reason, with the most violated constraint.
     closest : Point, optional
-        The least infeasible point of a search that found nothing feasible.
+        The least infeasible point of a search that found no feasible one.
     sort : bool
-        By the first objective, in the user's value; else the order given is kept.
+        Sort by the first objective, in the user's value; otherwise keep the order.
 
     Attributes
     ----------
@@ -62,13 +64,13 @@ class Points:
     goals, solver, stats, message, source
         As above; `source` identifies the problem, None for a black box.
     variables : tuple of Variable (D)
-        Every variable that any point has. Those of one point, in the order of its decision vector, are `Point.variables`.
+        All variables of all points. Those of one point, in the order of its decision vector, are `Point.variables`.
     decision : array (n, D)
-        A column for each of `variables`; NaN where a point, on a mesh of its own, has no such variable. `Point.decision` is without these.
+        A column for each of `variables`; NaN if the point, on a mesh of its own, does not have the variable. `Point.decision` has no NaN.
     """
 
     ROWS = ("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions")
-    """The columns that have one entry a point, beside the decision vectors."""
+    """Columns with one entry for each point, besides the decision vectors."""
 
     def __init__(
         self,
@@ -148,38 +150,38 @@ class Points:
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """See the class."""
+        """All variables of all points, (D,)."""
         return self._decisions.variables
 
     @property
     def decision(self) -> np.ndarray:
-        """See the class."""
+        """Decision vectors (n, D), a column for each of `variables`; NaN if the point does not have the variable."""
         return self._decisions.values
 
     @property
     def places(self) -> tuple[np.ndarray, ...]:
-        """For each point, the columns of `decision` that its own vector consists of, in its order."""
+        """For each point, the columns of `decision` that form its own vector, in the order of that vector."""
         return self._decisions.places
 
     @property
     def closest(self) -> Point | None:
-        """The least infeasible point. None only if not one evaluation gave a number."""
+        """The least infeasible point; None only if all evaluations failed."""
         if self._closest is not None or not len(self):
             return self._closest
         return self[int(np.argmin(np.where(np.isnan(self.violation), np.inf, self.violation)))]
 
     @property
     def problem(self) -> CompiledProblem | None:
-        """The problem, if it is known; points from a file have it after `compiled` has loaded it."""
+        """The problem, if it is known; for points from a file, after `compiled` has loaded it."""
         return self._problem
 
     def compiled(self) -> CompiledProblem:
-        """The problem: the one that the points were made with, else the one that their address loads (which runs the code there).
+        """The problem of the points; for points from a file it is loaded from its address, which runs the code there.
 
         Raises
         ------
         ValueError
-            For a black box, and where the problem is not found or is another one.
+            For a black box, and if the problem is not found or is another one.
         """
         if self.source is None:
             raise ValueError("this front is of a black box: there are no dynamics to simulate")
@@ -190,6 +192,10 @@ class Points:
     def __len__(self) -> int:
         return len(self.F)
 
+    def __repr__(self) -> str:
+        name = self.source.name if self.source else "black box"
+        return f"<{type(self).__name__}: {name}: {counted(len(self), 'point')}, {counted(len(self.goals), 'objective')}>"
+
     def __iter__(self) -> Iterator[Point]:
         return (Point(self, i) for i in range(len(self)))
 
@@ -198,7 +204,7 @@ class Points:
     @overload
     def __getitem__(self, key: slice | Sequence[int] | np.ndarray) -> Self: ...
     def __getitem__(self, key: Any) -> Point | Self:
-        """A Point for a number; points, in that order, for a slice, a list of numbers or a mask."""
+        """A `Point` for a number; points of the same class for a slice, a list of numbers or a mask."""
         if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
             if not -len(self) <= key < len(self):
                 raise IndexError(f"point {key} of a front of {len(self)}" + (f": {self.message}" if self.message and not len(self) else ""))
@@ -206,7 +212,7 @@ class Points:
         return self.take(np.arange(len(self))[key])
 
     def take(self, rows: Sequence[int] | np.ndarray) -> Self:
-        """Some of the points, in the order given; all that is not a column stays."""
+        """The points of `rows`, in that order; all other data are unchanged."""
         index = np.asarray(rows, dtype=int)
         taken = self._copy()
         taken._decisions = self._decisions.take(index)
@@ -221,7 +227,7 @@ class Points:
         Raises
         ------
         ValueError
-            If a column has not one entry for each point.
+            If a column does not have one entry for each point.
         """
         changed = self._copy()
         for name, value in changes.items():
@@ -244,7 +250,7 @@ class Points:
 
     @classmethod
     def concatenate(cls, several: Sequence[Points]) -> Self:
-        """The points of several sets, one after the other; all that is not a column is that of the first set whose problem is known."""
+        """The points of several sets, one after the other; all other data are those of the first set whose problem is known."""
         known = next((points for points in several if points.problem is not None), several[0])
         all_rows: dict[str, Any] = {name: [entry for points in several for entry in getattr(points, name)] for name in cls.ROWS}
         every = [point for points in several for point in points]
@@ -269,7 +275,7 @@ class Points:
 
 
 class Point:
-    """One point of a front: a trajectory, or one input of a black box. It keeps its front alive."""
+    """One point of a front: a trajectory, or one input of a black box. It refers to the data of its front."""
 
     __slots__ = ("_points", "index")
 
@@ -278,7 +284,7 @@ class Point:
         self.index = index
 
     def alone(self) -> Points:
-        """The front of this point alone."""
+        """A set of this point alone."""
         return self._points.take([self.index])
 
     @property
@@ -288,7 +294,7 @@ class Point:
 
     @property
     def objectives(self) -> dict[str, float]:
-        """By name, in the user's units and senses."""
+        """Objectives by name, in the user's units and senses."""
         return dict(zip(self._points.names, self._points.objectives[self.index].tolist(), strict=True))
 
     @property
@@ -303,7 +309,7 @@ class Point:
 
     @property
     def violations(self) -> dict[str, float]:
-        """Scaled residual by constraint; empty where none was recorded."""
+        """Scaled residual by constraint; empty if none was recorded."""
         return dict(self._points.violations[self.index] or {})
 
     @property
@@ -313,61 +319,61 @@ class Point:
 
     @property
     def decision(self) -> np.ndarray:
-        """The decision vector, in the user's units; `variables` names its entries."""
+        """Decision vector, in the user's units; `variables` are its entries."""
         return self._points._decisions.row(self.index)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """The variables that are the entries of the decision vector."""
+        """Variables of the decision vector, in its order."""
         return self._points._decisions.variables_of(self.index)
 
     @property
     def transcription(self) -> dict[str, Any] | None:
-        """The transcription of this point, as `Transcription.to_dict` has it. None for a black box."""
+        """Transcription of this point, as `Transcription.to_dict` gives it; None for a black box."""
         return self._points.transcriptions[self.index]
 
     @property
     def note(self) -> str:
-        """A remark on the point; mostly empty."""
+        """Remark on the point; usually empty."""
         return self._points.notes[self.index]
 
     @property
     def source(self) -> Source | None:
-        """The identity of the problem. None for a black box."""
+        """Identity of the problem; None for a black box."""
         return self._points.source
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Static decision variables by name. Of a black box, these are all there are."""
+        """Static decision variables by name; for a black box, all its variables."""
         if self._points.source is None:
             return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The trajectory. None for a black box."""
+        """The trajectory; None for a black box."""
         return self._points.trajectories[self.index]
 
     @property
     def optimality(self) -> float | None:
-        """Scaled residual of the conditions of Pareto optimality; None where it was not computed, as after Ctrl-C or a time limit."""
+        """Scaled residual of the conditions of Pareto optimality; None if it was not computed, for example after Ctrl-C or a time limit."""
         return self._points.optimality[self.index]
 
     @property
     def excursions(self) -> dict[str, float] | None:
-        """How far, scaled, a control, path constraint or state leaves its bounds *between* nodes, by name; None where unknown."""
+        """Excess, scaled, of controls, path constraints and states that leave their bounds *between* nodes, by name; None if unknown."""
         found = self._points.excursions[self.index]
         return None if found is None else dict(found)
 
     def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation:
-        """Integrate the dynamics under this point's own controls by an integrator that is independent of the transcription.
+        """Simulation of this point: its dynamics under its controls, by an integrator that is independent of the transcription.
 
         Parameters
         ----------
         rtol, atol : float
             Tolerances of the integrator; `atol` is relative to the scales of the states.
         method : str
-            Any of `scipy.integrate.solve_ivp`.
+            Method of `scipy.integrate.solve_ivp`.
 
         Returns
         -------
@@ -377,7 +383,7 @@ class Point:
         Raises
         ------
         ValueError
-            If there is nothing to simulate: a black box, or a saved front whose problem cannot be found.
+            For a black box, a point without a trajectory, and a saved front whose problem cannot be found.
         """
         problem = self._points.compiled()
         if self.trajectory is None:
@@ -385,7 +391,7 @@ class Point:
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
 
     def plot(self, figure: Any = None) -> np.ndarray:
-        """Draw states, controls and path constraints over time; returns the array of Axes, one for each of them."""
+        """Axes with the states, controls and path constraints over time, one for each of them."""
         from .flight_plot import draw_flight
 
         if self.trajectory is None:
@@ -399,7 +405,7 @@ class Point:
         return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
 
     def __repr__(self) -> str:
-        return f"<Point: {self.title}; violation {self.violation:.1e}, {self.status}>"
+        return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"
 
 
 def frozen(array: Any) -> np.ndarray:
@@ -410,17 +416,17 @@ def frozen(array: Any) -> np.ndarray:
 
 
 def by_first(objectives: np.ndarray) -> np.ndarray:
-    """Rows in the order of the first objective, ties by the next ones; NaN last."""
+    """Rows sorted by the first objective, ties by the next ones; NaN last."""
     return np.lexsort(objectives.T[::-1])
 
 
 def number(value: Any) -> float | None:
-    """None for None and for NaN."""
+    """The value as a float; None for None and for NaN."""
     return None if value is None or np.isnan(value) else float(value)
 
 
 def column(values: Any, n: int, name: str) -> Any:
-    """`values` if there are n of them; n times None for None."""
+    """The `values`, which must be n; n times None for None."""
     if values is None:
         return [None] * n
     if len(values) != n:
@@ -429,7 +435,7 @@ def column(values: Any, n: int, name: str) -> Any:
 
 
 def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """Equal dicts as one object."""
+    """The dicts, with equal ones as one object."""
     distinct: list[dict[str, Any]] = []
     found: list[dict[str, Any] | None] = []
     for given in dicts:

@@ -1,4 +1,4 @@
-"""Re-evaluates points by independent simulation, optionally under other problem data."""
+"""Points re-evaluated by independent simulation, optionally with other problem data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def simulated(front: Points, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Points:
-    """The front with objectives and violations as simulated, in the same order; see `Front.simulate`."""
+    """The points in the same order with simulated objectives and violations; see `Front.simulate`."""
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
     known = front.compiled()
@@ -42,8 +42,7 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
 
 
 def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
-    """By how much, scaled, what a trajectory decides is outside the bounds of a problem, which need not be its own: times, initial states,
-    controls at the nodes, parameters."""
+    """Excess, scaled, of a trajectory's times, initial states, controls at the nodes and parameters over the bounds of a problem."""
     found: dict[str, float] = {}
 
     def look(values: Any, limits: Sequence[Variable | Limit], where: str) -> None:
@@ -51,33 +50,33 @@ def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
         found.update({f"{where}{v.name}": float(amount) for v, amount in zip(limits, amounts, strict=True)})
 
     for phase in problem.phases:
-        flight = planned[phase.name]
+        trajectory = planned[phase.name]
         duration = Limit("duration", *phase.duration, phase.tf.scale)
-        look([flight.t0, flight.tf, flight.tf - flight.t0], [phase.t0, phase.tf, duration], f"bounds of {phase.name}.")
+        look([trajectory.t0, trajectory.tf, trajectory.tf - trajectory.t0], [phase.t0, phase.tf, duration], f"bounds of {phase.name}.")
         starts = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.initial, strict=True)]
-        look(flight.edge_states[0], starts, f"initial value of {phase.name}.")
+        look(trajectory.edge_states[0], starts, f"initial value of {phase.name}.")
         free = [k for k, v in enumerate(phase.controls) if not v.period]
-        look(flight.controls[:, free], [phase.controls[k] for k in free], f"bounds of {phase.name}.")
+        look(trajectory.controls[:, free], [phase.controls[k] for k in free], f"bounds of {phase.name}.")
     look([planned.parameters[v.name] for v in problem.parameters], problem.parameters, "bounds of ")
     return found
 
 
 def judged(front: Points, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Points:
-    """The points with other objectives (n, m), all minimised, and violations (n,); a point converged if it violates nothing by more."""
+    """The points with other objectives F (n, m) and violations (n,), and with their status for this tolerance."""
     status = np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE)
     stats = {**front.stats, "tolerance": float(tolerance)}
     return front.replace(F=F, violation=violation, status=status, optimality=[None] * len(front), stats=stats)
 
 
 def best(front: Points) -> np.ndarray:
-    """Which points (k,) converged and are not dominated by others that did, by the first objective."""
+    """Rows (k,) of the points that converged and are non-dominated among these, sorted by the first objective."""
     converged = np.flatnonzero(front.status == CONVERGED)
     kept = converged[nondominated(front.F[converged])]
     return kept[np.argsort(front.objectives[kept, 0], kind="stable")]
 
 
 def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
-    """Raise ValueError unless trajectories of one problem can be simulated under the other."""
+    """Raise ValueError unless trajectories of the known problem can be simulated with the other."""
 
     def parts(problem: CompiledProblem) -> dict[str, list[str]]:
         named = {
@@ -93,4 +92,4 @@ def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
     for what, names in ours.items():
         if theirs.get(what) != names:
             there, here = (", ".join(listed) or "none" for listed in (theirs.get(what, []), names))
-            raise ValueError(f"points of '{known.name}' cannot be simulated under '{other.name}': {what} are {there} there and {here} here")
+            raise ValueError(f"points of '{known.name}' cannot be simulated with '{other.name}': its {what} are {there}, not {here}")

@@ -1,4 +1,4 @@
-"""Colours, fonts and labels that all figures share."""
+"""Colours, fonts and labels of all figures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 from problems.compiled import Objective
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
-"""Okabe and Ito's, with a wine red for black, which references are near to: people with any colour vision tell them apart."""
+"""Colours of Okabe and Ito, which readers with any colour vision can distinguish; wine red instead of black, which is for references."""
 
 
 GREY = "#666666"
@@ -32,31 +32,31 @@ STYLE = {
 
 
 def new_figure(width: float, height: float) -> Any:
-    """A figure that `pyplot.show` will show where there is a display, and one that can be saved anywhere."""
+    """A figure for `pyplot.show` if there is a display; otherwise one that can only be saved."""
     try:
         from matplotlib import pyplot
 
         return pyplot.figure(figsize=(width, height), layout="constrained")
     except ImportError:
-        # The backend that the environment names needs a display, or a toolkit, that is not here.
+        # The backend of the environment needs a display or a toolkit that is not available.
         from matplotlib.figure import Figure
 
         return Figure(figsize=(width, height), layout="constrained")
 
 
 def blank_figure() -> Any:
-    """A figure of no window, for files."""
+    """A figure without a window, for files."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(5.5, 4.0), layout="constrained")
 
 
 def label(name: str, unit: str) -> str:
-    """`name [unit]`, for an axis."""
+    """Label of an axis: `name [unit]`."""
     return f"{name} [{unit}]" if unit else name
 
 
 def better(goal: Objective) -> str:
-    """An axis' label that says where it is better. On an upright axis, left is down."""
+    """Label of an axis with an arrow towards better values; on a vertical axis, left means down."""
     text = label(goal.name, goal.unit)
     return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"

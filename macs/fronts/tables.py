@@ -1,4 +1,4 @@
-"""Fronts as plain text, for terminals, logs and appendices."""
+"""Tables of fronts as plain text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def front_table(front: Points, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
-    """A headline, a row for each point and a footer: what `Front.table` returns."""
+    """Text with a headline, a row for each point and a footer; see `Front.table`."""
     more = {**({} if defects is None else {"defect": defects}), **(columns or {})}
     for header, values in more.items():
         if len(values) != len(front):
@@ -45,7 +45,7 @@ def front_table(front: Points, defects: Sequence[float] | None = None, columns: 
 
 
 def headline(front: Points) -> str:
-    """Problem, points, transcription, and what they cost, on one line."""
+    """Problem, number of points, transcription and costs in one line."""
     seed, count = front.stats["seed"], len(front)
     parts = [
         counted(count, "point") if count else "no feasible point",
@@ -60,7 +60,7 @@ def headline(front: Points) -> str:
 
 
 def _transcribed(front: Points) -> str:
-    """How the problem was written for the points, or for the nearest where there is none."""
+    """Transcription of the points, or of the least infeasible one if there are none."""
     given = front if len(front) or front.closest is None else front.closest.alone()
     distinct = list({id(one): one for one in given.transcriptions if one is not None}.values())
     if not distinct:
@@ -72,9 +72,9 @@ def _transcribed(front: Points) -> str:
 
 
 def _elements(point: Point) -> str:
-    """Elements of each phase."""
-    flight = point.trajectory
-    return "?" if flight is None else "+".join(str(len(phase.state.edges) - 1) for phase in flight.values())
+    """Number of elements of each phase."""
+    trajectory = point.trajectory
+    return "?" if trajectory is None else "+".join(str(len(phase.state.edges) - 1) for phase in trajectory.values())
 
 
 def _excursion(found: Mapping[str, float] | None) -> str:
@@ -94,21 +94,20 @@ def _footer(front: Points) -> list[str]:
     ]
     if leaving:
         amount, name, index = max(leaving)
-        who = (
-            f"{len(leaving)} of {counted(len(front), 'point')} {'leaves its' if len(leaving) == 1 else 'leave their'} bounds between nodes"
-        )
-        lines.append(f"{who}: {name} of point {index} by {amount:.2g} of its scale at most.")
+        verb = "leaves its" if len(leaving) == 1 else "leave their"
+        worst = f"{name} of point {index} by {amount:.2g} of its scale at most"
+        lines.append(f"{len(leaving)} of {counted(len(front), 'point')} {verb} bounds between nodes: {worst}.")
     elif front.source is not None and all(point.excursions is not None for point in front):
         lines.append("No point leaves its bounds between nodes.")
     bad = int((front.status != "converged").sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
     if front.stats["fallbacks"]:
-        lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went from the fast inner level to IPOPT.")
+        lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")
-        ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve hit its time limit"
-        lines.append(f"{ended}: the same seed need not give this front again.")
+        ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"
+        lines.append(f"{ended}: the same seed may give another front.")
     lines += [f"Point {point.index}: {point.note}" for point in front if point.note]
     if front.message:
         lines.append(front.message)

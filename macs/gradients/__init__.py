@@ -1,1 +1,1 @@
-"""Points by derivatives: best of several starts, polish, mesh refinement."""
+"""Gradient solves: best of several starts, polish of archives and fronts, mesh refinement."""

@@ -1,10 +1,10 @@
 """Gradient polish of a finished front on another transcription, with back-off until its points are feasible when simulated.
 
-A search wants a transcription whose candidates are evaluated quickly, gradient solves want a sparse one. A point that exceeds a limit
-between its nodes is solved once more, inside of its limits by what it exceeded. A finer mesh would do it, too, at many times the cost:
-where the excess is small, so is the loss in the objectives. To keep away from constraints by their known excess is called back-off:
-Figueroa, Bahri, Bandoni and Romagnoli, "Economic impact of disturbances and uncertain parameters in chemical processes - a dynamic back-off
-analysis", Computers and Chemical Engineering 20(4), 1996.
+A search needs a transcription whose candidates are evaluated quickly, gradient solves need a sparse one. A point that exceeds a limit
+between its nodes is solved again with that limit tightened by the excess. A finer mesh would help too, at many times the cost; and where
+the excess is small, so is the loss in the objectives. To tighten constraints by their known excess is called back-off: Figueroa, Bahri,
+Bandoni and Romagnoli, "Economic impact of disturbances and uncertain parameters in chemical processes - a dynamic back-off analysis",
+Computers and Chemical Engineering 20(4), 1996.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..pareto.ranges import ranges
 from .polish import CountedSolves, polish
 
 KEPT_INSIDE = "kept inside its limits, so that it is feasible when simulated"
-"""Note of a point that exceeded a limit before."""
+"""Note of a point that was solved with tightened limits."""
 
 
 def polished(
@@ -46,7 +46,7 @@ def polished(
     time_limit: float | None,
     progress: bool,
 ) -> Points:
-    """See `Front.polished`."""
+    """The polished points; see `Front.polished`."""
     problem = front.compiled()
     check_problem(problem, transcription)
     known = front[[point.index for point in front if point.status == CONVERGED and point.trajectory is not None]]
@@ -72,71 +72,70 @@ def polished(
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         moved = np.zeros(len(Z), dtype=bool)
         if verify is not None:
-            evaluator.before_batch = lambda: show("polish: points that are infeasible when simulated are solved once more")
+            evaluator.before_batch = lambda: show("polish: points that are infeasible when simulated are solved again")
             Z, feasible, moved = back_off(evaluator, Z, ranges(archive.F), verify)
             Z, moved = Z[feasible], moved[feasible]
             known = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
-        show(f"polish: how near to optimal {len(Z)} points are")
+        show(f"polish: optimality of {len(Z)} points")
         certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
-        # A point that was moved inside is no optimum of the problem as stated, but the nearest that is feasible when simulated.
+        # A point that was moved inside its limits is no optimum of the problem as stated: it has no certificate.
         optimality = [None if inside else next(certified) for inside in moved]
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
     found = merge([vectors_points(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
-    message = found.message if len(found) else f"no point misses less than {verify:g} when simulated"
+    message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
     return found.replace(solver=dict(front.solver), stats=stats, message=message)
 
 
 def _archive(nlp: NLP, known: Points, tolerance: float) -> Archive:
-    """Known points on this mesh, with the objectives that they have on their own: a polished point must not be worse than these."""
+    """The known points interpolated to this mesh, with their objectives on their own meshes: polished points must be no worse."""
     starts = [nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None]
     return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
 
 
 def _made_feasible(nlp: NLP, closest: Point | None, solves: CountedSolves) -> Archive:
-    """One point by a solve from the least infeasible one; none if that fails."""
+    """An archive of one point, by a solve from the least infeasible point; empty if that fails."""
     if closest is None or closest.trajectory is None or not np.isfinite([*closest.F, closest.violation]).all():
         return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
     found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
-    good = found.status == CONVERGED
-    return Archive(found.Z[good], found.F[good], found.violation[good])
+    return Archive.of(found, found.status == CONVERGED)
 
 
 ROUNDS = 3
-"""How often a point is moved further inside, at most."""
+"""Largest number of times that a point is solved with tightened limits."""
 
 
 MORE = 1.2
-"""A point is moved by so many times the excess: it may be a little larger at the new place."""
+"""Limits are tightened by so many times the excess, which may be a little larger at the new point."""
 
 
 PART = 1e-4
-"""Errors of the integrator are this part of what may be excess, at most."""
+"""Largest error of the integrator, as a fraction of the excess that is allowed."""
 
 
 def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vectors that are feasible when simulated, in place of those that are not.
+    """Vectors of which those that are infeasible when simulated have been solved again with tightened limits.
 
     Parameters
     ----------
     evaluator : Bilevel
-        It makes the solves, and counts them.
+        Makes and counts the solves.
     Z : array (k, D)
         Feasible vectors.
     ranges : array (m,)
-        What counts as much in each objective.
+        Ranges of the objectives.
     verify : float
-        By how much, in their scales, constraints may be exceeded in a simulation.
+        Largest violation, in the constraints' scales, of a point that is feasible when simulated.
 
     Returns
     -------
     Z : array (k, D)
     feasible : array (k,) of bool
-        Which are feasible when simulated, in the end.
+        Whether each is feasible when simulated, in the end.
     moved : array (k,) of bool
-        Which were solved once more.
+        Whether each was solved again.
     """
     nlp, Z = evaluator.nlp, Z.copy()
     F = nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(ranges)))
@@ -156,7 +155,7 @@ def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: floa
 
 
 def _infeasible(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarray, feasible: np.ndarray, verify: float) -> np.ndarray:
-    """Those of the rows `waiting` that are infeasible when simulated; their `margins` grow by the excess, the others become `feasible`."""
+    """Those of the rows `waiting` that are infeasible when simulated; increases their `margins` by the excess and updates `feasible`."""
     rtol, atol = _accuracy(verify)
     simulations = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
     feasible[waiting] = [simulation.violation <= verify for simulation in simulations]
@@ -166,13 +165,13 @@ def _infeasible(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarra
 
 
 def _by_row(violations: Mapping[str, float], labels: Sequence[str]) -> np.ndarray:
-    """The excess in each row of the constraints; 0 in a row whose constraint a simulation does not evaluate."""
+    """Excess (r,) in each row of the constraints; 0 for a constraint that a simulation does not evaluate."""
     excess = np.array([violations.get(label, 0.0) for label in labels])
     return np.where(np.isfinite(excess), np.maximum(excess, 0.0), 0.0)
 
 
 def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> Points:
-    """Points that are feasible when simulated; those that `found` (k, m) dominates are kept without a simulation."""
+    """The known points without those that are infeasible when simulated; points that `found` (k, m) dominates are not simulated."""
     feasible, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
     while True:
         rows = np.flatnonzero(feasible)
@@ -186,6 +185,6 @@ def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> 
 
 
 def _accuracy(verify: float) -> tuple[float, float]:
-    """rtol and atol of an integrator that decides whether a constraint is exceeded by more than `verify`."""
+    """Tolerances rtol and atol of the integrator, fine enough to detect an excess of `verify`."""
     accuracy = min(PART * verify, PART)
     return accuracy, 0.1 * accuracy

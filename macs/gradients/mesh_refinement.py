@@ -1,4 +1,4 @@
-"""Mesh refinement of a front: each point on a mesh of its own, fine enough that a simulation confirms it."""
+"""Mesh refinement of a front: each point gets a mesh of its own, fine enough for an independent simulation to confirm it."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from ..pareto.dominance import extremes
 from .solves import GradientSolves
 
 OPTIMAL = 1e-6
-"""A point whose optimality is at most this need not be solved anew on its own mesh."""
+"""A point with at most this optimality is not solved again on its first mesh."""
 
 
 PATIENCE = 5
-"""A point that gets no better on so many meshes is left alone."""
+"""Number of meshes without progress after which the mesh of a point is not refined further."""
 
 
 LEAST_TOLERANCE = 1e-10
@@ -40,7 +40,7 @@ LEAST_TOLERANCE = 1e-10
 
 
 def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool) -> Points:
-    """See `Front.refine_mesh`."""
+    """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
         raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
@@ -53,26 +53,26 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
 
 @dataclass
 class _Refined:
-    """A point and the mesh that it has reached.
+    """Point with its present mesh.
 
     Attributes
     ----------
     point : Point
-        Of the front that is refined.
+        Point of the original front.
     end : int or None
-        The objective of which it is the best point of the front.
+        Objective in which the point is the best of the front; None for other points.
     method, trajectory, verdict
-        The mesh, the trajectory on it, and the judgement of an independent simulation.
+        Transcription with the present mesh, trajectory on it, and its verification by an independent simulation.
     solved : SolvedPoint or None
-        On that mesh; None at first.
+        Solution on the present mesh; None for the original one.
     change : float
-        Of the objectives, from the mesh before, in ranges of the front.
+        Largest change of an objective from the previous mesh, in ranges of the front.
     history : list of float
         Error on each mesh, relative to the tolerance.
     active : bool
         Whether the mesh is to be refined further.
     trouble : str
-        Why it is not refined further though the tolerance is not met.
+        Reason why the mesh is not refined further although the tolerance is not met.
     """
 
     point: Point
@@ -93,15 +93,16 @@ class _Refined:
 
 
 class MeshRefinement:
-    """Refines the meshes of a front's points, all together, round after round.
+    """Refinement of the meshes of a front's points, in rounds; each round solves all unfinished points on finer meshes.
 
     Parameters
     ----------
     front : Points
     tolerance : float
-        Of defects and of what leaves its limits between nodes. Objectives are to settle within `COST` times that, in ranges of the front.
+        Largest defect, and largest excess of limits between nodes. Objectives may change by `COST` times that from mesh to mesh, in ranges
+        of the front.
     rounds : int
-        At most so many meshes are tried for each point.
+        Largest number of meshes for each point.
     """
 
     def __init__(self, front: Points, tolerance: float, rounds: int) -> None:
@@ -114,7 +115,7 @@ class MeshRefinement:
         self.points = {i: self._begin(i) for i in self.good.tolist()}
 
     def go(self, time_limit: float | None, progress: bool) -> Points:
-        """The refined points; after Ctrl-C or the time limit, as far as they are refined."""
+        """The refined points; after Ctrl-C or the time limit, on the meshes reached by then."""
         with working(time_limit, progress) as (show, interrupts):
             self._polish()
             for k in range(self.rounds):
@@ -145,32 +146,32 @@ class MeshRefinement:
         return judge(self.problem, trajectory, self.tolerance, self.front.stats["tolerance"])
 
     def _polish(self) -> None:
-        """Solve points that are not known to be optimal on the meshes that they have: rough controls would need finer ones."""
+        """Solve points that are not known to be optimal on their own meshes: rough controls would need finer meshes."""
         rough: dict[Meshed, list[int]] = {}
         for i, point in self.points.items():
             if point.point.optimality is None or point.point.optimality > OPTIMAL:
                 rough.setdefault(point.method, []).append(i)
         for method, members in rough.items():
             nlp = method.transcribe(self.problem)
-            for i in _still_wanted(members):
+            for i in _until_stopped(members):
                 solved = self.solver.solve(nlp, self.points[i].point.F, self.points[i].end, self._starts(i, nlp))
                 if solved.status == CONVERGED and solved.by_gradients:
                     self._take(self.points[i], method, solved)
 
     def _round(self) -> None:
-        """Solve every active point on a finer mesh, and judge it. Points that share a mesh follow each other."""
+        """Solve and verify every active point on a finer mesh, grouped by meshes."""
         finer: dict[Meshed, list[int]] = {}
         for i, point in self.points.items():
             if point.active:
                 settled = self._missed(point) <= COST * self.tolerance
                 method = next_method(point.method, point.verdict, point.trajectory, integrals=not settled)
                 point.active = method != point.method
-                point.trouble = "" if point.active else "no mesh is refined further"
+                point.trouble = "" if point.active else "its mesh cannot be refined further"
                 if point.active:
                     finer.setdefault(method, []).append(i)
         for method, members in finer.items():
             nlp = method.transcribe(self.problem)
-            for i in _still_wanted(members):
+            for i in _until_stopped(members):
                 self._solve(i, method, nlp)
 
     def _solve(self, i: int, method: Meshed, nlp: NLP) -> None:
@@ -178,7 +179,7 @@ class MeshRefinement:
         solved = self.solver.solve(nlp, point.point.F, point.end, self._starts(i, nlp))
         if solved.status != CONVERGED:
             if not stopping():
-                point.active, point.trouble = False, f"on the next finer mesh it is '{solved.status}'"
+                point.active, point.trouble = False, f"on the next finer mesh its status is '{solved.status}'"
             return
         change = float((np.abs(solved.F - point.F) / self.ranges).max())
         self._take(point, method, solved)
@@ -194,23 +195,23 @@ class MeshRefinement:
         point.verdict = self._judge(point.trajectory)
 
     def _starts(self, i: int, nlp: NLP) -> Iterator[np.ndarray]:
-        """Its own trajectory, then those of the points nearest to it, on its mesh."""
+        """Start vectors: the trajectory of point i, then those of the nearest points, all interpolated to the mesh of `nlp`."""
         here = self.points[i].point.F
         distance = {j: float(np.linalg.norm((other.point.F - here) / self.ranges)) for j, other in self.points.items()}
         for j in sorted(distance, key=lambda j: distance[j])[:3]:
             yield nlp.interpolate(self.points[j].trajectory)
 
     def _missed(self, point: _Refined) -> float:
-        """Difference of the simulated objectives from those of the mesh, in ranges of the front."""
+        """Largest difference between the simulated objectives and those on the mesh, in ranges of the front."""
         objectives = dict(zip(self.front.names, (point.F * self.problem.signs).tolist(), strict=True))
         return missed(point.verdict.simulation, objectives, self.ranges)
 
     def _complaints(self, point: _Refined) -> list[str]:
-        """Why a point does not meet the tolerance; empty if it does."""
+        """Reasons why a point does not meet the tolerance; empty if it does."""
         found = point.verdict.complaints()
         off, settled = self._missed(point), COST * self.tolerance
         if not found and not off <= settled:
-            found.append(f"simulated, its objectives differ by {off:.1e} of the front's range")
+            found.append(f"when simulated, its objectives differ by {off:.1e} of the front's range")
         if np.isinf(point.change):
             found.append("it was not solved on a finer mesh")
         elif not point.change <= settled:
@@ -218,7 +219,7 @@ class MeshRefinement:
         return found
 
     def _refined(self, i: int) -> Points:
-        """Point i as it is now, alone."""
+        """Point i on its present mesh, as a set of one point."""
         point, front = self.points.get(i), self.front
         if point is None:
             return front[[i]]
@@ -233,8 +234,8 @@ class MeshRefinement:
         return vectors_points(solved.nlp, solved.z[None], front.solver, front.stats, optimality=[certified], notes=[note])
 
 
-def _still_wanted(members: Iterable[int]) -> Iterator[int]:
-    """The members in order, until the work is to end."""
+def _until_stopped(members: Iterable[int]) -> Iterator[int]:
+    """The members in order, until the work is asked to end."""
     for i in members:
         if stopping():
             return
@@ -242,16 +243,28 @@ def _still_wanted(members: Iterable[int]) -> Iterator[int]:
 
 
 DRIFT = 1e-3
-"""For a point that gets worse by more than this, in ranges of the front, other starts are tried too."""
+"""If a point gets worse by more than this, in ranges of the front, other starts are tried too."""
 
 
 CAP = 1e-9
-"""How much of its range the objective that an end is best in may be given up for the other ones."""
+"""Fraction of its range that the best objective of an end may lose while the others are improved."""
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedPoint:
-    """A point solved anew: a vector of `nlp`, its objectives (m,), its status, and whether it is an optimum or only feasible."""
+    """Solution of a point on another mesh.
+
+    Attributes
+    ----------
+    nlp : NLP
+    z : array (n,)
+        Vector of `nlp`.
+    F : array (m,)
+        Objectives, all minimised.
+    status : str
+    by_gradients : bool
+        True: a local optimum. False: only the nearest feasible point.
+    """
 
     nlp: NLP
     z: np.ndarray
@@ -261,14 +274,14 @@ class SolvedPoint:
 
 
 class PointSolver:
-    """Solves points anew on other meshes, and counts.
+    """Solver of a front's points on other meshes.
 
     Parameters
     ----------
     ranges : array (m,)
-        Of the objectives on the front.
+        Ranges of the objectives on the front.
     F : array (n, m)
-        The front's objectives, all minimised.
+        Objectives of the front, all minimised.
     tolerance : float
         Largest scaled residual of a feasible point.
     """
@@ -283,25 +296,25 @@ class PointSolver:
         return self._solve.counts
 
     def solve(self, nlp: NLP, position: np.ndarray, end: int | None, starts: Iterable[np.ndarray]) -> SolvedPoint:
-        """The point of this mesh's front that is met from `position` along the front's ranges (Pascoletti and Serafini).
+        """The Pareto point on this mesh in the direction of the front's ranges from `position` (Pascoletti and Serafini 1984).
 
-        On a finer mesh a point may get worse; so there is no limit at its old objectives.
+        The old objectives are no limits, since a finer mesh may make a point worse.
 
         Parameters
         ----------
         nlp : NLP
         position : array (m,)
             Objectives of the point on the first mesh.
-        end : int, optional
-            The objective of which this is the front's best point: then that is minimised, and after it the others.
-        starts : vectors (n,)
-            The first is the point itself; the others are tried where that fails, or makes the point worse.
+        end : int or None
+            For the best point of an objective: this objective is minimised, then the others.
+        starts : iterable of vectors (n,)
+            The first is the point itself; the next are used only if the solve fails or makes the point worse.
 
         Returns
         -------
         SolvedPoint
-            Where objectives have no derivatives (a peak that is maximised) and where the gradient solves fail: the feasible point nearest
-            to the first start.
+            The feasible point nearest to the first start, if objectives have no derivatives (a peak that is maximised) or all gradient
+            solves fail.
         """
         found: list[Solved] = []
         first = None
@@ -312,8 +325,7 @@ class PointSolver:
                 if found[-1].status == CONVERGED and self._worse(found[-1], position, end) <= DRIFT:
                     break
         except ValueError:
-            # A use of peaks that gradient tools refuse.
-            pass
+            pass  # a use of peaks without derivatives
         good = [solved for solved in found if solved.status == CONVERGED]
         if good:
             best = min(good, key=lambda solved: self._worse(solved, position, end))
@@ -325,7 +337,7 @@ class PointSolver:
         return SolvedPoint(nlp, near.z[0], near.F[0], str(near.status[0]), False)
 
     def _worse(self, solved: Solved, position: np.ndarray, end: int | None) -> float:
-        """By how much, in ranges, it is worse than where it began."""
+        """Largest increase of an objective from `position`, in ranges; for an end, of its own objective."""
         change = (solved.F - position) / self.ranges
         return float(change.max() if end is None else change[end])
 
@@ -334,13 +346,13 @@ class PointSolver:
             solved = self._lexicographic(nlp, position, end, start)
             others = np.linalg.norm((self.F - position) / self.ranges, axis=1)
             nearest = others[others > 0].min(initial=np.inf)
-            # A point that moves further than half the way to the next one was not an end of the whole front.
+            # A point that moves by more than half the distance to the next one was not an end of the whole front.
             if solved.status != CONVERGED or np.linalg.norm((solved.F - position) / self.ranges) <= 0.5 * nearest:
                 return solved
         return self._solve(nlp, start, position, self.ranges)
 
     def _lexicographic(self, nlp: NLP, position: np.ndarray, end: int, start: np.ndarray) -> Solved:
-        """The best value of one objective, and with that, the best of the others."""
+        """The least value of one objective, and for that the least values of the others."""
         mine = np.arange(len(position)) == end
         alone = np.where(mine, position, np.inf)
         first = self._solve(nlp, start, alone, self.ranges)

@@ -1,4 +1,4 @@
-"""Gradient solves from several starts, with memory: each may begin at the best vector found before."""
+"""Gradient solves from several starts: the best vector found by earlier solves, and random candidates."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from ..evaluation.evaluator import CONVERGED, Counts
 from .solves import GradientSolves
 
 HOPELESS = 100.0
-"""Propagated states that miss bounds or constraints by more scales than this are worse to start from than a straight line."""
+"""If propagated states violate bounds or constraints by more scales than this, a straight line is the better start."""
 
 LIMIT, BETTER = 1e-8, 1e-7
-"""By what fraction of an objective's range a limit may be missed, and by what alpha an answer counts as better than another."""
+"""Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
 
 
 class MultistartSolver:
-    """Solves scalarised problems of one NLP, each from the best vector known for it and from random candidates, and counts.
+    """Solver of scalarised problems of one NLP, each from the best vector known for it and from random candidates.
 
     Parameters
     ----------
     nlp : NLP
     given : array (k, n), optional
-        Vectors known from the beginning.
+        Vectors that are known at the beginning.
     starts : int
-        From how many vectors each problem is solved.
+        Number of starts for each problem.
     rng : numpy.random.Generator
-        Draws the random candidates.
+        Generator of the random candidates.
     tolerance : float
         Largest scaled residual of a feasible point.
 
@@ -50,15 +50,15 @@ class MultistartSolver:
 
     @property
     def counts(self) -> Counts:
-        """See the class."""
+        """Gradient solves, iterations, failures by status."""
         return self._solves.counts
 
     def solve(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
     ) -> Solved:
-        """The best of what `starts` solves find; see `scalarize` for reference, weights and ceiling (m,).
+        """The best result of `starts` solves; see `scalarize` for reference, weights and ceiling (m,).
 
-        The first begins at `start` (n,), or at what is best for the purpose of all that is known.
+        The first solve begins at `start` (n,), or at the best known vector for this problem.
         """
         first = start if start is not None else self._nearest(reference, weights)
         found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
@@ -67,7 +67,7 @@ class MultistartSolver:
         return self.better(found, reference, weights)
 
     def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
-        """One solve from a vector (n,)."""
+        """The result of one solve from a vector (n,); if it converged, later solves may begin at it."""
         solved = self._solves(self.nlp, start, reference, weights, ceiling)
         if solved.status == CONVERGED:
             self._known = np.vstack([self._known, solved.z])
@@ -75,7 +75,7 @@ class MultistartSolver:
         return solved
 
     def lexicographic(self, i: int) -> Solved:
-        """Least objective i, then the others in their order, each without giving up what came before."""
+        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before."""
         m = len(self.nlp.problem.goals)
         ceiling = np.full(m, np.inf)
         best = None
@@ -86,16 +86,17 @@ class MultistartSolver:
                 best = solved
             if best.status != CONVERGED:
                 break
-            # No slack: where the front is steep, what it gives away in one objective is its square root in another.
+            # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[j] = best.F[j]
         assert best is not None
         return best
 
     def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
-        """How good points (k, m) are for a scalarised problem: the alpha that they allow, and what they miss of limits and constraints.
+        """Merits (k,) of points F (k, m) for a scalarised problem, less is better: their alpha plus their excess over limits and
+        constraints.
 
-        Limits are measured in the ranges that objectives have among the known points. `strict`: what misses any is infinitely bad, as an
-        answer is; otherwise it may still be a good start.
+        The excess over limits is in ranges of the objectives among the known points. With `strict`, as for results, a point with any excess
+        has an infinite merit; without, as for starts, it may still be good.
         """
         used, moving = reference < np.inf, (reference < np.inf) & (weights > 0)
         alpha = np.max((F[:, moving] - reference[moving]) / weights[moving], axis=1, initial=-np.inf)
@@ -107,14 +108,14 @@ class MultistartSolver:
         return np.where(np.isfinite(merit), merit, np.inf)
 
     def better(self, found: list[Solved], reference: np.ndarray, weights: np.ndarray) -> Solved:
-        """The best of several solves of one problem: what converged before what did not; of these the lesser alpha, or violation."""
+        """The best of several results of one problem: converged ones first, by their alpha; then the others by their violation."""
         F, violation = np.array([solved.F for solved in found]), np.array([solved.violation for solved in found])
         failed = np.array([solved.status != CONVERGED for solved in found])
         merit = np.where(failed, violation, self.merits(reference, weights, F, violation))
         return found[np.lexsort((merit, failed))[0]]
 
     def rival(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
-        """A known vector (n,) that is clearly better for a problem than its own answer; None if there is none."""
+        """A known vector (n,) that is clearly better for a problem than its own result; None if there is none."""
         if not len(self._known):
             return None
         merits = self.merits(reference, weights, self._F, self._violation, strict=True)
@@ -122,11 +123,11 @@ class MultistartSolver:
         return self._known[np.argmin(merits)] if merits.min() < own - BETTER else None
 
     def _nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
-        """The known vector (n,) that is best to start from."""
+        """The known vector (n,) with the best merit; None if none is known."""
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
 
     def _from_anywhere(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> Solved:
-        """A solve from a random candidate: from its propagated states, and if that fails from guessed ones."""
+        """The result of a solve from a random candidate: from its propagated states, and if that fails from guessed states."""
         nlp = self.nlp
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         guessed = nlp.first_guess((lower + self._rng.random(len(lower)) * span)[None])

@@ -1,4 +1,4 @@
-"""The last thing that a search with gradients does: its archive is brought down to the front, and spread along it."""
+"""Gradient polish of an archive: its points are moved to the Pareto front by gradient solves, and spread along it."""
 
 from __future__ import annotations
 
@@ -14,87 +14,92 @@ from ..pareto.dominance import extremes
 from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
 
 PLACES = 500
-"""How many places a surface has, at most."""
+"""Largest number of places that cover a surface."""
 
 
 ROUNDS = 6
-"""How often, at most, neighbours help and points slide along the front."""
+"""Largest number of rounds with starts from neighbours, and of rounds in which points slide along the front."""
 
 
 WIDE = 1.5
-"""A gap this many times as wide as the median one gets a point of its own; crowded ones give way."""
+"""A gap this many times as wide as the median one gets a point of its own; crowded points are left out for it."""
 
 
 GAIN = 0.995
-"""A slide is tried if it is to lower the energy of a point to this part."""
+"""A slide is tried only if it is expected to lower the energy of the point at least to this fraction."""
 
 
 def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None) -> Archive:
-    """Bring every point of an archive down to the front, and spread them along it as evenly as their number, at most `limit`, allows.
+    """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
-    First each from where it is, the best of an objective to the best there is; then from where its neighbours are, as long as that finds
-    better ones; then points slide along the front to where they repel each other least, or fill what places are left. `exponent` is that of
-    the archive. Where there are few solves, only some points come down, well spread, so that half of the solves are left to spread them
-    along the front; what did not come down, and is not dominated, then takes what places are left. A surface is first gone down to from
-    all over it, once for each point that the archive may hold. Where the work is to end early no solves are left, and what those before
-    have found is the front.
+    1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
+    2. One guarded solve from each point; the best point of each objective is first solved for the least value of that objective.
+    3. Solves for each point from the positions of its neighbours, as long as this finds better points.
+    4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places.
+
+    If there are few solves, step 2 uses only some points, well spread, and leaves half of the solves for the other steps. The remaining
+    points fill free places in the end, if they are not dominated. If the work is asked to end early, no solves are left, and the result is
+    made of those before.
+
+    Parameters
+    ----------
+    archive : Archive
+    solves : CountedSolves
+    limit : int
+        Largest number of points.
+    exponent : float, optional
+        See `archive.pair_energies`.
     """
     if not len(archive):
         return archive
     if archive.F.shape[1] > CURVE:
-        archive = _covered(archive, solves, limit, exponent)
+        archive = _cover(archive, solves, limit, exponent)
         if not solves.left:
             return archive
-    archive, waiting = _descended(archive, solves, exponent)
+    archive, waiting = _descend(archive, solves, exponent)
     for _ in range(ROUNDS):
-        better = _taught(archive, solves)
+        better = _helped_by_neighbours(archive, solves)
         if better is archive:
             break
         archive = better
     pool, span = archive, ranges(archive.F)
     archive = _thinned(pool, limit, exponent)
     for _ in range(ROUNDS):
-        references, starts = _slides(archive, limit, exponent)
+        references, starts = _slide(archive, limit, exponent)
         if not (len(references) and solves.left):
             break
         found = solves(starts, references, np.tile(span, (len(references), 1)))
-        good = found.status == CONVERGED
-        pool = _front(_joined(pool, Archive(found.Z[good], found.F[good], found.violation[good])), span)
+        pool = _front(pool.joined(Archive.of(found, found.status == CONVERGED)), span)
         before, archive = archive, _thinned(pool, limit, exponent)
         if np.array_equal(before.F, archive.F):
             break
     if len(waiting):
-        archive = _thinned(_front(_joined(archive, waiting), span), limit, exponent)
+        archive = _thinned(_front(archive.joined(waiting), span), limit, exponent)
     return archive
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
-    """No more points than the limit, evenly spread."""
+    """At most `limit` points of the pool, evenly spread."""
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
 
 
-def _descended(archive: Archive, solves: CountedSolves, exponent: float | None) -> tuple[Archive, Archive]:
-    """Guarded solves of the points; ends of the front for their own objective first, then for the others. Also returns the points
-    for which there are too few solves: they are not among the others any more."""
+def _descend(archive: Archive, solves: CountedSolves, exponent: float | None) -> tuple[Archive, Archive]:
+    """The points after one guarded solve each, with the ends of the front, and the points that are left out for want of solves."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
     chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
     archive, waiting = archive.take(chosen), archive.take(~chosen)
     found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
     kept = feasible_and_no_worse(found, archive.F, archive.violation, span)
-    archive = Archive(
-        np.where(kept[:, None], found.Z, archive.Z),
-        np.where(kept[:, None], found.F, archive.F),
-        np.where(kept, found.violation, archive.violation),
-    )
-    return _front(_joined(_ends(archive, span, solves), archive), span), waiting
+    archive = archive.replaced(kept, found)
+    return _front(_ends(archive, span, solves).joined(archive), span), waiting
 
 
-def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None) -> Archive:
-    """Ends of the front, and as many places between them as there may be points: always that which is farthest from what is known."""
+def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None) -> Archive:
+    """The ends of the front, and results of solves to `limit` places between them: always the place farthest from all known points."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
-    pool = _front(_joined(ends, archive), span)
+    pool = _front(ends.joined(archive), span)
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
@@ -109,30 +114,27 @@ def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: floa
         known = np.vstack([known, place])
         if found.status[0] == CONVERGED:
             known = np.vstack([known, across((found.F - ideal) / between)])
-            pool = _joined(Archive(found.Z, found.F, found.violation), pool)
+            pool = Archive.of(found, np.arange(1)).joined(pool)
     return _thinned(_front(pool, between), limit, exponent)
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
-    """The best of each objective, and of these the best in the others."""
+    """One point for each objective: its least value, and for that the least values of the others."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
     one = np.eye(m, dtype=bool)
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
     kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + slack(best.violation) * span)
-    Z, F = np.where(kept[:, None], single.Z, best.Z), np.where(kept[:, None], single.F, best.F)
+    ends = best.replaced(kept, single)
     if m == 1:
-        return Archive(Z, F, np.where(kept, single.violation, best.violation))
-    # From the least value of its own objective, which becomes a limit, all others together.
-    both = solves(Z, F, np.where(one, 0.0, span))
-    violation = np.where(kept, single.violation, best.violation)
-    good = feasible_and_no_worse(both, F, violation, span)
-    return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
+        return ends
+    # The least value of its own objective becomes a limit, and all others are lowered together.
+    both = solves(ends.Z, ends.F, np.where(one, 0.0, span))
+    return ends.replaced(feasible_and_no_worse(both, ends.F, ends.violation, span), both)
 
 
-def _taught(archive: Archive, solves: CountedSolves) -> Archive:
-    """Guarded solves of every point from its neighbours' controls, if there are enough for all; the archive itself if none was clearly
-    better."""
+def _helped_by_neighbours(archive: Archive, solves: CountedSolves) -> Archive:
+    """The archive after guarded solves of all points from their neighbours; the archive itself if none is better or solves are too few."""
     span = ranges(archive.F)
     pairs = [(i, j) for i in range(len(archive)) for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]]
     if not 0 < len(pairs) <= solves.left:
@@ -143,12 +145,11 @@ def _taught(archive: Archive, solves: CountedSolves) -> Archive:
     better = (found.status == CONVERGED) & (gain > BETTER)
     if not better.any():
         return archive
-    return _front(_joined(Archive(found.Z[better], found.F[better], found.violation[better]), archive), span)
+    return _front(Archive.of(found, better).joined(archive), span)
 
 
-def _slides(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """References (k, m) on the lines between neighbours, and vectors (k, D) to start from: in the middle of wide gaps, and where points
-    would repel each other less."""
+def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """References (k, m) on the lines between neighbours, in wide gaps and where points have less energy, and start vectors (k, D)."""
     span = ranges(archive.F)
     F, n = archive.F / span, len(archive)
     if n < 2:
@@ -173,24 +174,20 @@ def _slides(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nd
 
 
 def _front(points: Archive, span: np.ndarray) -> Archive:
-    """Points that are `distinct` and not dominated."""
+    """The points that are non-dominated and `distinct`."""
     return points.take(distinct(points.F, span))
-
-
-def _joined(one: Archive, two: Archive) -> Archive:
-    return Archive(np.vstack([one.Z, two.Z]), np.vstack([one.F, two.F]), np.concatenate([one.violation, two.violation]))
 
 
 @dataclass
 class PolishLog:
-    """A polish that is under way, after k solves.
+    """Results of the first k solves of a polish, which can be continued with them.
 
     Attributes
     ----------
     archive : Archive
-        What it began with.
+        The archive before the polish.
     Z, F, violation, status : arrays (k, D), (k, m), (k,), (k,)
-        What the solves gave, in their order; see `Evaluation`.
+        Results in the order of the solves; see `Evaluation`.
     """
 
     archive: Archive
@@ -201,46 +198,48 @@ class PolishLog:
 
     @classmethod
     def of(cls, archive: Archive) -> PolishLog:
-        """One that begins."""
+        """The log of a polish that begins with this archive."""
         return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
 
     def __len__(self) -> int:
         return len(self.F)
 
     def add(self, found: Evaluation) -> None:
-        """Take note of what further solves gave."""
+        """Append the results of further solves."""
         self.Z, self.F = np.vstack([self.Z, found.Z]), np.vstack([self.F, found.F])
         self.violation, self.status = np.append(self.violation, found.violation), np.append(self.status, found.status)
 
     def take(self, rows: slice) -> Evaluation:
-        """What the solves of `rows` gave."""
+        """The results of the solves `rows`."""
         return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
 
 
 class CountedSolves:
-    """Gradient solves, as long as there are any left: none are, once the work is to end early.
+    """Gradient solves up to a number. After a request to end early no more are made.
 
     Parameters
     ----------
     evaluator : Evaluator
     left : int
-    polishing : PolishLog, optional
-        The solves that it knows are not made again, all others are added to it.
+        Largest number of solves.
+    log : PolishLog, optional
+        The solves in it are not made again; all further solves are added to it.
 
     Attributes
     ----------
     left : int
+        Number of solves that may still be made; 0 after a request to end early.
     stopped : bool
-        Whether the work was to end early, with solves left to make.
+        Whether the work was asked to end while solves were left.
     """
 
-    def __init__(self, evaluator: Evaluator, left: int, polishing: PolishLog | None = None) -> None:
-        self._evaluator, self._polishing = evaluator, polishing
+    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None) -> None:
+        self._evaluator, self._log = evaluator, log
         self._made = 0
         self.left, self.stopped = left, False
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """See `Evaluator.descend`; rows for which nothing is left have failed."""
+        """The results of `Evaluator.descend`; rows beyond the number of solves have failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         for row in range(max(min(len(starts), self.left), 0)):
@@ -254,11 +253,11 @@ class CountedSolves:
         return Evaluation(Z, F, violation, status)
 
     def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """The next solve, of one row: made, or remembered; no row if the work is to end early."""
+        """The result of the next solve, one row, from the log or made now; no row if asked to end early."""
         made, self._made = self._made, self._made + 1
-        if self._polishing is not None and made < len(self._polishing):
-            return self._polishing.take(slice(made, made + 1))
+        if self._log is not None and made < len(self._log):
+            return self._log.take(slice(made, made + 1))
         found = self._evaluator.descend(start, reference, weights)
-        if self._polishing is not None:
-            self._polishing.add(found)
+        if self._log is not None:
+            self._log.add(found)
         return found

@@ -11,7 +11,7 @@ from ..evaluation.evaluator import Counts
 
 
 class GradientSolves:
-    """Gradient solves to one tolerance, with the counts of all of them.
+    """Gradient solves with one tolerance, which are counted.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class GradientSolves:
     def __call__(
         self, nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None
     ) -> Solved:
-        """One solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
+        """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
         solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, tolerance=self.tolerance)
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked)
         return solved

@@ -1,1 +1,1 @@
-"""Files, text, consoles and interrupts: nothing of the method is in here."""
+"""Files, text, consoles and interrupts, independent of the method."""

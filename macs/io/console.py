@@ -1,4 +1,4 @@
-"""Displays of long work: live on a terminal, a plain line every ten seconds elsewhere. They write to stderr."""
+"""Displays of long work, on stderr: live on a terminal, a plain line every ten seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ EVERY = 10.0
 
 
 class Display(AbstractContextManager, ABC):
-    """Something that is shown while it is entered.
+    """Display of the state of long work; a context manager.
 
     Parameters
     ----------
     shown : bool
-        False: nothing is written at all.
+        False: nothing is written.
     stream : text stream, optional
-        stderr by default.
+        Default: stderr.
     """
 
     transient = False
-    """Whether a terminal is cleared in the end."""
+    """Whether the display is removed from a terminal at the end."""
 
     def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
         self._shown, self._stream = shown, stream or sys.stderr
@@ -39,10 +39,10 @@ class Display(AbstractContextManager, ABC):
 
     @abstractmethod
     def line(self) -> str:
-        """The state of the work in one line; "" if there is none yet."""
+        """The state of the work in one line; "" if it is not known yet."""
 
     def render(self) -> Any:
-        """The same for a terminal: anything that rich can print."""
+        """The state of the work for a terminal, as an object that rich can print."""
         from rich.text import Text
 
         return Text(self.line())
@@ -53,12 +53,12 @@ class Display(AbstractContextManager, ABC):
         return time.perf_counter() - self._began
 
     def refresh(self) -> None:
-        """Write a plain line, where there is no terminal and the last one is `EVERY` seconds old."""
+        """Write a plain line, if there is no terminal and the last line is at least `EVERY` seconds old."""
         if self._shown and self._live is None and self.elapsed - self._written >= EVERY:
             self._write(self.line())
 
     def say(self, line: str) -> None:
-        """Write a line now, above what is live."""
+        """Write a line now; on a terminal above the live display."""
         if self._live is not None:
             self._live.console.print(line, markup=False, highlight=False)
         elif self._shown:
@@ -85,7 +85,7 @@ class Display(AbstractContextManager, ABC):
 
 
 class StatusLine(Display):
-    """One line that says what is being done; see `Display`."""
+    """Display of the present step of the work in one line; see `Display`."""
 
     transient = True
 
@@ -94,30 +94,30 @@ class StatusLine(Display):
         self._words = ""
 
     def __call__(self, words: str) -> None:
-        """What is being done now."""
+        """Show these words from now on."""
         self._words = words
         self.refresh()
 
     def line(self) -> str:
-        """What is being done."""
+        """The present words."""
         return self._words
 
     def render(self) -> Any:
-        """The same with a sign of life."""
+        """The present words with a spinner."""
         from rich.spinner import Spinner
 
         return Spinner("dots", self._words)
 
 
 class Steps(Display):
-    """Steps of a known number; Ctrl-C ends the work between two of them by raising `Stopped`, a second one at once.
+    """Display of a known number of steps. Ctrl-C raises `Stopped` at the next step; a second Ctrl-C interrupts at once.
 
     Parameters
     ----------
     title : str
     total : int
     stream : text stream, optional
-        stderr by default.
+        Default: stderr.
     """
 
     transient = True
@@ -137,18 +137,18 @@ class Steps(Display):
         self._interrupts.__exit__(kind, error, trace)
 
     def begin(self, what: str) -> None:
-        """The next step: what it does."""
+        """Begin the next step, described by `what`. Raises `Stopped` if Ctrl-C was pressed."""
         self.check()
         self._done += 1
         self._what = what
         self.refresh()
 
     def line(self) -> str:
-        """The step, its number and the time."""
+        """The present step, its number and the elapsed time."""
         return f"{self._title}: {self._what}, step {self._done} of {self._total}, {minutes(self.elapsed)}"
 
     def render(self) -> Any:
-        """The same with a bar."""
+        """The present step with a bar."""
         from rich.progress_bar import ProgressBar
         from rich.table import Table
         from rich.text import Text
@@ -170,12 +170,12 @@ class Steps(Display):
 
 @contextmanager
 def working(time_limit: float | None, progress: bool) -> Iterator[tuple[StatusLine, Interrupts]]:
-    """Long work with a status line, which Ctrl-C and a time limit ask to end early (see `transcription.stopping`)."""
+    """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
     with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, stopped_by(lambda: bool(interrupts.reason)):
         yield status, interrupts
 
 
 def minutes(seconds: float) -> str:
-    """0:07, 12:30 or 2:00:05."""
+    """A duration such as 0:07, 12:30 or 2:00:05."""
     hours, rest = divmod(round(seconds), 3600)
     return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"

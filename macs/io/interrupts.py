@@ -1,4 +1,4 @@
-"""Ctrl-C and time limits: why long work is to end, asked for between its steps."""
+"""Ctrl-C and time limits: requests to end long work, which it checks between its steps."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from typing import Any
 
 
 class Stopped(Exception):  # noqa: N818 - an end, not an error
-    """The work is to end with what it has. The text is the reason."""
+    """Raised to end the work with its results so far. The text is the reason."""
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
-    """Clock of long work, which records Ctrl-C instead of raising it.
+    """Clock and Ctrl-C handler of long work; a context manager.
 
-    While it is entered in the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual.
+    In the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual.
 
     Parameters
     ----------
     time_limit : float, optional
-        Seconds, in this process.
+        Seconds in this process.
     earlier : float
-        Seconds that the work has taken in other processes.
+        Seconds that the work has already taken in other processes.
     """
 
     def __init__(self, time_limit: float | None = None, earlier: float = 0.0) -> None:
@@ -35,7 +35,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     @property
     def elapsed(self) -> float:
-        """Seconds that the work has taken, earlier ones included."""
+        """Seconds that the work has taken, those in earlier processes included."""
         return self._earlier + self._here
 
     @property
@@ -44,7 +44,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     @property
     def reason(self) -> str:
-        """Why to end: "interrupted", "time limit", or "" as long as there is no reason."""
+        """Reason to end: "interrupted" or "time limit"; "" if there is none."""
         if self._interrupted:
             return "interrupted"
         return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""

@@ -1,4 +1,4 @@
-"""Plain text for people: tables, numbers, counts and durations."""
+"""Plain text: tables, numbers, counts and durations."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ RIGHT = str.rjust
 
 
 def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
-    """Columns of equal width under a rule.
+    """A text table with aligned columns and a rule under the headers.
 
     Parameters
     ----------
     headers : lines of cells
     rows : n rows of cells
     left : bool for each column
-        Set flush left instead of right.
+        Whether it is aligned left instead of right.
     """
     cells = [*headers, *rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(left))]
@@ -31,7 +31,7 @@ def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], 
 
 
 def numbers(values: Any) -> list[str]:
-    """A column of numbers, all with the same decimals: six significant digits, and at least four of the column's range."""
+    """A column of numbers with the same number of decimals: six significant digits, and at least four of the column's range."""
     values = np.asarray(values, dtype=float) + 0.0
     finite = values[np.isfinite(values)]
     largest = np.abs(finite).max(initial=0.0)
@@ -46,17 +46,17 @@ def numbers(values: Any) -> list[str]:
 
 
 def counted(number: int, what: str) -> str:
-    """1 evaluation, 10 000 evaluations."""
+    """A number with its noun: 1 evaluation, 10 000 evaluations."""
     return f"{number:,} {what}{'' if number == 1 else 's'}".replace(",", " ")
 
 
 def call(name: str, settings: Mapping[str, Any]) -> str:
-    """A method and its settings, as one would type them: `DFET(elements=4, order=6)`."""
+    """A method with its settings as in Python code: `DFET(elements=4, order=6)`."""
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in settings.items() if value is not None)})"
 
 
 def duration(seconds: float) -> str:
-    """A time for people: 0.25 s, 3.6 s, 4 min 05 s, 2 h 03 min."""
+    """A duration in words: 0.25 s, 3.6 s, 4 min 05 s, 2 h 03 min."""
     if seconds < 60:
         return f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s"
     minutes, rest = divmod(round(seconds), 60)

@@ -1,20 +1,22 @@
-"""The archive: feasible, mutually non-dominated points, spread like charges that repel each other (Ricciardi and Vasile 2015)."""
+"""Archive of a search: feasible, mutually non-dominated points, spread like charges that repel each other (Ricciardi and Vasile 2015)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 
+from ..io.text import counted
 from .dominance import extremes, nondominated
 
 HUGE = 1e9
-"""Largest energy of a pair, in units of that of neighbours."""
+"""Largest energy of a pair, in units of the energy of neighbours."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Archive:
-    """What a search has to show: n points, no more than its limit, none dominated by another, no two alike.
+    """Evaluated points as columns. Those that `insert` returns are feasible, mutually non-dominated and different.
 
     Attributes
     ----------
@@ -23,33 +25,54 @@ class Archive:
     F : array (n, m)
         Objectives, all minimised.
     violation : array (n,)
-        At most the tolerance.
+        Largest scaled residual of any constraint.
     """
 
     Z: np.ndarray
     F: np.ndarray
     violation: np.ndarray
 
+    @staticmethod
+    def of(points: Any, rows: np.ndarray) -> Archive:
+        """The points of `rows` (indices or mask) of anything with the columns `Z`, `F` and `violation`, such as an `Evaluation`."""
+        return Archive(points.Z[rows], points.F[rows], points.violation[rows])
+
     def __len__(self) -> int:
         return len(self.F)
 
-    def take(self, rows: np.ndarray) -> Archive:
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {counted(len(self), 'point')}, {counted(self.F.shape[1], 'objective')}>"
+
+    def columns(self) -> list[np.ndarray]:
+        """The arrays of all fields, in their order."""
+        return [getattr(self, one.name) for one in fields(self)]
+
+    def take(self, rows: np.ndarray) -> Self:
         """The points of `rows` (indices or mask)."""
-        return Archive(self.Z[rows], self.F[rows], self.violation[rows])
+        return type(self)(*(values[rows] for values in self.columns()))
+
+    def joined(self, others: Self) -> Self:
+        """The points of this archive, then the others, all of them."""
+        return type(self)(*map(np.concatenate, zip(self.columns(), others.columns(), strict=True)))
+
+    def replaced(self, rows: np.ndarray, others: Any) -> Archive:
+        """The points, with those of the mask `rows` (n,) replaced by those in the same rows of `others`, such as an `Evaluation`."""
+        Z, F = (np.where(rows[:, None], new, old) for new, old in ((others.Z, self.Z), (others.F, self.F)))
+        return Archive(Z, F, np.where(rows, others.violation, self.violation))
 
 
 def reach(F: np.ndarray, exponent: float | None) -> float:
-    """The exponent of the energy of points F (n, m), the given one or the default; see `pair_energies`."""
+    """Exponent of the energy of points F (n, m): the given one or the default; see `pair_energies`."""
     return exponent or (2.0 if np.count_nonzero(np.ptp(F, axis=0)) <= 2 else 8.0)
 
 
 def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None) -> np.ndarray:
-    """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of the rows of F (n, m) scaled by their ranges.
+    """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of two rows of F (n, m) scaled by their ranges.
 
-    Without an exponent, s is 2 on a curve, which is the paper's, and 8 where more than two objectives vary: a long reach drives the points
-    of a surface to its edges, and only a short one leaves them evenly spread (Hardin and Saff 2004). An objective that does not vary adds
-    nothing to any distance. Distances are in units of what there is between neighbours if `count` of the points (default: all) are evenly
-    spread, so that coinciding points have an energy that is huge but finite (more would drown the others in rounding).
+    By default the exponent s is 2, as in the paper, if at most two objectives vary, and 8 otherwise: a low exponent has a long reach, which
+    drives the points of a surface to its edges; a high one spreads them evenly (Hardin and Saff 2004). An objective that does not vary adds
+    nothing to the distances. The unit of distance is that between neighbours when `count` points (default: all) are evenly spread. The
+    energy of coinciding points is large but finite, since a larger one would hide the others in rounding errors.
     """
     span = F.max(axis=0) - F.min(axis=0)
     varying = np.flatnonzero(span > 0.0)
@@ -65,18 +88,18 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
 
 
 def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponent: float | None = None) -> np.ndarray:
-    """Choose `limit` of the points F (n, m), n > limit, with a low energy of all their pairs; the best of each objective is always kept.
+    """Mask (n,) of `limit` of the points F (n, m), n > limit, with a low energy of all pairs; the best of each objective is always kept.
 
-    Vacancies are filled one at a time by the point that adds least; then members are exchanged for points left over, the best exchange
-    first, as long as one lowers the energy. So the result has no higher energy than the `members`, if these were the limit in number and
-    had the best of each objective; a best one that they lack comes in whatever it costs.
+    Free places are filled one at a time by the point that adds least energy. Then chosen points are exchanged for others, the best exchange
+    first, as long as an exchange lowers the energy. So the energy is at most that of `members`, if these are `limit` points that include
+    the best of each objective; a best one that is missing is added at any cost.
 
     Parameters
     ----------
     F : array (n, m)
         Mutually non-dominated objectives.
     limit : int
-        How many to choose, at least 1. Of fewer than m, only as many are kept for being best, in the order of the objectives.
+        Number of points to choose, at least 1. If it is less than m, only the best points of the first objectives are kept.
     members : array (n,) of bool, optional
         Points to begin with, at most `limit`. Default: the best of each objective only.
     exponent : float, optional
@@ -91,7 +114,7 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponen
     fixed[extremes(F)[:limit]] = True
     inside = fixed.copy() if members is None else fixed | members
     energy = energies[:, inside].sum(axis=1)
-    while np.count_nonzero(inside) > limit:  # an extreme that came in makes room for itself
+    while np.count_nonzero(inside) > limit:  # a best point that was added replaces another
         _flip(inside, energy, energies, np.argmax(np.where(inside & ~fixed, energy, -np.inf)))
     while np.count_nonzero(inside) < limit:
         _flip(inside, energy, energies, np.argmin(np.where(inside, np.inf, energy)))
@@ -100,7 +123,7 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponen
 
 
 def _flip(inside: np.ndarray, energy: np.ndarray, energies: np.ndarray, point: np.intp) -> None:
-    """Let a point in or out; `energy` (n,) is that of each point with all that are inside."""
+    """Add or remove a point, in place; `energy` (n,) is that of each point with all points inside."""
     inside[point] = not inside[point]
     if inside[point]:
         energy += energies[point]
@@ -109,7 +132,7 @@ def _flip(inside: np.ndarray, energy: np.ndarray, energies: np.ndarray, point: n
 
 
 def _exchange(inside: np.ndarray, fixed: np.ndarray, energy: np.ndarray, energies: np.ndarray) -> None:
-    """Exchange members for others while that lowers the total; the threshold keeps rounding from exchanging two points for ever."""
+    """Exchange points, in place, while that lowers the total energy; because of the threshold, rounding cannot exchange two for ever."""
     for _ in range(10 * len(inside)):
         out, others = np.flatnonzero(inside & ~fixed), np.flatnonzero(~inside)
         if not (out.size and others.size):
@@ -132,31 +155,29 @@ def insert(
     tolerance: float,
     exponent: float | None = None,
 ) -> Archive:
-    """The archive after it has been offered points.
+    """The archive after points have been offered to it.
 
     Parameters
     ----------
     archive : Archive
     Z, F, violation : arrays (k, D), (k, m), (k,)
-        Points offered. Those that are infeasible, failed (NaN), dominated by or equal to another one are refused.
+        Offered points. Those that are infeasible, failed (NaN), or dominated by or equal to another one are refused.
     limit : int
         Largest number of points, at least m.
     tolerance : float
-        A violation of at most this is feasible.
+        A point with a violation of at most this is feasible.
     exponent : float, optional
         See `pair_energies`.
 
     Returns
     -------
     Archive
-        Members come first, in their order; the best value ever offered of each objective is always in it.
+        Points of the old archive come first, in their order. The best value of each objective that was ever offered is in it.
     """
     offered = np.flatnonzero((violation <= tolerance) & np.isfinite(F).all(axis=1))
     if not offered.size:
         return archive
-    every = Archive(
-        np.vstack([archive.Z, Z[offered]]), np.vstack([archive.F, F[offered]]), np.concatenate([archive.violation, violation[offered]])
-    )
+    every = archive.joined(Archive(Z[offered], F[offered], violation[offered]))
     keep = np.flatnonzero(nondominated(every.F))
     if len(keep) > limit:
         keep = keep[spread(every.F[keep], limit, keep < len(archive), exponent)]
@@ -164,6 +185,6 @@ def insert(
 
 
 def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray) -> Archive:
-    """The least violated, one row, of `closest` and of the points offered: Z (k, D), F (k, m), violation (k,). The first of equal ones."""
-    every = Archive(np.vstack([closest.Z, Z]), np.vstack([closest.F, F]), np.concatenate([closest.violation, violation]))
+    """The least violated point, one row, of `closest` and the points Z (k, D), F (k, m), violation (k,); of equal ones the first."""
+    every = closest.joined(Archive(Z, F, violation))
     return every.take(np.argsort(every.violation, kind="stable")[:1])

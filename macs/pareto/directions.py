@@ -1,4 +1,4 @@
-"""Directions of objectives: simplex lattices, weights of scalar sub-problems (Ricciardi and Vasile 2015), reference directions."""
+"""Directions in objective space: simplex lattices, weights of scalar sub-problems (Ricciardi and Vasile 2015), reference directions."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .ranges import normalised
 
 
 def across(y: np.ndarray) -> np.ndarray:
-    """Points (k, m) projected along the diagonal, on which all objectives fall alike, onto the plane through the origin."""
+    """Points (k, m) projected along the diagonal (1, ..., 1) onto the plane through the origin that is normal to it."""
     return y - y.mean(axis=1, keepdims=True)
 
 
 def simplex_lattice(m: int, divisions: int) -> np.ndarray:
-    """Points with coordinates that are multiples of 1/divisions and sum to 1, (comb(divisions + m - 1, m - 1), m) (Das and Dennis 1998)."""
+    """Points (comb(divisions + m - 1, m - 1), m) whose coordinates are multiples of 1/divisions and sum to 1 (Das and Dennis 1998)."""
     bars = np.array(list(combinations(range(divisions + m - 1), m - 1)), dtype=int).reshape(-1, m - 1)
     edges = np.hstack([np.full((len(bars), 1), -1), bars, np.full((len(bars), 1), divisions + m - 1)])
     return (np.diff(edges, axis=1) - 1) / divisions
@@ -32,8 +32,8 @@ def pool(m: int, size: int) -> np.ndarray:
     m : int
         Number of objectives.
     size : int
-        How many are wanted. For m = 2 this is how many there are; for m = 1 there is one; for m >= 3 the finest simplex lattice that has no
-        more is taken (with one division at least), and its centre added if it lacks it.
+        Number of directions: exact for m = 2; for m = 1 there is one. For m >= 3 they are those of the finest simplex lattice with at most
+        so many (and at least one division), and its centre.
 
     Returns
     -------
@@ -54,47 +54,44 @@ def pool(m: int, size: int) -> np.ndarray:
 
 
 def draw(directions: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Rows of active directions, (count,) of int: the m orthogonal ones, others at random, and none twice before all are taken."""
+    """Rows (count,) of active directions: the m orthogonal ones, then others at random; none is repeated before all have been drawn."""
     m = directions.shape[1]
     chosen = np.concatenate([np.arange(m), rng.permutation(np.arange(m, len(directions)))])[:count]
     return np.concatenate([chosen, rng.choice(len(directions), count - len(chosen))])
 
 
 def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
-    """Tchebycheff scalarisation: the largest weighted objective, of those that have a weight (Miettinen 1999, section 3.4).
+    """Values (...,) of the Tchebycheff scalarisation: the largest weighted objective among those with a weight (Miettinen 1999, section
+    3.4).
 
-    Values better than the ideal point count as negative, so that a new best of one objective is better for the direction that owns it.
+    A value below the ideal point is negative, so that a new best value of an objective is an improvement for its direction.
 
     Parameters
     ----------
     F, directions : arrays (..., m)
         Objectives and weights; leading axes broadcast.
     ideal, nadir : arrays (m,)
-        Where the objectives are scaled to 0 and 1.
-
-    Returns
-    -------
-    array (...,)
+        Values that are scaled to 0 and 1.
     """
     weighted = directions * normalised(F, ideal, nadir)
     return np.where(directions > 0.0, weighted, -np.inf).max(axis=-1)
 
 
 DEFAULT = 100
-"""By default: the finest lattice that has no more directions. 100 for two objectives and 91 for three, as is customary."""
+"""Default: the finest lattice with at most so many directions: 100 for two objectives and 91 for three, as usual."""
 
 
 FINER = 4
-"""A number of directions that no lattice has is chosen from a lattice with so many times as many."""
+"""If no lattice has the number of directions that is wanted, they are chosen from a lattice with up to so many times as many."""
 
 
 def lattice_size(m: int, divisions: int) -> int:
-    """How many directions a simplex lattice has."""
+    """Number of directions of a simplex lattice."""
     return comb(divisions + m - 1, m - 1)
 
 
 def divisions_below(m: int, count: int) -> int:
-    """Divisions of the finest lattice that has no more than `count` directions, at least 1."""
+    """Divisions, at least 1, of the finest lattice with at most `count` directions."""
     divisions = 1
     while lattice_size(m, divisions + 1) <= count:
         divisions += 1
@@ -102,22 +99,17 @@ def divisions_below(m: int, count: int) -> int:
 
 
 def reference_directions(m: int, population: int | None, divisions: int | None) -> np.ndarray:
-    """Directions by divisions or by number.
+    """Reference directions (k, m), rows that sum to 1, in lexicographic order.
 
     Parameters
     ----------
     m : int
         Number of objectives, at least 2.
     population : int or None
-        How many, at least m, if `divisions` do not say.
+        Number of directions, at least m; not used if `divisions` are given. If no simplex lattice has so many, they are points of a finer
+        one with a low energy of all pairs, its corners among them.
     divisions : int or None
-        Of the simplex lattice (Das and Dennis 1998).
-
-    Returns
-    -------
-    array (k, m)
-        Rows that sum to 1, in lexicographic order. The lattice that has as many as are wanted, if there is one; otherwise so many points of
-        a finer one with a low energy of all pairs, the corners among them.
+        Divisions of the simplex lattice (Das and Dennis 1998).
     """
     return _lattice(m, population, divisions).copy()
 
@@ -134,21 +126,21 @@ def _lattice(m: int, population: int | None, divisions: int | None) -> np.ndarra
 
 
 def population_size(m: int | None, population: int | None, divisions: int | None) -> int | None:
-    """How many individuals there are; None as long as that depends on the number of objectives and this is not known."""
+    """Number of individuals; None if it depends on the number m of objectives, which is not known."""
     if population is not None:
         return population
     return None if m is None else lattice_size(m, divisions_below(m, DEFAULT) if divisions is None else divisions)
 
 
 def check_directions(name: str, m: int, population: int | None, divisions: int | None) -> None:
-    """Raise ValueError where there are too few directions, or too few individuals for them.
+    """Raise ValueError if there are too few directions, or too few individuals for them.
 
     Parameters
     ----------
     name : str
-        Of the solver, for the message.
+        Name of the solver, for the message.
     m : int
-        Number of objectives that the directions are of.
+        Number of objectives of the directions.
     population, divisions : int or None
         As the user gave them.
     """
@@ -170,7 +162,7 @@ def check_directions(name: str, m: int, population: int | None, divisions: int |
 
 
 def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pair rows with columns of `costs` (r, c), the globally cheapest pair first: two arrays (min(r, c),) of int."""
+    """Rows and columns, (min(r, c),) each, of pairs in `costs` (r, c): always the cheapest of the pairs that are left."""
     costs = costs.astype(float, copy=True)
     rows, columns = [], []
     for _ in range(min(costs.shape)):

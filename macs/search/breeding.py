@@ -1,8 +1,10 @@
-"""Breeding: new points from those of the archive, by several operators that are called the more often the more of theirs it kept.
+"""Breeding: offspring of the points of the archive, by several operators. An operator is used more often if the archive keeps its
+offspring.
 
-The agents are few and look around where they are. The archive holds a whole front, whose points differ by what leads along it: crossover
-exchanges coordinates between its points, differences of two of them are steps for a third. No operator is best everywhere: crossover
-solves what is separable and full of local fronts, differences solve what is coupled. So all are used, each as far as it earns it.
+The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
+along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. No operator is
+best on every problem. Crossover suits separable problems with many local fronts, differences suit coupled variables. So all are used, in
+proportion to their success.
 """
 
 from __future__ import annotations
@@ -12,30 +14,33 @@ from collections.abc import Callable
 import numpy as np
 
 from ..evaluation.box import Box
-from .settings import Settings
-from .state import SearchState, remember
+from .state import remember
 from .trials import Trials
 
+FEW = 4
+"""An archive of at most so many points is too small for mates: the agents are mates too."""
+
+
 NEAR, WIDE = 20, 0.3
-"""Among how many of the nearest mates are chosen; the probability that they are chosen among all (Zhang and Li 2007; Li and Zhang 2009)."""
+"""Mates are drawn from so many nearest points, or with this probability from all (Zhang and Li 2007; Li and Zhang 2009)."""
 
 
 DIFFERENCE = 0.5
-"""Weight of a difference of two mates, the usual one (Li and Zhang 2009)."""
+"""Weight of the difference of two mates (Li and Zhang 2009)."""
 
 
 INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
-"""Distribution indices: the higher, the nearer offspring are to their parents (Deb and Agrawal 1995)."""
+"""Distribution indices; a higher index puts offspring nearer to their parents (Deb and Agrawal 1995)."""
 
 
 LEAST_SHARE, FORGET = 0.05, 0.1
-"""Least share of an operator in the offspring, so that it may show its worth later; which part of the credit is forgotten each time."""
+"""Least share of an operator in the offspring, so that it can succeed later; fraction of the credit that is forgotten in each iteration."""
 
 
 def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Three different points of the pool (p, d) for each of X (k, d), mostly near it and none equal to it: (3, k, d).
+    """Three different points of the pool (p, d) for each of X (k, d), mostly near it and never equal to it: (3, k, d).
 
-    Where the pool has too few others, the point itself stands in for them: differences to it are zero.
+    If the pool has too few other points, the point itself takes their places; its difference to itself is zero.
     """
     squared = box.squared_distances(X, pool)
     squared[squared == 0.0] = np.inf
@@ -54,9 +59,11 @@ def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -
 
 
 def crossover(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Simulated binary crossover (Deb and Agrawal 1995): half of the coordinates are bred with the first mate's.
+    """Children (k, d) by simulated binary crossover (Deb and Agrawal 1995): half of the coordinates are crossed with those of the first
+    mate.
 
-    A child is near its parent in three of four of them, and near the mate in the others, at distances in the scale of their difference.
+    In three of four of these coordinates a child is near its parent, in the others near the mate. Distances scale with the difference of
+    parent and mate.
     """
     u = rng.random(X.shape)
     ratio = np.where(u < 0.5, 2.0 * u, 0.5 / (1.0 - u)) ** (1.0 / (INDEX_CROSSOVER + 1.0))
@@ -65,18 +72,18 @@ def crossover(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generat
 
 
 def differential(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Differential evolution from the point itself: x + F (m2 - m3), every second time in half of the coordinates only."""
-    return X + np.where(_part(X, rng), DIFFERENCE * box.difference(mates[1], mates[2]), 0.0)
+    """Children (k, d) by differential evolution from the parent: x + F (m2 - m3); every second child in half of the coordinates only."""
+    return X + np.where(_moving_coordinates(X, rng), DIFFERENCE * box.difference(mates[1], mates[2]), 0.0)
 
 
 def toward_mate(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Part of the way to the first mate, and a difference of the others: x + K (m1 - x) + F (m2 - m3), K uniform in (0, 1)."""
+    """Children (k, d) on the way to the first mate, plus a difference of the others: x + K (m1 - x) + F (m2 - m3), K uniform in (0, 1)."""
     step = rng.random((len(X), 1)) * box.difference(mates[0], X) + DIFFERENCE * box.difference(mates[1], mates[2])
-    return X + np.where(_part(X, rng), step, 0.0)
+    return X + np.where(_moving_coordinates(X, rng), step, 0.0)
 
 
-def draw_anew(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """One coordinate from anywhere in its bounds: the way out where all that has been found is on one side of a barrier."""
+def redraw_coordinate(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Children (k, d) with one coordinate drawn anew within its bounds: this can cross a barrier when all known points are on one side."""
     trial = X.copy()
     trial[np.arange(len(X)), rng.integers(X.shape[1], size=len(X))] = rng.random(len(X))
     return trial
@@ -85,36 +92,39 @@ def draw_anew(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generat
 Operator = Callable[[Box, np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
 
 
-OPERATORS: tuple[tuple[Operator, bool], ...] = ((crossover, True), (differential, True), (toward_mate, True), (draw_anew, False))
-"""The operators, and whether their offspring also mutate."""
+OPERATORS: tuple[tuple[Operator, bool], ...] = ((crossover, True), (differential, True), (toward_mate, True), (redraw_coordinate, False))
+"""The operators, each with whether its offspring also mutate."""
 
 
 def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Polynomial mutation (Deb and Goyal 1996) of one coordinate on average, in units of its span; not put back in the box."""
+    """Points (k, d) after polynomial mutation (Deb and Goyal 1996) of one coordinate on average; they may be outside the box."""
     u = rng.random(X.shape)
     size = 1.0 - (1.0 - np.abs(2.0 * u - 1.0)) ** (1.0 / (INDEX_MUTATION + 1.0))
     return X + np.where(rng.random(X.shape) < 1.0 / X.shape[1], np.copysign(size, u - 0.5), 0.0)
 
 
 def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """One proposal for each parent.
+    """One offspring of each parent, and the operator that made it.
 
     Parameters
     ----------
+    box : Box
     X : array (k, d)
-        The parents.
+        The parents, in unit coordinates.
     pool : array (p, d)
-        Where their mates are from.
+        Points that mates are chosen from.
     credit : array (number of operators, 2)
-        See `learn`.
+        See `updated_credit`.
+    rng : numpy.random.Generator
 
     Returns
     -------
     array (k, d)
+        The offspring, inside the box.
     array (k,) of int
-        Which operator made each.
+        Row in `OPERATORS` of the operator that made each.
     """
-    operator = rng.choice(len(OPERATORS), size=len(X), p=shares(credit))
+    operator = rng.choice(len(OPERATORS), size=len(X), p=operator_shares(credit))
     others = mates(box, X, pool, rng)
     trial = X.copy()
     for index, (propose, mutates) in enumerate(OPERATORS):
@@ -126,38 +136,40 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np
 
 
 def no_credit() -> np.ndarray:
-    """The credit to begin with, alike for all operators: as if each had been tried a few times, some of them with success."""
+    """Initial credit (o, 2), equal for all operators: one success in five trials."""
     return np.tile([1.0, 5.0], (len(OPERATORS), 1))
 
 
-def learn(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """The credit of the operators, (o, 2): how many of their offspring were kept, and how many there were, the older the less.
+def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Credit of the operators (o, 2): number of offspring that the archive kept, and of all offspring; older ones count less.
 
     Parameters
     ----------
     credit : array (o, 2)
+        Credit so far.
     operator, kept : arrays (k,) of int and bool
-        Which operator made each child, and whether the archive kept it.
+        Operator of each child, and whether the archive kept the child.
     """
     tried = np.bincount(operator, minlength=len(credit))
     won = np.bincount(operator, weights=kept, minlength=len(credit))
     return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
 
 
-def shares(credit: np.ndarray) -> np.ndarray:
-    """Probability matching: each operator's share is proportional to its rate of success, but for a least share (Thierens 2005)."""
+def operator_shares(credit: np.ndarray) -> np.ndarray:
+    """Probabilities (o,) of the operators: proportional to their success rates, with a least share for each (Thierens 2005)."""
     rate = (credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)
     return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
 
 
-def _part(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Which coordinates take part, (k, d) of bool: all of them, or every second time half of them."""
+def _moving_coordinates(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Mask (k, d) of the coordinates that change: all of a row or, with probability one half, each with probability one half."""
     return rng.random(X.shape) < np.where(rng.random((len(X), 1)) < 0.5, 1.0, 0.5)
 
 
-def breed_archive(state: SearchState, settings: Settings, box: Box, trials: Trials) -> None:
-    """Offspring of points of the archive, of as many as possible; the operators whose offspring it keeps will make more."""
-    archive, evaluator, rng = state.archive, trials.evaluator, state.rng
+def breed_archive(trials: Trials) -> None:
+    """Breed offspring of the archive's points, from as many parents as possible, and update the credit of the operators."""
+    state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
+    archive, rng = state.archive, state.rng
     count = settings.offspring(len(archive))
     if not count:
         return
@@ -171,8 +183,4 @@ def breed_archive(state: SearchState, settings: Settings, box: Box, trials: Tria
         return
     remember(state, trials.seen, settings, evaluator)
     kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
-    state.credit = learn(state.credit, operator[bred], kept)
-
-
-FEW = 4
-"""An archive of so many points is too small to find mates in: the agents are mates too."""
+    state.credit = updated_credit(state.credit, operator[bred], kept)

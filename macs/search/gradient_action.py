@@ -1,43 +1,44 @@
-"""Refinement by gradients: an individual action of agents during the search; see `polish` for what comes at its end.
+"""Gradient action: gradient refinement of single agents during the search. See `gradients.polish` for the end of the search.
 
-Every solve goes from a point down to the front (Pascoletti and Serafini 1984): F - reference <= alpha weights, least alpha. With the
-point's own objectives as reference it is guarded: no objective gets worse, whichever basin the solve began in. What it finds is taken only
-if it is feasible and keeps that promise.
+Each solve leads from a point to the front by the scalarisation of Pascoletti and Serafini (1984): minimise alpha subject to
+F - reference <= alpha weights. If the reference is the objectives of the point itself, no objective may get worse, wherever the solve
+begins: such a solve is called guarded. Its result is used only if it is feasible and indeed no worse.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
 from .state import NO_DIRECTION, SearchState
 
 FLAT = 0.05
-"""Least component of a direction that still counts: a smaller one would let its objective go anywhere."""
+"""Least component of a direction in the weights: a smaller one would leave its objective without control."""
 
 
 def allowed(evaluations: int, every: int, solves: int) -> int:
-    """How many gradient solves a search may make now: one for every so many evaluations, less those that it has made."""
+    """Number of gradient solves that a search may make now: one for every `every` evaluations, less the `solves` already made."""
     return max(evaluations // every - solves, 0)
 
 
-def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: float) -> list[Evaluation]:
-    """One solve for the agent whose turn it is, towards its own direction.
+def individual_action(state: SearchState, evaluator: Evaluator, F: float) -> list[Evaluation]:
+    """Make one gradient solve for the agent whose turn it is, along its own direction.
 
-    Of an agent that is feasible it is guarded, and begins, in turn, where the agent is, where its nearest neighbour in the archive is, and
-    where a social action would have led it: the last two so that it may leave the basin that it is in. One that is infeasible is made
-    feasible on the way, from where it is. In the first turn, those whose direction is one objective go for its best there is, whatever
-    becomes of the others: where the ends of the front are, the archive has to know to be spread along it. With more than two objectives,
-    all but these look from the ideal point, along their direction: a surface has too many places to wait until each has been visited by
-    somebody. After the first turn, there is nothing to be gained at the ends, and another direction is drawn.
+    For a feasible agent the solve is guarded. Its start changes from turn to turn: the position of the agent, that of its nearest neighbour
+    in the archive, or the proposal of a social action. The last two allow the agent to leave its basin of attraction. For an infeasible
+    agent the solve starts at its position and makes it feasible as well.
+
+    In the first turn, an agent whose direction is a single objective minimises that objective alone, without regard to the others: the
+    archive needs the ends of the front to be spread along it. After the first turn the ends are known, and with more than two objectives
+    such an agent gets a random direction. With more than two objectives, all other solves start their line at the ideal point instead of
+    the agent's objectives: a surface is too large to be covered from the positions of the agents alone.
 
     Returns
     -------
     list of Evaluation
-        What there is to tell the archive.
+        Points to be offered to the archive: one, or none.
     """
     agents, m = state.agents, state.directions.shape[1]
     turn, i = divmod(state.refinements, len(agents))
@@ -50,6 +51,7 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     if turn % 3 == 1 and others.size:
         start = state.archive.Z[others[nearest(agents.F[i], state.archive.F[others], ranges_of(state))[0]]]
     elif turn % 3 == 2 and feasible:
+        box = evaluator.box
         pool = box.to_unit(state.archive.Z[:, evaluator.free])
         X = box.to_unit(start[evaluator.free])[None]
         start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
@@ -61,14 +63,14 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
     reference = np.where(direction > 0, reference, np.inf) if alone else reference
     found = evaluator.descend(start[None], reference[None], weights[None])
-    if not len(found.F):  # the search is to end
+    if not len(found.F):  # asked to end early
         return []
-    promised = agents.F[i] if feasible else np.full(m, np.inf)
-    if feasible_and_no_worse(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
+    limit = agents.F[i] if feasible else np.full(m, np.inf)
+    if feasible_and_no_worse(found, limit[None], agents.violation[i : i + 1], ranges_of(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
 
 
 def ranges_of(state: SearchState) -> np.ndarray:
-    """The `ranges` of the archive, or of the agents while it is empty."""
+    """The `ranges` (m,) of the archive, or of the agents while the archive is empty."""
     return ranges(state.archive.F if len(state.archive) else state.agents.F[np.isfinite(state.agents.F).all(axis=1)])

@@ -1,4 +1,4 @@
-"""MACS: Multi-Agent Collaborative Search, the loop of its iterations and its end."""
+"""MACS: Multi-Agent Collaborative Search, its iterations and what follows the last of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from problems.peaks import refuse_peaks
 from transcription.base import Meshed, Transcription
 from transcription.catalogue import parse
 
-from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..gradients.polish import CountedSolves, PolishLog, polish
@@ -33,17 +32,18 @@ class MACS(Settings, Solver):
     __doc__ = Settings.__doc__
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
-        """Sample, evaluate and archive the first population.
+        """The state of a search after its first population has been sampled, evaluated and archived.
 
         Parameters
         ----------
         evaluator : Evaluator
         budget : int
-            How many evaluations the evaluator may have counted in the end; never exceeded.
+            Number of evaluations that the evaluator may have counted at the end; never exceeded.
         rng : numpy.random.Generator
-            The one source of chance; it becomes part of the state.
+            The only source of randomness; it becomes part of the state.
         start : array (k, D), optional
-            Full vectors to begin with, evaluated first. Missing agents are sampled, and of too many the best become agents.
+            Full vectors that are evaluated first. If they are fewer than the points to sample, the rest is sampled; the best of all become
+            agents.
 
         Returns
         -------
@@ -52,11 +52,10 @@ class MACS(Settings, Solver):
         Raises
         ------
         ValueError
-            Where the archive is smaller than the number of objectives, or the budget leaves nothing to evaluate.
+            If the archive is smaller than the number of objectives, or the budget leaves nothing to evaluate.
         """
-        if budget <= evaluator.counts.evaluations:
-            raise ValueError(f"evaluations: the budget of {budget} leaves none")
-        box = box_of(evaluator)
+        evaluator.check_budget(budget)
+        box = evaluator.box
         missing = self.points_to_sample(budget) - (0 if start is None else len(start))
         batches = [] if start is None else [np.asarray(start, dtype=float)]
         if missing > 0:
@@ -68,8 +67,8 @@ class MACS(Settings, Solver):
         self.check_objectives(m)
         state = SearchState(
             agents=agents_at(seen, np.arange(0), len(evaluator.free), self),
-            archive=Archive(seen.Z[:0], seen.F[:0], seen.violation[:0]),
-            closest=Archive(seen.Z[:0], seen.F[:0], seen.violation[:0]),
+            archive=Archive.of(seen, np.arange(0)),
+            closest=Archive.of(seen, np.arange(0)),
             ideal=np.full(m, np.nan),
             nadir=np.full(m, np.nan),
             directions=directions.pool(m, self.directions or 100 * m),
@@ -80,31 +79,28 @@ class MACS(Settings, Solver):
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
-        seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # a failure may bring nothing back to start from again
+        seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent), len(evaluator.free), self)
-        assign(state, self, box, evaluator)
+        assign(state, self)
         return state
 
     def advance(self, state: SearchState, evaluator: Evaluator, budget: int) -> None:
-        """One iteration, of some tens of evaluations; changes `state`. With the budget spent it does nothing."""
+        """Do one iteration, of some tens of evaluations; changes `state`. Once the budget is spent it does nothing."""
         if state.evaluations >= budget:
             return
-        box = box_of(evaluator)
-        trials = Trials(self, state, evaluator, box, budget)
-        individual_actions(state, self, box, trials)
-        remember(state, trials.seen, self, evaluator)
-        trials = Trials(self, state, evaluator, box, budget)
-        social_actions(state, self, box, trials, evaluator)
-        remember(state, trials.seen, self, evaluator)
-        breed_archive(state, self, box, Trials(self, state, evaluator, box, budget))
+        for actions in (individual_actions, social_actions):
+            trials = Trials(self, state, evaluator, budget)
+            actions(trials)
+            remember(state, trials.seen, self, evaluator)
+        breed_archive(Trials(self, state, evaluator, budget))
         if self.refines and evaluator.has_gradients:
             for _ in range(gradient_action.allowed(state.evaluations, self.refine_every, state.refinements)):
-                remember(state, gradient_action.individual_action(state, box, evaluator, self.F), self, evaluator)
-        assign(state, self, box, evaluator)
+                remember(state, gradient_action.individual_action(state, evaluator, self.F), self, evaluator)
+        assign(state, self)
         state.iteration += 1
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
-        """Polish the archive by gradients, where there are any. Asked to end early, it leaves what it has; called again, it goes on."""
+        """Polish the archive by gradients, if the problem has them. If asked to end early, the polish continues at the next call."""
         if not (self.refines and evaluator.has_gradients):
             return
         if state.polishing is None:
@@ -116,7 +112,7 @@ class MACS(Settings, Solver):
             state.polishing = None
 
     def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
-        """The front polished on another transcription, or with its meshes refined, where the settings say so."""
+        """The front, polished on another transcription or with refined meshes if the settings ask for it."""
         if self.polish_on is not None:
             solves = front.stats["evaluations"] // self.polish_every
             return front.polished(
@@ -130,17 +126,17 @@ class MACS(Settings, Solver):
         if self.mesh == "fixed" or not len(front):
             return front
         refined = front.refine_mesh(tolerance=self.mesh_tolerance, time_limit=time_limit, progress=progress)
-        # A point whose mesh is not fine enough may look too good: it does not count as dominating any.
+        # The objectives of a point on too coarse a mesh may be too low: such a point must not remove others.
         trusted = refined.F[[i for i, point in enumerate(refined) if not point.note]]
         return refined[np.flatnonzero(~np.any(dominates(trusted, refined.F[:, None]), axis=1))]
 
     def check_objectives(self, m: int) -> None:
-        """Refuse an archive that could not keep the best points of all m objectives."""
+        """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""
         if self.archive < m:
-            raise ValueError(f"MACS: archive must hold at least one point for each of the {m} objectives, not {self.archive}")
+            raise ValueError(f"MACS: archive must have at least one point for each of the {m} objectives, not {self.archive}")
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:
-        """Refuse `mesh="adaptive"` for a method whose mesh cannot be refined, and `polish_on` where gradient solves are refused."""
+        """Raise ValueError for `mesh="adaptive"` with a method whose mesh cannot be refined, and for `polish_on` without gradients."""
         if self.mesh == "adaptive" and not isinstance(transcription, Meshed):
             raise ValueError(f"MACS: mesh='adaptive' needs DFET or another method on elements, not {type(transcription).__name__}")
         if self.polish_on is not None:
@@ -148,15 +144,15 @@ class MACS(Settings, Solver):
 
     @property
     def certifies(self) -> bool:
-        """Whether the points of a front have their `optimality`."""
+        """Whether the points of its fronts get their `optimality`."""
         return self.refines
 
 
 def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | None) -> np.ndarray:
-    """Rows, in order, of the points to start from: all, or of too many the best.
+    """Rows, in increasing order, of the points that become agents: all of them, or the best `count`.
 
-    Feasible ones come before infeasible ones, and these by violation; of the feasible ones those that no other dominates come first, well
-    spread if they are too many, and then those that the fewest dominate.
+    Feasible points come before infeasible ones; infeasible ones are ordered by their violation. Of the feasible ones, the non-dominated
+    come first (well spread, if they are more than `count`), then those that the fewest points dominate.
     """
     if len(seen.F) <= count:
         return np.arange(len(seen.F))

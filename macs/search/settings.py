@@ -1,129 +1,136 @@
-"""Settings of MACS: every parameter, its range, its default, and its value in the paper."""
+"""Settings of MACS: each parameter with its range, its default and its value in the paper."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
-from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 
-from problems.checks import check_count
+from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
 SHARE = 8
-"""Of the budget, this part is the most that an iteration's scan of the coordinates may take."""
+"""Pattern search takes at most this part, one eighth, of the budget in one iteration."""
 LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1}
-OPTIONAL = ("verify", "exponent")
+"""Least value of each whole number."""
 INTERVALS = {
-    "rho": ("(0, 1]", lambda x: 0 < x <= 1),
-    "F": ("(0, 2]", lambda x: 0 < x <= 2),
-    "CR": ("[0, 1]", lambda x: 0 <= x <= 1),
-    "social": ("[0, 1]", lambda x: 0 <= x <= 1),
-    "contraction": ("(0, 1)", lambda x: 0 < x < 1),
-    "coordinates": ("(0, 1]", lambda x: 0 < x <= 1),
-    "momentum": ("[0, 1)", lambda x: 0 <= x < 1),
-    "concentration": ("[1, 10]", lambda x: 1 <= x <= 10),
-    "experience": ("[0, 1]", lambda x: 0 <= x <= 1),
-    "breeding": ("[0, 10]", lambda x: 0 <= x <= 10),
-    "mesh_tolerance": ("[1e-10, 1]", lambda x: 1e-10 <= x <= 1),
-    "verify": ("(0, inf)", lambda x: 0 < x < np.inf),
-    "exponent": ("[1, 16]", lambda x: 1 <= x <= 16),
+    "rho": "(0, 1]",
+    "F": "(0, 2]",
+    "CR": "[0, 1]",
+    "social": "[0, 1]",
+    "contraction": "(0, 1)",
+    "coordinates": "(0, 1]",
+    "momentum": "[0, 1)",
+    "concentration": "[1, 10]",
+    "experience": "[0, 1]",
+    "breeding": "[0, 10]",
+    "mesh_tolerance": "[1e-10, 1]",
+    "verify": "(0, inf)",
+    "exponent": "[1, 16]",
 }
-"""The interval that each number has to be in; OPTIONAL ones may be None."""
+"""Interval of each number."""
+OPTIONAL = ("verify", "exponent")
+"""Numbers that may be None."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Multi-Agent Collaborative Search (Ricciardi and Vasile 2015; Ricciardi, Vasile and Maddock 2016).
+    """Multi-Agent Collaborative Search: global search for the Pareto front by a few agents, refined by gradients.
 
-    A few agents look for better points, each by itself and then with what all have found; an archive keeps the best trade-offs,
-    evenly spread.
+    In each iteration the agents look for better points: first each by itself (individual actions), then with the information of all (social
+    actions). The best trade-offs are kept in an archive and spread evenly along the front; offspring of the archive's points add to the
+    search. If the problem has derivatives, gradient solves refine agents during the search and polish the archive at its end.
+
+    `MACS()` suits most problems. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
+    Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
 
     Parameters
     ----------
     agents : int, default 10
-        Number of agents, at least 3: differential evolution takes its parents among the others.
+        Number of agents, at least 3, as differential evolution needs.
     archive : int, default 10
-        Largest number of points in the archive, and so on the front; at least the number of objectives, whose best points are always kept.
+        Largest number of points in the archive, and so on the front. At least the number of objectives; the best point of each objective is
+        always kept.
     refine : bool, default True
-        Use derivatives, where the problem has them (a black box has none): one gradient solve of an agent for every `refine_every`
-        evaluations, and at the end of the search a polish of the archive, of about six solves for each of its points, as far as one for
-        every `polish_every` evaluations goes; with more than two objectives it first goes down to the front from places all over it, once
-        for each point that the archive may hold. They are counted in `stats["gradient_solves"]`, and points then carry their `optimality`.
-        False: the derivative-free method.
+        Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, see
+        `refine_every`, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
+        `stats["gradient_solves"]` counts all solves.
     polish_on : str, optional
-        A transcription, said as on the command line ("dfet:30x3:bernstein:1"), on which the archive is polished instead, see
-        `Front.polished`: a search wants what is scored quickly, such as shooting, gradients what is sparse. There are no gradient solves of
-        agents then. Not after Ctrl-C, a time limit or a callback ended the search; of a finished checkpoint the polish is made again.
+        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
+        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
+        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
+        polished again each time.
     verify : float, optional
-        For `polish_on`: by how much, in their scales, constraints may be missed when a point is flown. Points that miss more are moved
-        inside, by solves that come beside, or left out.
+        With `polish_on`: largest violation, in the constraints' scales, of a point when simulated. Points with more are moved inside their
+        limits by further solves, or left out.
     mesh : {"fixed", "adaptive"}, default "fixed"
-        "adaptive": at its end, the search refines the mesh of each point of its front until what the point promises can be flown, see
-        `Front.refine_mesh`; points that turn out to be dominated are left out. Not after Ctrl-C, a time limit or a callback ended it. Black
-        boxes have no mesh.
+        "adaptive": after the search, each point is solved on a mesh of its own until an independent simulation confirms it, see
+        `Front.refine_mesh`; points that are dominated then are left out. Not after Ctrl-C, a time limit or a callback. For optimal control
+        problems only.
     mesh_tolerance : float, default 1e-7
-        For an adaptive mesh: largest difference of a flown state from the transcription's, in spans of its bounds.
+        With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
+        [1e-10, 1].
     rho : float, default 1.0
-        Radius of the pattern search to begin with, in (0, 1], as a fraction of half the span of each variable (Table I: 1).
+        Initial radius of the pattern search, in (0, 1], as a fraction of half the span of each variable (Table I: 1).
     F : float, default 0.9
         Weight of the differences in differential evolution, in (0, 2] (Table I: 0.9).
     CR : float, default 0.9
-        Probability that a coordinate takes part in a step of differential evolution, in [0, 1] (Table I: 0.9).
+        Probability that a coordinate changes in differential evolution, in [0, 1] (Table I: 0.9).
     social : float, default 1.0
-        Fraction of the agents that own a direction and act socially, in [0, 1] (Table I: 1). Fewer than there are objectives: none do.
+        Fraction of the agents that do social actions, each for a direction of its own, in [0, 1] (Table I: 1). If they would be fewer than
+        the objectives, no agent does.
     contraction : float, default 0.5
-        By how much the radius shrinks when everything an agent tried failed, in (0, 1) (Table I: 0.5).
+        Factor by which the radius shrinks when all actions of an agent failed, in (0, 1) (Table I: 0.5).
     max_contractions : int, default 5
-        After how many contractions the radius starts anew, at least 0 (Table I: 5).
+        Number of contractions after which the radius is reset, at least 0 (Table I: 5).
     coordinates : float, default 1.0
-        Fraction of the coordinates that pattern search goes through, in (0, 1]; used if `adaptive_coordinates` is off (Table I: 1).
+        Fraction of the coordinates that pattern search tries, in (0, 1], if `adaptive_coordinates` is off (Table I: 1).
     adaptive_coordinates : bool, default True
-        Go through all coordinates while the archive is empty and through one when it is full (the authors' later code); but not through so
-        many that, if all fail, an iteration takes more than an eighth of the budget.
+        Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). An iteration
+        takes at most an eighth of the budget for it.
     directions : int, optional
-        How many directions the agents' own are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
+        Number of directions that those of the agents are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True
-        Draw the agents' directions anew in every iteration; otherwise they keep those they were given first, as in the paper.
+        Draw the agents' directions anew in each iteration. False: they keep their first directions, as in the paper.
     reseed : {"all", "spread"}, default "all"
-        Which points of the archive agents may be sent to: all, or only as many as there are agents, well spread. With "spread", agents are
-        also sent to an archive of fewer points than objectives: those nearest to them (the authors' later code).
+        Points of the archive that agents are moved to: all, or only as many as there are agents, well spread. With "spread", agents are
+        also moved to an archive with fewer points than objectives, the nearest agents first (the authors' later code).
     momentum : float, default 0.7
-        How much of the last velocity stays when a success adds its displacement to it, in [0, 1). 0 as in the paper: it is replaced.
+        Part of the last velocity that is added to the displacement of a success, in [0, 1). 0 in the paper.
     concentration : float, default 1.5
-        Exponent of the lengths of pattern search, in [1, 10]: radius times a uniform number to this power. Higher: more short steps. 1 in
-        the paper.
+        Exponent of the step lengths of pattern search, in [1, 10]: the radius times a uniform number to this power. A higher value gives
+        more short steps. 1 in the paper.
     experience : float, default 0.3
-        Probability that a social agent moves as others did when they improved, in [0, 1]. 0 in the paper, where it only uses positions.
+        Probability that a social agent repeats past improvements of all agents, in [0, 1]. 0 in the paper.
     memory : int, default 100
-        How many of the last improvements are remembered for that, at least 1.
+        Number of improvements that are kept for `experience`, at least 1.
     shorten : bool, default False
-        Shorten inertia's steps until they stay in the box, as in the paper; otherwise they are clipped to it, variable by variable.
+        Shorten steps of inertia so that they end in the box, as in the paper. False: each variable is clipped to its bounds.
     social_moves : bool, default True
-        Agents go where a social action was a success. False as in the paper: social actions only offer points to the archive.
-    refine_every : int, default 200
-        How many evaluations there are, at least 1, for each gradient solve of an agent.
-    polish_every : int, default 20
-        How many evaluations there are, at least 1, for each gradient solve in all.
+        Agents move to the points of successful social actions. False as in the paper: these points are only offered to the archive.
     keep_velocity : bool, default True
-        Every success gives its agent a velocity. Otherwise only one of pattern search does, and the others leave it at rest (the authors'
-        later code).
+        Every success gives its agent a velocity. False: only a success of pattern search does (the authors' later code).
+    refine_every : int, default 200
+        During the search, one gradient solve of an agent for so many evaluations, at least 1.
+    polish_every : int, default 20
+        At most one gradient solve, those during the search included, for so many evaluations, at least 1. A polish needs about six solves
+        for each point of the archive; with more than two objectives, one more for each point that the archive may contain.
     breeding : float, default 0.15
-        How many offspring each point of the archive has in an iteration, in [0, 10]; altogether at least one for each agent. More of them
-        get out of more local fronts, fewer leave the agents more to spend on convergence. 0 in the paper: there are none.
+        Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
+        More offspring escape from more local fronts, and leave less of the budget for the agents. 0 in the paper.
     sample : int, optional
-        How many points are drawn to begin with, at least as many as agents. Default: as many as the archive holds, if these are more, but
-        of the budget no more than a twentieth. In the paper there are as many as agents.
+        Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
+        the budget and at least the number of agents. In the paper: the number of agents.
     exponent : float, optional
-        By which power of the distance the charges of the archive repel each other, in [1, 16]. Default: 2 as in the paper with two
-        objectives, 8 with more: on a surface a lower one drives the points to its edges.
+        Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
+        with more: on a surface, a low power drives the points to the edges.
 
     Raises
     ------
     ValueError
-        Where a setting is out of its range; the message names it.
+        If a setting is outside its range; the message names it.
     """
 
     agents: int = 10
@@ -166,16 +173,11 @@ class Settings:
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
-        for name, (interval, inside) in INTERVALS.items():
-            value = getattr(self, name)
-            if (value is not None or name not in OPTIONAL) and (
-                not isinstance(value, Real) or isinstance(value, bool) or not inside(value)
-            ):
-                raise ValueError(f"MACS: {name} must be in {interval}, not {value!r}")
-        if self.reseed not in ("all", "spread"):
-            raise ValueError(f"MACS: reseed must be 'all' or 'spread', not {self.reseed!r}")
-        if self.mesh not in ("fixed", "adaptive"):
-            raise ValueError(f"MACS: mesh must be 'fixed' or 'adaptive', not {self.mesh!r}")
+        for name, interval in INTERVALS.items():
+            if name not in OPTIONAL or getattr(self, name) is not None:
+                check_interval(f"MACS: {name}", getattr(self, name), interval)
+        check_choice("MACS: reseed", self.reseed, ("all", "spread"))
+        check_choice("MACS: mesh", self.mesh, ("fixed", "adaptive"))
         self._check_polish()
 
     def _check_polish(self) -> None:
@@ -190,25 +192,26 @@ class Settings:
         except ValueError as error:
             raise ValueError(f"MACS: polish_on: {error}") from error
         if not self.refine:
-            raise ValueError("MACS: polish_on makes no sense with refine=False, which is to use no derivatives")
+            raise ValueError("MACS: polish_on makes no sense with refine=False, which uses no derivatives")
         if self.mesh == "adaptive":
-            raise ValueError("MACS: polish_on makes no sense with mesh='adaptive': points are on the mesh that it says")
+            raise ValueError("MACS: polish_on makes no sense with mesh='adaptive': its points are on the mesh that it names")
 
     @classmethod
     def paper(cls, **overrides: Any) -> Self:
-        """The settings of Table I of the paper, and what it does where the defaults do otherwise; `overrides` as for MACS itself.
+        """The settings of the paper: Table I, and its choices where the defaults differ. `overrides` are settings of MACS.
 
-        There are as many directions as social agents, and these keep theirs; as many points are sampled as there are agents. What
-        deliberately stays different:
+        There are as many directions as social agents, and these keep theirs; the first population has as many points as there are agents.
+        The following deliberately differs from the paper:
 
-        - Feasible points come before infeasible ones, and these by their violation; no penalty enters an objective.
-        - The budget is met exactly. The best point of each objective never leaves the archive.
-        - The scalarisation is normalised by feasible points only: the best values ever, and the worst ones in the archive.
-        - Success is dominance, or a better value for the direction; a point with equal objectives is none.
-        - A success puts its agent there at once, where the next actions of the others find it as a parent.
-        - Velocities are displacements that the inner level left, and the radius is credited with a success only for most of its own step.
-        - The parents in differential evolution are others than the agent, in social actions also other than its copies in the archive.
-        - Inertia shortens the step that it takes, not the velocity. One coordinate of differential evolution always takes part.
+        - Feasible points come before infeasible ones, which are ordered by their violation. No penalty enters an objective.
+        - The budget is never exceeded. The best point of each objective never leaves the archive.
+        - The scalarisation is normalised by feasible points only: the best values ever found, and the worst values in the archive.
+        - A success is dominance, or a better value for the agent's direction. A point with equal objectives is no success.
+        - After a success the agent moves at once, and the next actions of other agents use its new position.
+        - Velocities are the displacements after the inner level. The radius expands only after a success that kept most of the proposed
+          step.
+        - The parents in differential evolution differ from the agent; in social actions also from its copies in the archive.
+        - Inertia shortens its step, not the velocity. In differential evolution at least one coordinate changes.
         """
         settings: dict[str, Any] = {
             "refine": False,
@@ -230,11 +233,11 @@ class Settings:
 
     @property
     def refines(self) -> bool:
-        """Whether there are gradient solves on the transcription that is searched."""
+        """Whether the search makes gradient solves on its own transcription."""
         return self.refine and self.polish_on is None
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
-        """How many of d coordinates pattern search goes through; with one objective the archive is full with one point."""
+        """Number of the d coordinates that pattern search tries; with m = 1 objective the archive is full with one point."""
         if not self.adaptive_coordinates:
             return max(1, ceil(d * self.coordinates - 1e-9))
         limit = self.archive if m > 1 else 1
@@ -242,14 +245,14 @@ class Settings:
         return max(1, min(wanted, budget // (2 * SHARE * self.agents)))
 
     def points_to_sample(self, budget: int) -> int:
-        """How many points are drawn to begin with."""
+        """Number of points of the first population."""
         return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
 
     def offspring(self, archived: int) -> int:
-        """How many offspring an archive of so many points has in an iteration: none if there are no points."""
+        """Number of offspring in an iteration of an archive with so many points; 0 if it is empty."""
         return max(self.agents, round(self.breeding * archived)) if self.breeding and archived else 0
 
     def social_agents(self, m: int) -> int:
-        """How many agents own a direction, with m objectives: none, if they could not own all the orthogonal ones."""
+        """Number of agents with a direction, for m objectives: 0 if they are too few for all orthogonal directions."""
         count = round(self.social * self.agents)
         return count if count >= m else 0

@@ -1,4 +1,4 @@
-"""Social actions: proposals from population, archive and past improvements; directions of agents (Ricciardi and Vasile 2015)."""
+"""Social actions: proposals from the population, the archive and past improvements; directions of agents (Ricciardi and Vasile 2015)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evaluation.box import Box
-from ..evaluation.evaluator import Evaluator
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.ranges import normalised
@@ -17,13 +16,13 @@ from .state import NO_DIRECTION, SearchState
 from .trials import Trials
 
 FEWEST = 4
-"""Fewest points that parents are drawn from, and fewest improvements that are an experience."""
+"""Least number of points that parents are drawn from, and of improvements that `follow_experience` uses."""
 
 
 def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
-    """Rows (k, <= count) of the `count` points of the pool (p, d) nearest to each of X (k, d), without the point itself.
+    """Rows (k, <= count) of the `count` points of the pool (p, d) that are nearest to each of X (k, d), points equal to it left out.
 
-    A pool with copies of the point has fewer others; the missing rows are -1.
+    Missing rows are -1.
     """
     squared = box.squared_distances(X, pool)
     squared[squared == 0.0] = np.inf
@@ -32,23 +31,25 @@ def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray
 
 
 def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: float, rng: np.random.Generator) -> np.ndarray:
-    """DE/current-to-rand/1 with parents near each agent: y = x + K (p3 - x) + K F (p1 - p2), K uniform in (0, 1).
+    """Proposals of DE/current-to-rand/1 with parents near each agent: y = x + K (p3 - x) + K F (p1 - p2), K uniform in (0, 1).
 
     Parameters
     ----------
+    box : Box
     X : array (k, d)
         Positions of the agents.
     pool : array (p, d)
-        Where the parents are from.
+        Points that the parents are drawn from.
     count : int
-        Among how many of the nearest the three parents are drawn.
+        The parents are drawn from so many nearest points of the pool.
     F : float
         Weight of the difference.
+    rng : numpy.random.Generator
 
     Returns
     -------
     array (k, d)
-        Proposals; with only two parents near there is no p3, with fewer the agent stays.
+        With only two parents the term of p3 is zero; with fewer the proposal is x.
     """
     if not len(pool):
         return X.copy()
@@ -64,17 +65,19 @@ def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: fl
 
 
 def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Move like past improvements: by normal deviates with the mean and the second moments of their displacements.
+    """Proposals by random steps with the mean and the second moments of the displacements of past improvements.
 
-    A step that improves one point of a front tends to improve its neighbours, and such steps are longest where there is most to gain. This
-    estimates a covariance from successful steps (Hansen and Ostermeier 2001), without its matrix.
+    A step that improved one point of a front often improves its neighbours too, and the longest such steps gained most. This samples from
+    a covariance estimated from successful steps (Hansen and Ostermeier 2001), without forming its matrix.
 
     Parameters
     ----------
+    box : Box
     X : array (k, d)
         Positions of the agents.
     experience : array (e, d)
         Displacements, e > 0.
+    rng : numpy.random.Generator
 
     Returns
     -------
@@ -82,13 +85,13 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
     """
     count = len(experience)
     weights = rng.standard_normal((len(X), count)) / np.sqrt(count) + 1.0 / count
-    # Not a matrix product: those of BLAS may sum in another order with another number of threads.
+    # No matrix product: with another number of threads BLAS may sum in another order.
     return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All that a social action may use, positions in the unit box.
+    """Input of a social action; positions are in the unit box.
 
     Attributes
     ----------
@@ -113,29 +116,29 @@ class Surroundings:
 
 
 def among_population(s: Surroundings) -> np.ndarray:
-    """DE/current-to-rand/1 with parents among the nearest agents."""
+    """Proposals (k, d) of DE/current-to-rand/1 with parents among the nearest agents."""
     return current_to_rand(s.box, s.X, s.population, max(len(s.X), FEWEST), s.settings.F, s.rng)
 
 
 def among_archive(s: Surroundings) -> np.ndarray:
-    """DE/current-to-rand/1 with parents among the nearest points of the archive."""
+    """Proposals (k, d) of DE/current-to-rand/1 with parents among the nearest points of the archive."""
     return current_to_rand(s.box, s.X, s.archive, max(len(s.X), FEWEST), s.settings.F, s.rng)
 
 
 def along_experience(s: Surroundings) -> np.ndarray:
-    """Displacements like those of the last improvements."""
+    """Proposals (k, d) by displacements like those of the last improvements."""
     return follow_experience(s.box, s.X, s.experience, s.rng)
 
 
 def archive_probability(s: Surroundings) -> float | None:
-    """The larger the archive relative to the population, the more often it gives the parents; None while it is too small."""
+    """Probability that parents are from the archive: it grows with the archive's size relative to the population's; None if too small."""
     if len(s.archive) < FEWEST:
         return None
     return 1.0 - float(np.exp(-len(s.archive) / len({row.tobytes() for row in s.population})))
 
 
 def experience_probability(s: Surroundings) -> float | None:
-    """The setting `experience`; None until there are enough improvements."""
+    """The setting `experience`; None as long as there are too few improvements."""
     return s.settings.experience if len(s.experience) >= FEWEST else None
 
 
@@ -143,17 +146,18 @@ ACTIONS: tuple[tuple[Callable[[Surroundings], np.ndarray], Callable[[Surrounding
     (among_archive, archive_probability),
     (along_experience, experience_probability),
 )
-"""Proposals (k, d), each with the probability that an agent takes it instead of an earlier one; the first of all is `among_population`. An
-action without a probability is left out."""
+"""Social actions, each with the probability that its proposal replaces an earlier one. The first proposal is that of `among_population`. An
+action whose probability is None is left out."""
 
 
-def social_actions(state: SearchState, settings: Settings, box: Box, trials: Trials, evaluator: Evaluator) -> None:
-    """One proposal for each social agent, by one of the `ACTIONS`."""
+def social_actions(trials: Trials) -> None:
+    """Evaluate one proposal for each social agent, and move the agents with success if the settings say so."""
+    state, settings, box = trials.state, trials.settings, trials.box
     agents, rng = state.agents, state.rng
     rows = np.flatnonzero(agents.direction != NO_DIRECTION)
     if not rows.size:
         return
-    archive = box.to_unit(state.archive.Z[:, evaluator.free])
+    archive = box.to_unit(state.archive.Z[:, trials.evaluator.free])
     around = Surroundings(box, trials.positions(rows), trials.positions(), archive, state.experience, settings, rng)
     trial = among_population(around)
     for propose, probability in ACTIONS:
@@ -167,11 +171,11 @@ def social_actions(state: SearchState, settings: Settings, box: Box, trials: Tri
         trials.evaluate(agents.Z[rows], around.X, trial)
 
 
-def assign(state: SearchState, settings: Settings, box: Box, evaluator: Evaluator) -> None:
-    """Give the social agents their directions, and place them on the points of the archive that are best for these.
+def assign(state: SearchState, settings: Settings) -> None:
+    """Give the social agents their directions, and move them to the points of the archive that are best in these directions.
 
-    While the archive has fewer points than there are objectives, no agent is placed; or, as in the authors' code, the nearest of the
-    agents that own the orthogonal directions are.
+    While the archive has fewer points than objectives, no agent is moved, except with `reseed="spread"`: then, as in the authors' code,
+    those agents that have the orthogonal directions and are nearest to the points.
     """
     agents, archive, m = state.agents, state.archive, state.directions.shape[1]
     social_count = min(settings.social_agents(m), len(agents))

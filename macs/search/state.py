@@ -1,4 +1,4 @@
-"""The state of a search: agents, archive, and what else has to be known between two iterations."""
+"""State of a search between two iterations: agents, archive, ideal and nadir points, memory, counters and generator."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..gradients.polish import PolishLog
+from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from .settings import Settings
 
 NO_DIRECTION = -1
+"""In place of a row in the pool of directions, for an agent that has none."""
 
 
-@dataclass
+@dataclass(repr=False)
 class Agents:
-    """The population of a search.
+    """Population of a search: n agents with their positions and velocities.
 
     Attributes
     ----------
@@ -26,15 +28,15 @@ class Agents:
     F : array (n, m)
         Objectives, all minimised; NaN where the evaluation failed.
     violation : array (n,)
-        Infinite where the evaluation failed.
+        Largest scaled residual; infinite where the evaluation failed.
     velocity : array (n, d)
-        The free displacement that the last success achieved, in units of span; zero where there is none.
+        Displacement of the free variables by the last successes, in units of span; zero for an agent at rest.
     rho : array (n,)
         Relative radius of the pattern search.
     contractions : array (n,) of int
-        How many times the radius has been contracted.
+        Number of contractions of the radius since it was last reset.
     direction : array (n,) of int
-        Row, in the pool of directions, of the sub-problem that the agent owns; -1 where it owns none.
+        Row, in the pool of directions, of the scalar sub-problem of the agent; -1 if it has none.
     """
 
     Z: np.ndarray
@@ -48,22 +50,25 @@ class Agents:
     def __len__(self) -> int:
         return len(self.Z)
 
+    def __repr__(self) -> str:
+        return f"<Agents: {len(self)}, {np.count_nonzero(self.direction != NO_DIRECTION)} with a direction>"
+
     def place(self, rows: np.ndarray, Z: np.ndarray, F: np.ndarray, violation: np.ndarray) -> None:
-        """Put the agents `rows` on evaluated points."""
+        """Move the agents `rows` to evaluated points Z (k, D), F (k, m), violation (k,)."""
         self.Z[rows], self.F[rows], self.violation[rows] = Z, F, violation
 
     def adapt_radius(self, success: np.ndarray, rho: float, contraction: float, limit: int) -> None:
-        """Contract the radius of the agents that failed, widen that of those that succeeded; past either end it starts anew.
+        """Contract the radius of agents without success, and expand that of agents with success; at either limit it is reset.
 
         Parameters
         ----------
         success : array (n,) of bool
         rho : float
-            The radius to start with.
+            Initial radius, and the one after a reset.
         contraction : float
-            By how much it shrinks.
+            Factor of a contraction; an expansion divides by it.
         limit : int
-            How many contractions in a row are allowed.
+            Largest number of contractions. After one more, or an expansion beyond `rho`, the radius is reset.
         """
         self.contractions += np.where(success, -1, 1)
         self.rho *= np.where(success, 1.0 / contraction, contraction)
@@ -72,30 +77,30 @@ class Agents:
         self.rho[anew] = rho
 
 
-@dataclass
+@dataclass(repr=False)
 class SearchState:
-    """Everything a search knows between two iterations: with it, and the same evaluator and settings, it goes on as if never stopped.
+    """All data of a search between two iterations: with the same evaluator and settings it continues to the same bits.
 
     Attributes
     ----------
     agents : Agents
     archive : Archive
     closest : Archive
-        The least violated point seen, one row, as long as none was feasible; no row before and after.
+        The least violated point evaluated, one row, as long as no point was feasible; no row once the archive has points.
     ideal, nadir : arrays (m,)
-        The best feasible values ever seen; the worst ones in the archive. NaN before there are any.
+        Best feasible values ever evaluated; worst values in the archive. NaN as long as no point was feasible.
     directions : array (k, m)
-        The pool that the agents' directions are drawn from.
+        Pool from which the directions of the agents are drawn.
     experience : array (k, d)
-        The displacements of the last improvements of any agent, in units of span, oldest first.
+        Displacements of the last improvements of all agents, in units of span, oldest first.
     credit : array (o, 2)
-        Of the operators that breed from the archive: how many of their offspring it kept, and how many there were, the older the less.
+        For each breeding operator, the number of offspring that the archive kept and of all offspring; see `breeding.updated_credit`.
     iteration, evaluations, refinements : int
-        Iterations done; evaluations spent by the evaluator so far; gradient solves of agents.
+        Iterations done; evaluations counted by the evaluator; gradient solves of agents.
     rng : numpy.random.Generator
-        Its `bit_generator.state` is data, and all there is to keep of it.
+        The generator of all random numbers; a checkpoint keeps its `bit_generator.state`.
     polishing : PolishLog, optional
-        Of a polish that has begun and is not finished: where to go on.
+        Solves of a polish that has begun and is not finished.
     """
 
     agents: Agents
@@ -112,9 +117,13 @@ class SearchState:
     refinements: int = 0
     polishing: PolishLog | None = None
 
+    def __repr__(self) -> str:
+        counts = {"iteration": self.iteration, "evaluation": self.evaluations, "gradient solve": self.refinements}
+        return f"<SearchState: {', '.join(counted(number, what) for what, number in counts.items())}; {self.agents}, {self.archive}>"
+
 
 def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator) -> None:
-    """Offer what was seen to the archive, and keep the ideal and nadir points, or else the least violated point."""
+    """Offer evaluated points to the archive and update ideal and nadir; as long as none is feasible, update the least violated point."""
     if not seen:
         return
     Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
@@ -130,7 +139,7 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
 
 
 def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: Settings) -> Agents:
-    """Agents at rest on the evaluated points `rows`."""
+    """Agents at rest at the evaluated points `rows`, with d free variables."""
     count = len(rows)
     return Agents(
         Z=seen.Z[rows],

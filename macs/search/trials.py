@@ -1,10 +1,9 @@
-"""What becomes of a proposal: it is evaluated, and the agent that made it moves there if it is better."""
+"""Evaluation of the agents' proposals: a proposal is evaluated, and its agent moves there if it is better."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
@@ -12,39 +11,50 @@ from .settings import Settings
 from .state import NO_DIRECTION, SearchState
 
 CREDIT = 0.5
-"""Least part of a proposed step that must have been achieved for the radius to take it as its own success."""
+"""Least fraction of a proposed step that the inner level must leave, for the success to expand the radius."""
 
 
 class Trials:
-    """The one door between proposals and the evaluator, for the length of one phase of an iteration.
+    """Evaluates proposals within the budget, during one phase of an iteration, and records all results.
+
+    Parameters
+    ----------
+    settings : Settings
+    state : SearchState
+    evaluator : Evaluator
+    budget : int
+        Number of evaluations that the evaluator may have counted at the end.
 
     Attributes
     ----------
+    box : Box
+        Of the evaluator.
     seen : list of Evaluation
-        All that was evaluated.
+        All results.
     credited : array (n,) of bool
-        Which agents had a success that their own step brought about, not the inner level that moved the candidate elsewhere.
+        Agents with a success that is due to their own step, not to the inner level that moved the candidate elsewhere.
     """
 
-    def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, box: Box, budget: int) -> None:
-        self.settings, self.state, self.evaluator, self.box, self.budget = settings, state, evaluator, box, budget
+    def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, budget: int) -> None:
+        self.settings, self.state, self.evaluator, self.budget = settings, state, evaluator, budget
+        self.box = evaluator.box
         self.seen: list[Evaluation] = []
         self.credited = np.zeros(len(state.agents), dtype=bool)
 
     def positions(self, rows: np.ndarray | None = None) -> np.ndarray:
-        """Unit coordinates (k, d) of the agents `rows`, or of all."""
+        """Unit coordinates (k, d) of the agents `rows`, or of all agents."""
         Z = self.state.agents.Z if rows is None else self.state.agents.Z[rows]
         return self.box.to_unit(Z[:, self.evaluator.free])
 
     def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
-        """Evaluate the proposals `trial` (k, d) made from the full vectors Z (k, D), at X (k, d), and move nobody.
+        """Evaluate the proposals `trial` (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d); no agent moves.
 
         Returns
         -------
         array (j,) of int
-            Which of the k were evaluated: those that moved, as far as the budget goes.
+            Rows of the proposals that were evaluated: those that differ from X, as far as the budget allows.
         Evaluation or None
-            What came of these; None if there were none.
+            Their results; None if j = 0.
         """
         moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
         if not moved.size:
@@ -58,15 +68,15 @@ class Trials:
         return moved, result
 
     def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
-        """Evaluate the proposals `trial` (k, d) of the agents `rows`, at X (k, d); put those that had success there.
+        """Evaluate the proposals `trial` (k, d) of the agents `rows` at X (k, d), and move the agents with success.
 
-        The velocity of these, and the experience of all, are made of the displacements that came back, not of those that were proposed.
-        Without `velocity` a success leaves its agent at rest.
+        A success is dominance over the agent, or a better value for its direction. Velocities and experience use the displacements after
+        the inner level, not the proposed ones. Without `velocity`, an agent with success is left at rest.
 
         Returns
         -------
         array (k,) of bool
-            Who had success. A proposal that did not move, or for which no budget is left, is not evaluated and has none.
+            Agents with success. A proposal equal to X, or beyond the budget, is not evaluated and is no success.
         """
         success = np.zeros(len(rows), dtype=bool)
         moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)
@@ -87,7 +97,7 @@ class Trials:
         return success
 
     def _serves_direction(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
-        """Which results (k,), of feasible agents and feasible themselves, are better for the direction that the agent owns."""
+        """Mask (k,) of the feasible results that are better than their feasible agents in the sub-problem of the agents' directions."""
         agents, state, tolerance = self.state.agents, self.state, self.evaluator.tolerance
         owns = agents.direction[rows] != NO_DIRECTION
         feasible = (result.violation <= tolerance) & (agents.violation[rows] <= tolerance)

@@ -1,1 +1,1 @@
-"""What takes a problem and returns a front: the contract of a solver and its run."""
+"""Solvers of problems: their contract, their run from a seed to a front, and its checkpoints."""

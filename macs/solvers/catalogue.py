@@ -1,4 +1,4 @@
-"""Solvers by name: for the command line ("macs") and for studies."""
+"""Solvers by name, for the command line ("macs") and for studies."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ SOLVERS: dict[str, str] = {
     "mopso": "macs.baselines.mopso:MOPSO",
     "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
 }
-"""Where each class is, imported only when it is asked for."""
+"""Module and class of each solver, imported only when needed."""
 
 
 def solver_class(name: str) -> type[Solver]:
-    """The class behind a name. Raises ValueError that tells the names there are."""
+    """The class of a solver by its name. Raises ValueError, with the known names, for an unknown name."""
     place = SOLVERS.get(name.lower())
     if place is None:
         raise ValueError(unknown("solver", name, SOLVERS))
@@ -36,7 +36,7 @@ def solver(name: str, **settings: Any) -> Solver:
     Raises
     ------
     ValueError
-        There is no such solver or setting, or a setting is out of its range.
+        If there is no such solver or setting, or a setting is outside its range.
     """
     kind = solver_class(name)
     known = inspect.signature(kind).parameters

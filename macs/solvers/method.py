@@ -1,4 +1,4 @@
-"""The contract of a search method: settings that begin a search, advance it and conclude it."""
+"""Contract of a search method: it begins a search, advances it step by step, and concludes it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import short_repr
 from problems.compiled import CompiledProblem
 from transcription.base import Transcription
 
@@ -17,48 +18,57 @@ from ..front import Front
 
 
 class SearchMethod(ABC):
-    """A search over several objectives, step by step.
+    """Search over several objectives, step by step.
 
-    An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state is all that it knows
-    between two iterations, and has `archive` and `closest`, each with rows `Z`, `F` and `violation`.
+    An implementation is a frozen dataclass of its settings with the two methods `begin` and `advance`. Its state has all data of the search
+    between two iterations, among them `archive` and `closest`, each with columns `Z`, `F` and `violation` (see `Archive`). Budget and
+    evaluator do not belong to the state.
 
-    A run can be kept in a checkpoint, and continue from it to the same bits. For that, the state is a dataclass of the class that `begin`
-    (or what `makes_state` names) is annotated to return. Names in that annotation and in those of the fields exist at run time, not only
-    for type checkers. The fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator,
-    dataclasses of these, and lists, tuples, dicts (`dict[str, ...]`) or Counters of these, annotated in full. `X | None` may be missing;
-    other unions and `Any` are refused. The state is rebuilt from its fields alone, without `__init__`. So nothing else may change between
-    two iterations, neither in the solver nor in objects that the state refers to; no generator may be in two fields; and arrays that are
-    changed in place must not share their memory with others. An error names the field that does not comply. Budget and evaluator do not
-    belong to the state.
+    A checkpoint keeps the state, so that a run can continue to the same bits. For that:
+
+    - The state is a dataclass, of the class in the return annotation of `begin` (or of the method that `makes_state` returns).
+    - Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator, dataclasses of these, and
+      lists, tuples, dicts (`dict[str, ...]`) or Counters of these. They are annotated in full, with names that exist at run time. `X |
+      None` is allowed; other unions and `Any` are not.
+    - The state is rebuilt from its fields alone, without `__init__`. Nothing else may change between two iterations, neither in the solver
+      nor in objects that the state refers to.
+    - No generator is in two fields. Arrays that are changed in place do not share memory with others.
+
+    An error names the field that breaks one of these rules.
     """
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "__repr__" not in vars(cls):  # dataclasses keep it
+            cls.__repr__ = short_repr  # type: ignore[method-assign]
 
     @abstractmethod
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """Evaluate a first population, of which the full vectors `start` (k, D) are the first; returns the state."""
+        """The state after a first population has been evaluated, the full vectors `start` (k, D) first."""
 
     @abstractmethod
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
-        """One iteration, within the budget of evaluations."""
+        """Do one iteration within the budget of evaluations; changes `state`."""
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
-        """Finish the state of a search that ended by itself, beyond its evaluations. Most solvers do nothing.
+        """Do what follows the last evaluation of a search that was not stopped, such as a polish; most solvers do nothing.
 
-        If the work is to end early (`transcription.stopping`), the state keeps what was reached. A checkpoint may keep the state before
-        each batch of this: called with that state, it continues to the same bits.
+        If asked to end early (`transcription.stopping`), the state keeps the results so far. A checkpoint may keep the state before each
+        batch of this work: called with that state, it continues to the same bits.
         """
 
-    def tells(self, state: Any, tolerance: float) -> dict[str, Any]:
-        """Entries of the state for the `stats` of a front, as plain data; for most solvers none."""
+    def extra_stats(self, state: Any, tolerance: float) -> dict[str, Any]:
+        """Further entries of a front's `stats`, as plain data; none for most solvers."""
         return {}
 
     @property
     def makes_state(self) -> Callable[..., Any]:
-        """The method that is annotated to return the class of the state, which checkpoints need."""
+        """The method whose return annotation is the class of the state, which checkpoints need."""
         return self.begin
 
     @property
     def certifies(self) -> bool:
-        """Whether points of its fronts are to carry their `optimality`."""
+        """Whether the points of its fronts get their `optimality`."""
         return False
 
     def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
@@ -68,11 +78,11 @@ class SearchMethod(ABC):
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
     def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
-        """Further work on the front of a search that ended by itself, within so many seconds. Most solvers do none."""
+        """The front after further work, of at most `time_limit` seconds, if the search was not stopped; for most solvers the same front."""
         return front
 
     def about(self) -> dict[str, Any]:
-        """Name and settings as plain data, for fronts and checkpoints."""
+        """Name and settings of the solver as plain data, for fronts and checkpoints."""
         if not is_dataclass(self):
-            raise TypeError(f"{type(self).__name__} must be a dataclass of its settings, which its fronts record")
+            raise TypeError(f"{type(self).__name__} must be a dataclass of its settings, since fronts record them")
         return {"name": type(self).__name__, "settings": asdict(self)}

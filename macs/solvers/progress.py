@@ -14,23 +14,24 @@ from ..io.console import Display, minutes
 from ..io.text import counted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Progress:
     """State of a running search.
 
     Attributes
     ----------
     evaluations, budget : int
+        Evaluations so far, and their largest number.
     elapsed : float
         Seconds.
     archive : int
-        Points in the archive.
+        Number of points in the archive.
     ideal : mapping
-        The best value of each objective in the archive, by name, in the user's senses; empty as long as nothing feasible was found.
+        Best value of each objective in the archive, by name, in the user's units and senses; empty as long as no point is feasible.
     failures : mapping
-        Evaluations that did not converge, by status.
+        Number of evaluations and gradient solves that did not converge, by status.
     F : array (archive, m)
-        Objectives of the points in the archive, all minimised; costs nothing, unlike `front`.
+        Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
     inner_iterations, gradient_solves : int
     """
 
@@ -40,42 +41,35 @@ class Progress:
     archive: int
     ideal: Mapping[str, float]
     failures: Mapping[str, int]
-    make_front: Callable[[], Front] = field(repr=False)
-    F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    make_front: Callable[[], Front]
+    F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
     inner_iterations: int = 0
     gradient_solves: int = 0
 
     @property
     def front(self) -> Front:
-        """The front found so far; made when it is asked for."""
+        """The front found so far; it is made at each access, which takes some time."""
         return self.make_front()
+
+    def __repr__(self) -> str:
+        return f"<Progress: {', '.join([count(self), clock(self), *found(self)])}>"
 
 
 class SearchDisplay(Display):
-    """Shows the `Progress` that it is updated with.
+    """Display of the `Progress` of a search; see `Display`."""
 
-    Parameters
-    ----------
-    shown : bool
-    stream : text stream, optional
-        stderr by default.
-    title : str
-        Of what is searched.
-    """
-
-    def __init__(self, shown: bool = True, stream: TextIO | None = None, title: str = "") -> None:
+    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
         super().__init__(shown, stream)
-        self._title = title
         self._last: Progress | None = None
         self._shown_last: Progress | None = None
 
     @property
     def elapsed(self) -> float:
-        """Seconds that the search has taken, those in other processes included."""
+        """Seconds that the search has taken, those in earlier processes included."""
         return self._last.elapsed if self._last else 0.0
 
     def update(self, progress: Progress) -> None:
-        """Take note of the state of the search; cheap enough for every batch."""
+        """Show this state of the search from now on; fast enough for every batch."""
         self._last = progress
         self.refresh()
 
@@ -85,23 +79,21 @@ class SearchDisplay(Display):
             self._write(self.line())
 
     def line(self) -> str:
-        """Title, counts, time, archive and failures."""
-        if self._last is None:
-            return ""
-        return ", ".join(word for word in [self._title, count(self._last), clock(self._last), *found(self._last)] if word)
+        """Counts, time, archive and failures in one line."""
+        return ", ".join([count(self._last), clock(self._last), *found(self._last)]) if self._last else ""
 
     def render(self) -> Any:
-        """The same with a bar."""
+        """The state of the search with a bar."""
         from rich.console import Group
         from rich.progress_bar import ProgressBar
         from rich.table import Table
         from rich.text import Text
 
         if self._last is None:
-            return Text(f"{self._title}: beginning")
+            return Text("beginning")
         line = Table.grid(padding=(0, 2), expand=False)
         bar = ProgressBar(total=self._last.budget, completed=self._last.evaluations, width=30)
-        line.add_row(Text(self._title, style="bold"), bar, Text(count(self._last)), Text(clock(self._last), style="dim"))
+        line.add_row(bar, Text(count(self._last)), Text(clock(self._last), style="dim"))
         return Group(line, Text(", ".join(found(self._last)), overflow="ellipsis", no_wrap=True))
 
     def _write(self, line: str) -> None:
@@ -110,12 +102,12 @@ class SearchDisplay(Display):
 
 
 def count(progress: Progress) -> str:
-    """Evaluations and budget: 1 200 / 10 000 evaluations."""
+    """Evaluations and budget, such as 1 200 / 10 000 evaluations."""
     return f"{progress.evaluations:,} / {counted(progress.budget, 'evaluation')}".replace(",", " ")
 
 
 def clock(progress: Progress) -> str:
-    """Elapsed and remaining time, the latter by the pace so far: 0:12, 1:03 left."""
+    """Elapsed and estimated remaining time, such as 0:12, 1:03 left."""
     if not 0 < progress.evaluations < progress.budget:
         return minutes(progress.elapsed)
     left = progress.elapsed * (progress.budget - progress.evaluations) / progress.evaluations
@@ -123,9 +115,9 @@ def clock(progress: Progress) -> str:
 
 
 def found(progress: Progress) -> list[str]:
-    """The archive, its best value of each objective, and what did not converge."""
+    """Size of the archive, its best value of each objective, and the number of failures by status."""
     words = [f"archive {progress.archive}", *(f"{name} {value:.6g}" for name, value in progress.ideal.items())]
     if not progress.archive:
-        words = ["nothing feasible yet"]
+        words = ["no feasible point yet"]
     failures = [f"{number:,} {status}".replace(",", " ") for status, number in progress.failures.items() if number]
     return [*words, *failures]

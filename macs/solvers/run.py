@@ -1,4 +1,4 @@
-"""One run of a solver, from a seed to a front: progress, interrupts, checkpoint and costs."""
+"""Run of a solver from a seed to a front, with progress, interrupts, checkpoint and costs."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from .method import SearchMethod
 from .progress import Progress, SearchDisplay
 
 IDLE_ITERATIONS = 100
-"""A search that evaluated nothing in so many iterations on end has nothing left to try."""
+"""Number of successive iterations without any evaluation after which a search ends."""
 ENDED = ("budget", "idle")
-"""What ends a run that nobody stopped."""
+"""Values of `stats["stopped"]` for a run that ended without being stopped."""
 
 
 @dataclass
 class SearchRun:
-    """One run of a solver, from a seed to a front.
+    """Run of a solver from a seed to a front.
 
     Attributes
     ----------
     solver : SearchMethod
     evaluator : Evaluator
     goals : callable
-        The objectives; called after the first evaluation, since a black box does not know their number before.
+        Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
     make_front : callable
         (state, stats) -> Front.
     budget : int
-        Evaluations, never exceeded.
+        Largest number of evaluations.
     seed : int or None
         None draws one.
     start : array (k, D) or None
@@ -67,12 +67,13 @@ class SearchRun:
         callback: Callable[[Progress], Any] | None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """Search, from where a checkpoint was left if there is one, until the budget is spent, or until something stops it.
+        """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped.
 
         Returns
         -------
         Front
-            Its `stats["stopped"]` says what ended the run: "budget", "interrupted", "time limit", "callback" or "idle".
+            Its `stats["stopped"]` is the reason for the end of the run: "budget", "interrupted", "time limit", "callback", or "idle" if
+            nothing was left to evaluate.
         """
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs())
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
@@ -96,31 +97,30 @@ class SearchRun:
             if self._checkpoint:
                 self._checkpoint.write()
             front = self.make_front(self._state, self._stats(stopped))
-            # The certificates of optimality take their time, too.
+            # The certificates of optimality take time, too.
             front.stats["wall_time"] = self._interrupts.elapsed
             return front
 
     def _search(self) -> str:
-        """Search to the end; returns what ended the search."""
+        """Search to the end; returns the reason of the end."""
         if self._state is None:
             self.evaluator.before_batch = self._show
             self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
             self._keep()
             self._write_in_time()
-        # From here on there is a state to return, so a batch need not even begin. Before, the first population ends with what it has.
+        # From here on there is a state to return, so a stop may come before any batch. The first population is not stopped by an exception.
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         try:
-            # A search that evaluates nothing any more has nothing left to try.
             while counts.evaluations < self.budget and self._idle < IDLE_ITERATIONS:
                 spent = counts.evaluations
                 self.solver.advance(self._state, self.evaluator, self.budget)
                 self._idle = self._idle + 1 if counts.evaluations == spent else 0
                 self._keep()
                 self._call_back(self._show())
-                self._write_in_time()  # after the callback: what is in the file, the callback has seen
-            # Asked to stop, this ends with what it has; what it reached is kept.
-            self.evaluator.before_batch = self._within_the_end
+                self._write_in_time()  # after the callback: it has seen every state that is in the file
+            # This work is not stopped by an exception: asked to end, it keeps its results so far.
+            self.evaluator.before_batch = self._keep_and_write
             self.solver.conclude(self._state, self.evaluator)
         except Stopped as reason:
             return str(reason)
@@ -144,7 +144,7 @@ class SearchRun:
             raise Stopped("callback")
 
     def _keep(self, stopped: str = "") -> None:
-        """Give the state to the checkpoint, unless something of the last iteration was cut short: that has to be done again."""
+        """Give the state to the checkpoint, unless work of the last iteration was cut short: this iteration is done again."""
         if self._cut_short():
             return
         counts = self.evaluator.counts
@@ -154,10 +154,10 @@ class SearchRun:
             self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
     def _cut_short(self) -> bool:
-        """Whether a clock or Ctrl-C has cut work short since the state was last kept."""
+        """Whether a time limit or Ctrl-C has cut work short since the state was last kept."""
         return bool(self._interrupts.reason) and self.evaluator.counts.clocked > self._uncut
 
-    def _within_the_end(self) -> None:
+    def _keep_and_write(self) -> None:
         self._keep()
         self._write_in_time()
 
@@ -166,12 +166,12 @@ class SearchRun:
             self._checkpoint.write_in_time()
 
     def _belongs(self) -> dict[str, Any]:
-        """All that decides the run but the seed: a checkpoint of another run is refused."""
+        """All data that determine the run, except the seed: a checkpoint with other data is refused."""
         start = None if self.start is None else {"shape": self.start.shape, "hash": hashlib.sha256(self.start.tobytes()).hexdigest()}
         return {**self.what, "evaluations": self.budget, "tolerance": self.evaluator.tolerance, "start": start}
 
     def _asked_to_stop(self) -> bool:
-        """Whether the work is to end; also the time for a sign of life between long solves."""
+        """Whether the work is asked to end; also refreshes the display between long solves."""
         self._show()
         return bool(self._interrupts.reason)
 
@@ -184,7 +184,7 @@ class SearchRun:
             tolerance=self.evaluator.tolerance,
             stopped=stopped,
             reproducible=stopped in ENDED and not counts.clocked and not (checkpoint and checkpoint.mixed),
-            **({} if state is None else self.solver.tells(state, self.evaluator.tolerance)),
+            **({} if state is None else self.solver.extra_stats(state, self.evaluator.tolerance)),
             **({"checkpoint": checkpoint.failure} if checkpoint and checkpoint.failure else {}),
         )
 

@@ -1,4 +1,4 @@
-"""Solvers: what a user calls to search an optimal control problem or a plain function for its Pareto front."""
+"""Solvers: search methods that a user calls to find the Pareto front of an optimal control problem or a plain function."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from .start import beginning, check_run, decisions, drawing
 
 Callback = Callable[[Progress], Any]
 NO_TIME = 1e-6
-"""Seconds that are left when there are none: what comes then ends before its first solve."""
+"""Time limit, in seconds, of the work after a search that used up its own: this work then ends before its first solve."""
 
 
 class Solver(SearchMethod):
-    """A search method with the two calls of its user: `solve` for optimal control problems, `minimize` for plain functions."""
+    """Search method with two calls for its user: `solve` for optimal control problems, `minimize` for plain functions."""
 
     def solve(
         self,
@@ -48,52 +48,59 @@ class Solver(SearchMethod):
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """Search an optimal control problem for its Pareto front.
+        """The Pareto front of an optimal control problem.
 
         Parameters
         ----------
         problem : Problem
         transcription : Transcription
         evaluations : int
-            How many candidates may be sent to the inner level; never exceeded.
+            Largest number of candidates that are sent to the inner level.
         seed : int, optional
-            The same one gives the same bits. None draws one, which `stats` record.
+            The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver
-            "auto", "propagate", "ipopt", "ipopt-feasibility", or one of your own.
+            How candidates are made feasible: "auto" (fast, and IPOPT if that fails), "propagate" (not at all), "ipopt" (the nearest
+            feasible point), "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own.
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
-            Decisions to begin with: all variables, or the free ones only; after the problem's guess, if there is one. Or how candidates are
-            drawn: "uniform", each variable by itself, as all those that are missing otherwise, but without the guess; "smooth", random
-            profiles about the guess, see `transcription.Smooth`.
+            First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
+            problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
+            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
         time_limit : float, optional
-            Seconds after which the search, and what may come after it, ends with what it has; looked at, like Ctrl-C, before each batch and
-            each solve by IPOPT. A safety net: a run that it ends is recorded as not reproducible.
+            Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
+            batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
         progress : bool
-            Show how the search stands on the terminal.
+            Show the progress of the search on the terminal.
         callback : callable, optional
-            Called with a `Progress` after every iteration; the search ends if it returns True.
+            Function that is called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
-            A file that the run is kept in, now and then and whenever it ends. The same call goes on where it was, whether the run was
-            killed, interrupted, out of time or stopped by the callback, and ends with the same bits as if it never had been. What was done
-            since the last write is done again; writes are between iterations, and between the gradient solves that end a search, a second
-            or more apart. So is a first population that was not finished. `time_limit` counts from each call, `stats["wall_time"]` sums
-            them up. Of a run that has ended by itself, the same call returns the front again, without a search; an adaptive mesh is refined
-            again. All that decides a run has to be the same: problem, transcription, settings, inner level, tolerance, start, budget and
-            seed; a seed of None takes over that of the file. Should the file not be writable any more in the middle of the run, the search
-            goes on, logs a warning, and `stats["checkpoint"]` says why.
+            File that keeps the state of the run. The same call continues a run that was killed, interrupted, out of time or stopped by the
+            callback, and gives the same front as without the interruption, to the last bit. See Notes.
 
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points. Empty if none was found: then `message` says why, and `closest` is the nearest.
+            Feasible, mutually non-dominated points. If none was found it is empty: `message` says why, and `closest` is the least
+            infeasible point.
 
         Raises
         ------
         ValueError
-            If the problem is stated wrongly, an argument makes no sense, or the checkpoint is damaged or of another run, before any work.
+            If the problem is not stated correctly, an argument is not valid, or the checkpoint is damaged or of another run; before any
+            work.
         OSError
-            If the checkpoint could not be written, before any work.
+            If the checkpoint cannot be written; before any work.
+
+        Notes
+        -----
+        A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
+        the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search; only an
+        adaptive mesh, or a polish on another transcription, is made again.
+
+        A checkpoint belongs to one problem, transcription, solver with its settings, inner level, tolerance, start, budget and seed; a seed
+        of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
+        cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
@@ -150,22 +157,22 @@ class Solver(SearchMethod):
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """Search a plain vector function, or a pymoo Problem, for its Pareto front.
+        """The Pareto front of a plain vector function or a pymoo Problem.
 
         Parameters
         ----------
         function : callable or pymoo Problem
-            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)` with G <= 0 where feasible. A row with NaN is a failed evaluation.
+            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)`; a row with all G <= 0 is feasible, a row with NaN is a failed evaluation.
         bounds : pairs, pair of arrays, or mapping
-            d pairs; (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
+            d pairs (lower, upper); two arrays (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
         evaluations : int
-            How many rows of X may be evaluated; never exceeded.
+            Largest number of rows of X that are evaluated.
         constraints : callable, optional
-            `constraints(X) -> G`, G <= 0 where feasible.
+            `constraints(X) -> G`; a row with all G <= 0 is feasible.
         names, units, senses : sequences of str, optional
-            Of the objectives; senses are "minimize" or "maximize".
+            Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
         seed, tolerance, start, time_limit, progress, callback, checkpoint
-            As for `solve`. Of the function, a checkpoint only knows its bounds and names: that it is the same one is the caller's to say.
+            As for `solve`. A checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
 
         Returns
         -------
@@ -174,9 +181,9 @@ class Solver(SearchMethod):
         Raises
         ------
         ValueError
-            If an argument, or what the function returns, makes no sense, or the checkpoint is damaged or of another run.
+            If an argument is not valid, the function returns arrays of a wrong shape, or the checkpoint is damaged or of another run.
         OSError
-            If the checkpoint could not be written, before any work.
+            If the checkpoint cannot be written; before any work.
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))

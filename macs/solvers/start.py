@@ -1,4 +1,4 @@
-"""Checks of what a solver is given, before any work."""
+"""Checks of a solver's arguments, and the vectors that a search begins with."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..fronts.points import Point, Points
 from ..io.atomic import check_target
 
 STARTS = ("uniform", "smooth")
-"""How first candidates are drawn."""
+"""Words for the way first candidates are drawn."""
 
 
-OTHER = "start: the points are of other variables; a start belongs to one problem"
+OTHER = "start: the points have other variables; a start belongs to one problem"
 
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
-    """Raise ValueError for arguments of `solve` and `minimize` that make no sense, OSError for a checkpoint that cannot be written."""
+    """Raise ValueError for arguments of `solve` or `minimize` that are not valid, OSError for a checkpoint that cannot be written."""
     check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
@@ -40,7 +40,7 @@ def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, call
 
 
 def drawing(start: Any) -> Smooth | str | None:
-    """How first candidates are to be drawn, if `start` says that and not which they are: a `Smooth`, or "uniform"."""
+    """The way first candidates are drawn, a `Smooth` or "uniform", if `start` is a word or a `Smooth`; else None."""
     if not isinstance(start, str):
         return start if isinstance(start, Smooth) else None
     if start not in STARTS:
@@ -49,7 +49,7 @@ def drawing(start: Any) -> Smooth | str | None:
 
 
 def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
-    """Full vectors to begin with: what the caller gave, after what the problem's user guessed, if that is wanted; None if there is nothing.
+    """Full vectors (k, D) that a search begins with: with `guess` the problem's guess, then the vectors of `start`; None if there are none.
 
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
     meshes are interpolated.
@@ -71,12 +71,12 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
 
 
 def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
-    """Decisions (k, D) to begin with, checked against their bounds.
+    """Decisions (k, D) that a search begins with, checked against their bounds.
 
     Raises
     ------
     ValueError
-        If they have another length, are no numbers, or lie outside the bounds; the message names the variable.
+        If they have another length, are not numbers, or are outside the bounds; the message names the variable.
     """
     points = _points(start)
     for point in points:
@@ -95,13 +95,13 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
 
 
 def _points(start: Any) -> list[Point]:
-    """The Points that a start consists of; none if it is an array."""
+    """The list of Points in a start; empty if it is an array."""
     points = [start] if isinstance(start, Point) else list(start) if isinstance(start, Points | list | tuple) else []
     return points if all(isinstance(point, Point) for point in points) else []
 
 
 def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
-    """The vector (n,) of a point, interpolated if it is on another mesh."""
+    """The decision vector (n,) of a point, interpolated if the point is on another mesh."""
     if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
         return point.decision
     if point.source is None or point.source.fingerprint != nlp.problem.fingerprint or point.trajectory is None:

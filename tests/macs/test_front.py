@@ -77,7 +77,7 @@ def test_results_cannot_be_overwritten_by_accident():
             array[...] = 0
 
 
-def test_a_black_box_has_no_trajectory_and_says_so():
+def test_a_black_box_has_no_trajectory_and_its_errors_name_the_reason():
     point = black_box()[0]
     assert point.trajectory is None and point.excursions is None
     assert point.parameters.keys() == {"span", "chord", "twist"}
@@ -85,7 +85,7 @@ def test_a_black_box_has_no_trajectory_and_says_so():
         point.simulate()
 
 
-def test_an_unknown_problem_says_what_to_pass():
+def test_the_error_of_an_unknown_problem_names_the_argument_to_pass():
     front = flights(problem=Source("two legs", "0" * 32))
     with pytest.raises(ValueError, match=r"'two legs' was stated in a script.*problem=problem"):
         front[0].simulate()
@@ -196,7 +196,7 @@ def test_fronts_of_different_things_do_not_merge():
 # Tables
 
 
-def test_a_table_has_a_row_for_each_point_and_says_what_to_beware_of():
+def test_a_table_has_a_row_for_each_point_and_warnings():
     front = flights(5)
     lines = front.table(defects=[1e-9] * 5, columns={"note": list("abcde")}).split("\n")
     assert lines[0] == "two legs: 5 points, DFET(elements=3, order=4), MACS, 1 000 evaluations, seed 7, 1.2 s"
@@ -221,7 +221,7 @@ def test_numbers_show_what_differs():
     assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
 
 
-def test_durations_are_for_people():
+def test_durations_in_words():
     assert [duration(s) for s in (0.0123, 3.61, 59.7, 61, 7384)] == ["0.012 s", "3.6 s", "60 s", "1 min 01 s", "2 h 03 min"]
 
 

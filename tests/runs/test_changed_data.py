@@ -206,6 +206,6 @@ def test_other_variables_are_told_when_the_study_is_made():
     other.minimize("time", phase.tf, unit="s")
     other.maximize("distance", phase.final(x), unit="km")
     problems = {"slow": glide(), "other": other}
-    with pytest.raises(ValueError, match=r"nominal: problem 'other': .* states of phase 'leg' are y there and x here") as error:
+    with pytest.raises(ValueError, match=r"nominal: problem 'other': .* states of phase 'leg' are y, not x") as error:
         Study("gliders", problems=problems, transcriptions="dfet:2x2", solvers=Plain(), evaluations=40, runs=1, seed=1, nominal="slow")
     assert "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""The mesh around the front: what every point promises can be flown."""
+"""Mesh refinement of a front: an independent simulation confirms every point."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def fine(coarse) -> Front:
     return coarse.refine_mesh(limit=4)
 
 
-def test_points_get_near_the_truth_and_can_be_flown(coarse, fine):
+def test_points_get_near_the_truth_and_are_confirmed_by_simulation(coarse, fine):
     truth = reference(20001)
     before, after = distance_to_curve(coarse.objectives, truth), distance_to_curve(fine.objectives, truth)
-    assert before[0] > 1e-4, "on the first mesh the shortest flight is shorter than can be flown"
+    assert before[0] > 1e-4, "on the first mesh the shortest flight is shorter than simulation confirms"
     assert after.max() < 2e-5 and after[1:].max() < 2e-8
     assert fine.status.tolist() == ["converged"] * 5 and fine.violation.max() < 1e-8
     for point in fine[1:]:
@@ -64,7 +64,7 @@ def test_controls_stay_within_bounds_everywhere(coarse, fine):
     assert all(most(point) <= np.pi / 2 for point in fine)
 
 
-def test_what_does_not_get_there_says_why(fine):
+def test_the_note_of_an_unrefined_point_has_the_reason(fine):
     assert fine.message == "4 of 5 points meet the mesh tolerance of 1e-07."
     assert "objectives still change" in fine[0].note and "phase 'ascent' near" in fine[0].note
     table = fine.table()
@@ -122,7 +122,7 @@ def test_part_of_a_front_keeps_its_places(coarse):
 def test_objectives_without_derivatives_are_solved_by_projection():
     """The largest of a peak has no gradient solve: the feasible point nearest to the old one is taken."""
     problem = Problem("highest")
-    phase = problem.phase("fly", t0=0, tf=2)
+    phase = problem.phase("run", t0=0, tf=2)
     x, v = phase.state("x", bounds=(-3, 3), initial=0), phase.state("v", bounds=(-3, 3), initial=0, final=0)
     u = phase.control("u", bounds=(-1, 1))
     phase.dynamics(x=v, v=u - 0.3 * v * ca.fabs(v) ** 2)
@@ -152,7 +152,7 @@ def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
     assert sum("not solved on a finer mesh" in point.note for point in front) == 3
 
 
-def test_ctrl_c_while_a_point_is_solved_says_nothing_of_that_point(coarse, monkeypatch):
+def test_ctrl_c_while_a_point_is_solved_adds_no_note_to_that_point(coarse, monkeypatch):
     plain = PointSolver.solve
 
     def solve(self, nlp, *arguments):

@@ -1,4 +1,4 @@
-"""What `MACS.paper()` promises: the directions, social actions, velocities and the first re-seeding of the authors."""
+"""Settings of `MACS.paper()`: the directions, social actions, velocities and first re-seeding of the authors."""
 
 import copy
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from macs.evaluation.blackbox import BlackBox
-from macs.evaluation.box import box_of
 from macs.pareto.archive import Archive
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
@@ -22,11 +21,11 @@ def begun(settings, function=schaffer, d=3):
     """Settings at work on a function: its state, and the two phases of an iteration as functions."""
     box = BlackBox(function, [(-2, 2)] * d)
     state = settings.begin(box, 10_000, np.random.default_rng(0))
-    trials = Trials(settings, state, box, box_of(box), 10_000)
+    trials = Trials(settings, state, box, 10_000)
     return (
         state,
-        lambda: individual_actions(state, settings, box_of(box), trials),
-        lambda: social_actions(state, settings, box_of(box), trials, box),
+        lambda: individual_actions(trials),
+        lambda: social_actions(trials),
         trials,
     )
 
@@ -51,7 +50,7 @@ def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
 @pytest.mark.parametrize(
     ("overrides", "expected"), [({"agents": 20}, 20), ({"social": 0.5}, 5), ({"social": 0.0}, 1), ({"directions": 40}, 40)]
 )
-def test_there_are_as_many_directions_as_social_agents_unless_told(overrides, expected):
+def test_there_are_as_many_directions_as_social_agents_unless_overridden(overrides, expected):
     assert MACS.paper(**overrides).directions == expected
     assert MACS.paper(directions=None).directions is None
 
@@ -109,13 +108,13 @@ def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_d
     state.ideal = state.nadir = state.archive.F[0]
     state.agents.Z[:], state.agents.F[:] = 1.0, [3.0, 0.0]
     state.agents.F[[0, 1, 2]] = [[np.nan, np.nan], [2.0, 2.0], [0.0, 3.0]]
-    assign(state, settings, box_of(box), box)
+    assign(state, settings)
     assert np.flatnonzero((state.agents.Z == 0.0).all(axis=1)).tolist() == ([1] if settings == MACS.paper() else [])
 
 
-def test_nothing_feasible_moves_nobody():
+def test_without_feasible_points_no_agent_moves():
     box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = MACS.paper().begin(box, 100, np.random.default_rng(0))
     before = state.agents.Z.copy()
-    assign(state, MACS.paper(), box_of(box), box)
+    assign(state, MACS.paper())
     assert np.array_equal(state.agents.Z, before)

@@ -49,7 +49,7 @@ def test_bounds_that_cannot_be_meant(bounds, message):
         ({"senses": ["minimise", "maximize"]}, "senses: .*'minimise'"),
         ({"senses": "minimize"}, "senses"),
         ({"names": ["a"], "senses": ["minimize"] * 2}, "senses has 2, 1 expected"),
-        ({"names": ["a", "a"]}, "holds a name twice"),
+        ({"names": ["a", "a"]}, "has a name twice"),
         ({"names": []}, "names has 0"),
         ({"constraints": 3}, "constraints: must be callable"),
         ({"tolerance": -1.0}, "tolerance"),
@@ -67,7 +67,7 @@ def test_other_arguments_that_cannot_be_meant(arguments, message):
     [
         (lambda X: two(X)[:1], r"shape \(1, 2\) for 3 points"),
         (lambda X: 7.0, r"shape \(\) for 3 points"),
-        (lambda X: ["a"] * len(X), "no array of numbers"),
+        (lambda X: ["a"] * len(X), "must be an array of numbers"),
         (lambda X: (two(X), two(X)[:2]), "constraints have shape"),
         (lambda X: np.empty((len(X), 0)), "returned 0"),
     ],

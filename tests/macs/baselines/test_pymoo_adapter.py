@@ -240,7 +240,7 @@ def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
 
 
 @pytest.mark.parametrize("settings", HANDLED, ids=named)
-def test_failures_and_constraints_stop_nobody(settings: Any) -> None:
+def test_failures_and_constraints_stop_no_solver(settings: Any) -> None:
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         F, G = constrained(X)
         F[X[:, 0] > 0.8] = np.nan
@@ -257,7 +257,7 @@ def test_failures_and_constraints_stop_nobody(settings: Any) -> None:
 
 @pytest.mark.parametrize("settings", HANDLED, ids=named)
 @pytest.mark.parametrize("what", ["infeasible", "failed"])
-def test_where_nothing_is_feasible_the_nearest_is_told(settings: Any, what: str) -> None:
+def test_without_feasible_points_the_message_has_the_nearest(settings: Any, what: str) -> None:
     seen: list[float] = []
 
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -267,7 +267,7 @@ def test_where_nothing_is_feasible_the_nearest_is_told(settings: Any, what: str)
 
     front = settings.minimize(function, [(-2, 2)] * 3, evaluations=120, seed=3)
     assert len(front) == 0
-    assert front.message.startswith("nothing feasible in 120 evaluations")
+    assert front.message.startswith("no feasible point in 120 evaluations")
     assert front.closest is not None
     if what == "infeasible":
         assert front.closest.violation == min(seen)
@@ -371,7 +371,7 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: NSGA2(population=None), "NSGA2: population must be a whole number of at least 2, not None"),  # type: ignore[arg-type]
         (lambda: NSGA2(handling="death"), "NSGA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
         (lambda: NSGA2(crossover=1.5), r"NSGA2: crossover must be in \[0, 1\], not 1.5"),
-        (lambda: NSGA2(penalty=-1.0), "NSGA2: penalty must be a number of at least 0"),
+        (lambda: NSGA2(penalty=-1.0), r"NSGA2: penalty must be in \[0, inf\), not -1.0"),
         (lambda: NSGA3(divisions=0), "NSGA3: divisions"),
         (lambda: NSGA3(whole=1), "NSGA3: whole must be True or False, not 1"),  # type: ignore[arg-type]
         (lambda: NSGA3(mutation_eta="x"), "NSGA3: mutation_eta"),  # type: ignore[arg-type]
@@ -385,7 +385,7 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: MOPSO(archive=0), "MOPSO: archive must be a whole number of at least 1"),
         (lambda: MOPSO(cells=2.5), "MOPSO: cells must be a whole number of at least 1, not 2.5"),  # type: ignore[arg-type]
         (lambda: MOPSO(search=1.5), r"MOPSO: search must be in \[0, 1\], not 1.5"),
-        (lambda: MOPSO(final_inertia=-1), "MOPSO: final_inertia must be a number of at least 0"),
+        (lambda: MOPSO(final_inertia=-1), r"MOPSO: final_inertia must be in \[0, inf\), not -1"),
         (lambda: MOPSO(handling="death"), "MOPSO: handling must be one of"),
     ],
 )
@@ -420,7 +420,7 @@ def test_objectives_that_only_an_evaluation_tells_are_checked_then() -> None:
             settings.minimize(lambda X: X.sum(axis=1), [(0, 1)] * 4, evaluations=50)
 
 
-def test_numbers_of_individuals_that_depend_on_objectives_nobody_told() -> None:
+def test_numbers_of_individuals_that_depend_on_an_unknown_number_of_objectives() -> None:
     function, bounds, _ = dtlz(2, 3)
     rows = []
 
@@ -429,7 +429,7 @@ def test_numbers_of_individuals_that_depend_on_objectives_nobody_told() -> None:
         return function(X)
 
     NSGA3(divisions=4).minimize(counted, bounds, evaluations=30, seed=1)
-    assert rows == [1, 14, 15]  # the first of the fifteen tells how many there are to be
+    assert rows == [1, 14, 15]  # the first of the fifteen gives the number of objectives
 
 
 def test_pymoo_s_changes_of_warnings_do_not_stay() -> None:

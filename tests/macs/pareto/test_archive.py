@@ -67,7 +67,7 @@ def test_extremes_are_chosen_and_energy_never_rises_unless_they_were_missing(m, 
         assert energy(F, chosen) <= energy(F, members) * (1 + 1e-9)
 
 
-def test_an_extreme_that_was_missing_comes_in_whatever_it_costs():
+def test_a_missing_extreme_is_added_at_any_cost():
     F = np.array([[0.0, 0.01, 1.0], [0.01, 0.0, 0.9], [1.0, 1.0, 0.0], [0.3, 0.5, 0.5]])
     members = np.array([True, False, True, True])
     chosen = spread(F, 3, members)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from macs import MOPSO, NSGA2, NSGA3
-from macs.baselines.constraints import DEGREES, degree, excess, problem_type, told
+from macs.baselines.constraints import DEGREES, degree, excess, presented, problem_type
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.blackbox import BlackBox
 from problems import Problem, load
@@ -59,11 +59,11 @@ def test_problem_types_of_algorithm_1() -> None:
     assert problem_type(np.array([0.0, 0.0])) == 1
 
 
-def test_what_algorithms_are_told_has_the_degree_in_place_of_the_violation() -> None:
+def test_algorithms_get_the_degree_in_place_of_the_violation() -> None:
     F, violation, degrees = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0.0, 0.5]), np.array([0.0, 0.75])
-    assert told("feasible-first", 10, F, violation, 1e-6, degrees)[1].tolist() == [0, 0.75]
-    assert told("penalty", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2], [10.5, 11.5]]
-    assert told("objective", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2, 0], [3, 4, 0.75]]
+    assert presented("feasible-first", 10, F, violation, 1e-6, degrees)[1].tolist() == [0, 0.75]
+    assert presented("penalty", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2], [10.5, 11.5]]
+    assert presented("objective", 10, F, violation, 1e-6, degrees)[0].tolist() == [[1, 2, 0], [3, 4, 0.75]]
 
 
 # Each constraint's own violation
@@ -80,7 +80,7 @@ def test_those_of_a_function_are_its_columns() -> None:
 
 
 class Foreign(InnerSolver):
-    """One that tells nothing beyond the contract."""
+    """An inner solver with nothing beyond the contract."""
 
     def solve(self, nlp, candidates, warm=None, *, tolerance=1e-6) -> InnerResult:
         found = inner_solver("propagate").solve(nlp, candidates, warm, tolerance=tolerance)
@@ -99,7 +99,7 @@ def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
         assert dict(zip(nlp.constraints, row.tolist(), strict=True)) == nlp.violations(z)
 
 
-def test_nothing_is_spent_on_them_unless_somebody_asks(monkeypatch) -> None:
+def test_they_are_not_computed_unless_needed(monkeypatch) -> None:
     nlp = DFET(2, 3).transcribe(load("goddard"))
     monkeypatch.setattr(type(nlp), "by_constraint", lambda *_: pytest.fail("asked for"))
     evaluator = Bilevel(nlp, inner_solver("propagate"), 1e-6)
@@ -128,14 +128,14 @@ def two_limits(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return F, np.stack([20 * (np.abs(X[:, 0] - 0.6) - 0.01), 20 * (np.abs(X[:, 1] - 0.3) - 0.01)], axis=1)
 
 
-@pytest.mark.parametrize("name", DEGREES[:3])  # the printed one cannot tell better from worse where both are missed by their size
+@pytest.mark.parametrize("name", DEGREES[:3])  # the printed one does not distinguish better from worse where both are missed by their size
 @pytest.mark.parametrize("solver", [NSGA2, NSGA3, MOPSO], ids=lambda kind: kind.__name__)
 def test_solvers_rank_by_the_degree_and_show_the_violation(solver, name) -> None:
     size = {"particles": 20} if solver is MOPSO else {"population": 20}
     front = solver(**size, degree=name).minimize(two_limits, [(-2, 2)] * 2, evaluations=1000, seed=3)
-    told = front.stats["population"]
+    seen = front.stats["population"]
     assert len(front) and (np.abs(front.decision - [0.6, 0.3]) <= 0.01 + 1e-6).all()
-    assert 1 <= told["first_feasible"] <= told["generations"]
+    assert 1 <= seen["first_feasible"] <= seen["generations"]
 
 
 def test_how_feasible_populations_are_is_counted_generation_by_generation() -> None:
@@ -147,10 +147,16 @@ def test_how_feasible_populations_are_is_counted_generation_by_generation() -> N
         return X, np.full((len(X), 1), 1.0 if len(generations) < 3 else -1.0)
 
     front = NSGA2(population=10).minimize(function, [(0, 1)] * 2, evaluations=60, seed=1)
-    told = front.stats["population"]
-    assert (told["first_feasible"], told["all_feasible"], told["generations"], told["size"], told["feasible"]) == (3, 3, 6, 10, 10)
-    assert told["nondominated"] == len(front)
+    seen = front.stats["population"]
+    assert (seen["first_feasible"], seen["all_feasible"], seen["generations"], seen["size"], seen["feasible"]) == (
+        3,
+        3,
+        6,
+        10,
+        10,
+    )
+    assert seen["nondominated"] == len(front)
 
     front = NSGA2(population=10).minimize(lambda X: (X, X[:, :1] + 1), [(0, 1)] * 2, evaluations=60, seed=1)
-    told = front.stats["population"]
-    assert (told["first_feasible"], told["all_feasible"], told["feasible"], told["nondominated"]) == (None, None, 0, 0)
+    seen = front.stats["population"]
+    assert (seen["first_feasible"], seen["all_feasible"], seen["feasible"], seen["nondominated"]) == (None, None, 0, 0)

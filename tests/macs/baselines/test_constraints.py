@@ -1,4 +1,4 @@
-"""What algorithms are told of constraints, against the definition of constrained dominance."""
+"""Constraints as presented to algorithms, against the definition of constrained dominance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.baselines.constraints import by_objectives, excess, feasible_first, objective, penalty, told
+from macs.baselines.constraints import by_objectives, excess, feasible_first, objective, penalty, presented
 from macs.pareto.dominance import constrained_dominates, dominates
 
 VALUES = st.floats(-1e9, 1e9).map(lambda value: round(value, 3))
@@ -15,9 +15,9 @@ VIOLATIONS = st.sampled_from([0.0, 1e-9, 1e-6, 2e-6, 0.5, 0.5000001, 3.0, 1e9, n
 
 
 @given(arrays(float, (6, 2), elements=VALUES), arrays(float, 6, elements=VIOLATIONS))
-def test_objectives_that_say_all_dominate_as_feasible_first_does(F, violation):
+def test_objectives_that_include_the_violation_dominate_as_feasible_first_does(F, violation):
     F[np.isinf(violation)] = np.nan
-    G = by_objectives(*told("feasible-first", 0.0, F, violation, 1e-6))
+    G = by_objectives(*presented("feasible-first", 0.0, F, violation, 1e-6))
     assert np.isfinite(G).all()
     wanted = constrained_dominates(F[:, None], violation[:, None], F, violation, 1e-6)
     assert np.array_equal(dominates(G[:, None], G), wanted)
@@ -27,9 +27,9 @@ def test_the_three_ways_by_hand():
     F, violation = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [np.nan, 0.0]]), np.array([0.0, 1e-7, 0.5, np.inf])
     cv = excess(F, violation, 1e-6)
     assert cv.tolist() == [0, 0, 0.5, np.inf]
-    for told_F, told_cv in (feasible_first(F, cv), penalty(F, cv, 10.0), objective(F, cv)):
-        assert np.isfinite(told_F).all()
-        assert told_cv[3] == np.inf
+    for presented_F, presented_cv in (feasible_first(F, cv), penalty(F, cv, 10.0), objective(F, cv)):
+        assert np.isfinite(presented_F).all()
+        assert presented_cv[3] == np.inf
     assert feasible_first(F, cv)[0][:3].tolist() == [[1, 2], [3, 4], [5, 6]]
     assert feasible_first(F, cv)[1][:3].tolist() == [0, 0, 0.5]
     assert penalty(F, cv, 10.0)[0][:3].tolist() == [[1, 2], [3, 4], [10, 11]]

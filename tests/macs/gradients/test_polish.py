@@ -305,7 +305,7 @@ def test_without_refinement_nothing_is_certified_and_no_gradient_used() -> None:
 
 def test_a_peak_that_is_maximised_leaves_the_search_without_derivatives() -> None:
     problem = Problem("highest")
-    phase = problem.phase("fly", t0=0, tf=2)
+    phase = problem.phase("run", t0=0, tf=2)
     x, v = phase.state("x", bounds=(-3, 3), initial=0), phase.state("v", bounds=(-3, 3), initial=0)
     u = phase.control("u", bounds=(-1, 1))
     phase.dynamics(x=v, v=u)

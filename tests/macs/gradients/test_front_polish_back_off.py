@@ -1,4 +1,4 @@
-"""Points that are moved inside of their limits until they hold when flown, by the problem of Bryson and Denham, whose front is known.
+"""Back-off of a front's points until they are feasible when simulated, by the problem of Bryson and Denham, whose front is known.
 
 Bryson and Ho, "Applied Optimal Control", 1975, section 3.11: least effort is 4 / (9 l) where the height may not exceed l <= 1/6.
 """
@@ -56,34 +56,34 @@ def rough() -> Front:
 
 
 def share(front: Front) -> np.ndarray:
-    """The effort as flown, by the least that any flight of this height takes."""
-    flown = front.simulate(tolerance=np.inf).objectives
-    return flown[:, 0] / (4 / (9 * flown[:, 1]))
+    """Simulated effort, relative to the least effort of any flight of this height."""
+    simulated = front.simulate(tolerance=np.inf).objectives
+    return simulated[:, 0] / (4 / (9 * simulated[:, 1]))
 
 
 def test_points_hold_at_a_price_that_is_small(rough):
-    promised, held = (rough.polished(COARSE, solves=30, verify=verify) for verify in (None, VERIFY))
-    before, after = (front.simulate(tolerance=VERIFY) for front in (promised, held))
-    assert before.violation.max() > 10 * VERIFY and share(promised).min() < 0.99, "better than there is: they exceed what they promise"
-    assert after.violation.max() <= VERIFY and share(held).min() > 1 - 1e-3
-    assert len(held) == len(promised) and np.median(share(held)) < 1.03
-    moved = [point for point in held if point.note]
+    unchecked, kept = (rough.polished(COARSE, solves=30, verify=verify) for verify in (None, VERIFY))
+    before, after = (front.simulate(tolerance=VERIFY) for front in (unchecked, kept))
+    assert before.violation.max() > 10 * VERIFY and share(unchecked).min() < 0.99, "better than there is: they exceed their limits"
+    assert after.violation.max() <= VERIFY and share(kept).min() > 1 - 1e-3
+    assert len(kept) == len(unchecked) and np.median(share(kept)) < 1.03
+    moved = [point for point in kept if point.note]
     assert moved and all("inside its limits" in point.note and point.optimality is None for point in moved)
-    assert held.stats["gradient_solves"] == promised.stats["gradient_solves"] + len(moved), "at once"
+    assert kept.stats["gradient_solves"] == unchecked.stats["gradient_solves"] + len(moved), "at once"
 
 
-def test_what_cannot_be_made_to_hold_is_told():
+def test_points_that_cannot_be_made_feasible_are_marked():
     evaluator = Bilevel(DFET(2, 1).transcribe(gust()), Propagate(), 1e-6)
     start = evaluator.nlp.propagate(evaluator.first_guess(np.zeros((1, len(evaluator.free)))))
     flat = evaluator.descend(start, np.full((1, 1), 0.0), np.ones((1, 1)))
     assert flat.status[0] == "converged"
-    Z, holds, _ = back_off(evaluator, flat.Z, np.ones(1), VERIFY)
-    assert holds.shape == (1,) and not holds[0] and evaluator.nlp.evaluate(Z)[1][0] <= 1e-6
-    none, holds, moved = back_off(evaluator, flat.Z[:0], np.ones(1), VERIFY)
-    assert len(none) == len(holds) == len(moved) == 0
+    Z, feasible, _ = back_off(evaluator, flat.Z, np.ones(1), VERIFY)
+    assert feasible.shape == (1,) and not feasible[0] and evaluator.nlp.evaluate(Z)[1][0] <= 1e-6
+    none, feasible, moved = back_off(evaluator, flat.Z[:0], np.ones(1), VERIFY)
+    assert len(none) == len(feasible) == len(moved) == 0
 
 
-def test_known_points_are_flown_only_if_it_matters(rough, monkeypatch):
+def test_known_points_are_simulated_only_if_it_matters(rough, monkeypatch):
     counts, simulated = [], front_polish.simulated
 
     def counted(points, *arguments):
@@ -113,7 +113,7 @@ def test_margins_keep_rows_inside(rough):
     assert evaluator.counts.gradient_solves == 2
 
 
-def test_an_interruption_leaves_what_holds(rough, monkeypatch):
+def test_an_interruption_leaves_what_feasible(rough, monkeypatch):
     refine = Bilevel._descend
 
     def interrupted(self, starts, references, weights, margins):
@@ -128,11 +128,11 @@ def test_an_interruption_leaves_what_holds(rough, monkeypatch):
     assert found.simulate(tolerance=VERIFY).violation.max() <= VERIFY
 
 
-def test_if_nothing_holds_the_front_says_so():
+def test_the_message_of_a_front_without_feasible_points():
     front = MACS(archive=1).solve(gust(), DFET(2, 1), evaluations=40, seed=1)
     assert len(front)
     empty = front.polished(DFET(2, 1), solves=2, verify=VERIFY)
-    assert not len(empty) and empty.message == "no point misses less than 0.0001 when simulated"
+    assert not len(empty) and empty.message == "no point violates less than 0.0001 when simulated"
     assert "0.0001" in empty.table() and len(front.polished(DFET(2, 1), solves=2, verify=1.0))
 
 
@@ -141,7 +141,7 @@ def test_what_makes_no_sense_is_refused(rough):
         rough.polished(COARSE, verify=0)
 
 
-def test_without_a_terminal_it_is_not_told_of_each_solve(rough, capsys):
+def test_without_a_terminal_not_every_solve_is_shown(rough, capsys):
     rough.polished(COARSE, solves=12, verify=VERIFY, progress=True)
     assert 0 < capsys.readouterr().err.count("polish: ") < 6
 
@@ -190,7 +190,7 @@ class TestOfASearch:
         with pytest.raises(ValueError, match=words):
             MACS(**settings)
 
-    def test_a_peak_that_gradients_refuse_is_told_before_any_work(self):
+    def test_a_peak_that_gradients_refuse_is_an_error_before_any_work(self):
         problem = bryson_denham()
         problem.maximize("fastest", problem.phases["flight"].peak(problem.phases["flight"]["v"]))
         with pytest.raises(ValueError, match="peak"):

@@ -99,8 +99,8 @@ def test_the_first_population_of_a_hard_problem_may_be_cut_short(capsys) -> None
     front = MACS().solve(load("goddard"), MESH, evaluations=100, seed=1, inner="ipopt", time_limit=1e-9, progress=True)
     assert len(front) == 0 and front.stats["stopped"] == "time limit" and not front.stats["reproducible"]
     assert front.stats["failures"] == {"timeout": 10} and front.stats["evaluations"] == 10
-    assert front.message.startswith("nothing feasible in 10 evaluations") and front.closest is not None
-    assert capsys.readouterr().err.startswith("0 / 100 evaluations, 0:00, nothing feasible yet")
+    assert front.message.startswith("no feasible point in 10 evaluations") and front.closest is not None
+    assert capsys.readouterr().err.startswith("0 / 100 evaluations, 0:00, no feasible point yet")
 
 
 def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch) -> None:
@@ -173,4 +173,4 @@ def test_candidates_that_the_fast_inner_level_leaves_are_counted() -> None:
     problem.minimize("effort", phase.integral(u**2))
     front = MACS(refine=False).solve(problem, DFET(8, 3), evaluations=20, seed=1)
     assert len(front) == 1 and 0 < front.stats["fallbacks"] <= 20
-    assert "went from the fast inner level to IPOPT" in front.table()
+    assert "went to IPOPT, because the fast inner level failed" in front.table()

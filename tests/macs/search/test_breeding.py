@@ -78,9 +78,9 @@ def test_differences_take_the_short_way_round():
     assert np.abs(steps).max() == pytest.approx(0.05)
 
 
-def test_drawing_anew_changes_one_coordinate_and_reaches_everywhere():
+def test_redrawing_changes_one_coordinate_and_reaches_everywhere():
     X = np.full((5000, 3), 0.1)
-    trial = breeding.draw_anew(box(3), X, np.stack([X] * 3), np.random.default_rng(0))
+    trial = breeding.redraw_coordinate(box(3), X, np.stack([X] * 3), np.random.default_rng(0))
     assert ((trial != X).sum(axis=1) == 1).all()
     assert np.histogram(trial[trial != X], bins=10, range=(0, 1))[0].min() > 400
 
@@ -96,24 +96,24 @@ def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
 
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
     credit, count = breeding.no_credit(), len(breeding.OPERATORS)
-    assert np.allclose(breeding.shares(credit), 1 / count)
+    assert np.allclose(breeding.operator_shares(credit), 1 / count)
     operator = np.repeat(np.arange(count), 25)
     for _ in range(40):
-        credit = breeding.learn(credit, operator, operator == 1)
-    share = breeding.shares(credit)
+        credit = breeding.updated_credit(credit, operator, operator == 1)
+    share = breeding.operator_shares(credit)
     assert share.sum() == pytest.approx(1.0)
     assert share.argmax() == 1
     assert share[1] > 0.8
     assert np.allclose(share[[0, 2, 3]], breeding.LEAST_SHARE, atol=0.01)
     for _ in range(40):  # what was is forgotten
-        credit = breeding.learn(credit, operator, operator == 2)
-    assert breeding.shares(credit).argmax() == 2
+        credit = breeding.updated_credit(credit, operator, operator == 2)
+    assert breeding.operator_shares(credit).argmax() == 2
 
 
 def test_nothing_tried_changes_nothing_that_can_be_seen():
     credit = np.zeros((len(breeding.OPERATORS), 2))
-    assert np.array_equal(breeding.learn(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
-    assert np.allclose(breeding.shares(credit), 1 / len(credit))
+    assert np.array_equal(breeding.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
+    assert np.allclose(breeding.operator_shares(credit), 1 / len(credit))
 
 
 def test_the_search_credits_what_the_archive_keeps():

@@ -1,4 +1,4 @@
-"""A front as an independent integrator flies it, as stated and under other data."""
+"""A front as simulated by an independent integrator, with its own and with other problem data."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_under_other_data(front):
     np.testing.assert_array_equal([p.decision for p in other], [p.decision for p in front])
 
 
-def test_what_becomes_infeasible_says_so_and_does_not_merge(front):
+def test_points_that_become_infeasible_have_this_status_and_do_not_merge(front):
     speeds = np.array([point.trajectory["run"]["v"][-1] for point in front])
     limit = float(np.median(speeds)) + 0.013
     limited = front.simulate(push(gate=limit), tolerance=1e-3)
@@ -71,7 +71,7 @@ def test_what_becomes_infeasible_says_so_and_does_not_merge(front):
 
 
 def test_what_is_dominated_in_the_air_is_not_the_best():
-    """A coarse mesh promises what does not come true."""
+    """Objectives on a coarse mesh that simulation does not confirm."""
     front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="propagate")
     again = front.simulate(tolerance=1.0)
     kept = best(again)
@@ -80,13 +80,13 @@ def test_what_is_dominated_in_the_air_is_not_the_best():
     assert (np.abs(again.F - front.F).max() > 1e-3) and len(kept) <= len(front)
 
 
-def test_flown_fronts_are_saved_like_others(front, tmp_path):
+def test_simulated_fronts_are_saved_like_others(front, tmp_path):
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc", push())
     np.testing.assert_allclose(loaded.simulate().F, front.simulate().F, rtol=1e-9)
     again = front.simulate()
-    again.save(tmp_path / "flown.nc")
-    back = Front.load(tmp_path / "flown.nc", push())
+    again.save(tmp_path / "simulated.nc")
+    back = Front.load(tmp_path / "simulated.nc", push())
     np.testing.assert_array_equal(back.F, again.F)
     np.testing.assert_allclose(back[0].trajectory["run"].at(2.2)["x"], again[0].trajectory["run"].at(2.2)["x"])
 
@@ -97,9 +97,9 @@ def test_other_problems_are_refused_by_what_differs(front):
     phase.state("x", bounds=(0, 100), initial=0)
     phase.dynamics(x=phase.control("u", bounds=(0, 2)))
     problem.minimize("effort", phase.final(phase["x"]))
-    with pytest.raises(ValueError, match="'push' cannot be simulated under 'pull': objectives are minimize effort"):
+    with pytest.raises(ValueError, match="'push' cannot be simulated with 'pull': its objectives are minimize effort"):
         front.simulate(problem)
-    with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* there and maximize distance \[m\]"):
+    with pytest.raises(ValueError, match=r"objectives are maximize distance \[ft\], .* not maximize distance \[m\]"):
         front.simulate(push(unit="ft"))
     with pytest.raises(ValueError, match="tolerance must not be negative"):
         front.simulate(tolerance=-1.0)
@@ -107,7 +107,7 @@ def test_other_problems_are_refused_by_what_differs(front):
         NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).simulate()
 
 
-def test_where_nothing_holds_the_merged_front_says_what_is_violated(front):
+def test_the_message_of_a_merged_front_without_feasible_points_names_the_violation(front):
     merged = Front.merge([front.simulate(push(gate=-1.0), tolerance=1e-3)])
     assert not len(merged) and merged.closest is not None
     assert "the nearest violates path 'gate' of 'run' by " in merged.message

@@ -1,4 +1,4 @@
-"""MOPSO: its kernels by hand and by what always holds, its archive, constraints, periodic variables, first particles, known fronts."""
+"""MOPSO: its kernels by hand and by properties, its archive, constraints, periodic variables, first particles, known fronts."""
 
 from __future__ import annotations
 
@@ -192,15 +192,15 @@ def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_the
 
 
 @pytest.mark.parametrize("more", [{"search": 0.0}, {"handling": "penalty"}, {"handling": "objective"}])
-def test_where_nobody_asks_for_feasible_particles_none_are_searched(more) -> None:
+def test_without_a_search_for_feasible_particles_none_are_drawn(more) -> None:
     box, method = BlackBox(ring, [(-2, 2)] * 2), MOPSO(particles=10, **more)
     assert method.begin(box, 1000, np.random.default_rng(1)).launched == 10
 
 
-def test_nothing_feasible_is_told() -> None:
+def test_the_message_without_feasible_points() -> None:
     front = MOPSO(particles=10).minimize(lambda X: (schaffer(X), X[:, :1] + 3), [(-2, 2)] * 2, evaluations=200, seed=1)
     assert not len(front)
-    assert front.message == "nothing feasible in 200 evaluations; the nearest violates the constraints by 1"
+    assert front.message == "no feasible point in 200 evaluations; the nearest violates the constraints by 1"
     assert front.closest.decision[0] == -2
 
 

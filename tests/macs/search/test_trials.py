@@ -4,7 +4,6 @@ import copy
 
 import numpy as np
 
-from macs.evaluation.box import box_of
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.search.macs import MACS
 from macs.search.trials import Trials
@@ -36,7 +35,7 @@ def prepared():
     agents.Z[:], agents.velocity[:] = [0.8, 0.8, 0.5], 0.0
     agents.F[:] = [0.8, 0.64]
     state.experience = np.empty((0, 2))
-    return box, state, Trials(settings, state, box, box_of(box), 1000)
+    return box, state, Trials(settings, state, box, 1000)
 
 
 def test_velocity_and_experience_are_what_was_achieved():

@@ -186,7 +186,7 @@ def test_a_guess_is_the_first_start() -> None:
     assert optimize(problem, MESH).parameters["p"] == pytest.approx(-1, abs=1e-2)
 
 
-def test_the_same_seed_gives_the_same_bits_and_the_cost_is_told() -> None:
+def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     one, two = (sweep(shuttle(), MESH, points=4, starts=2, seed=3) for _ in range(2))
     assert np.array_equal(one.decision, two.decision) and one.stats["seed"] == 3
     assert one.stats["gradient_solves"] == two.stats["gradient_solves"] >= 2 * (2 * 2 + 2)
@@ -215,7 +215,7 @@ def unreachable() -> Problem:
     return problem
 
 
-def test_what_cannot_be_reached_is_told() -> None:
+def test_the_message_if_nothing_converges() -> None:
     point = optimize(unreachable(), MESH)
     assert point.status in ("infeasible", "failed") and point.violation > 1e-3
     ends = payoff(unreachable(), MESH)
@@ -233,7 +233,7 @@ def test_objectives_that_are_in_no_conflict_have_one_point() -> None:
     problem.minimize("effort", run.integral(u**2))
     problem.minimize("path", run.integral(x**2))
     front = sweep(problem, MESH, points=6)
-    assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or alike" in front.message
+    assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or equal" in front.message
 
 
 @pytest.mark.parametrize("tool", TOOLS)
