@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +12,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import problems
+from problems.catalogue import CASES
 from problems.compiled import CompiledProblem
+from problems.problem import Problem
 
 from ..evaluation.evaluator import Counts
 
@@ -20,27 +23,29 @@ from ..evaluation.evaluator import Counts
 class Source:
     """Identity of a problem: its name, its fingerprint, and the address and data that `problems.load` makes it from.
 
-    `address` is empty where a script stated the problem; then only the script can give it again.
+    `address` is empty where a script stated the problem; then only the script can give it again. To load a problem runs the code at its
+    address: one that was read from a file is only loaded if it is of the catalogue, or `trusted`.
     """
 
     name: str
     fingerprint: str
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
+    trusted: bool = field(default=False, compare=False)
 
     @classmethod
     def of(cls, problem: CompiledProblem) -> Source:
-        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data))
+        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True)
 
-    def check(self, problem: Any, whose: str) -> CompiledProblem:
-        """`problem` (a `Problem` or a `CompiledProblem`), compiled.
+    def check(self, problem: Problem | CompiledProblem, whose: str) -> CompiledProblem:
+        """`problem`, compiled.
 
         Raises
         ------
         ValueError
             If it is another problem than this source's; `whose` begins the message.
         """
-        compiled = problem.compile() if hasattr(problem, "compile") else problem
+        compiled = problem.compile() if isinstance(problem, Problem) else problem
         if compiled.fingerprint != self.fingerprint:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
             raise ValueError(
@@ -48,25 +53,43 @@ class Source:
             )
         return compiled
 
-    def load(self) -> CompiledProblem:
+    def load(self) -> Problem:
         """The problem from its address. This runs the code that the address names.
 
         Raises
         ------
         ValueError
-            If there is no address, nothing is found there, or something else is.
+            If there is no address, it may not be loaded, nothing is found there, or something else is.
         """
         if not self.address:
             raise ValueError(
                 f"problem '{self.name}' was stated in a script, so it cannot be found by name: pass it, Front.load(path, problem=problem)"
             )
+        if not (self.trusted or _is_catalogued(self.address)):
+            raise ValueError(
+                f"the file says that its problem '{self.name}' is made by the code at '{self.address}', which is not run unasked: "
+                "give problem=, or trust=True (--problem or --trust)"
+            )
         try:
-            problem = problems.load(self.address, **self.data)
-        except Exception as error:
+            problem = _load(self.address, self.data)
+        except (Exception, SystemExit) as error:
             raise ValueError(
                 f"problem '{self.name}' does not load from '{self.address}' ({error}): pass it, Front.load(path, problem=problem)"
             ) from error
-        return self.check(problem, "the front")
+        self.check(problem, "the front")
+        return problem
+
+
+def _is_catalogued(address: str) -> bool:
+    """Whether this is a name or an address of the catalogue of problems."""
+    return address in CASES or address in [own for own, _ in CASES.values()]
+
+
+def _load(address: str, data: Mapping[str, Any]) -> Problem:
+    """`problems.load`, but of no module of Python itself, whose functions make no problems."""
+    if address.partition(":")[0].partition(".")[0] in sys.stdlib_module_names:
+        raise ValueError("a module of Python itself has no problems")
+    return problems.load(address, **data)
 
 
 STATS: dict[str, Any] = {

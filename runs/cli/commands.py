@@ -114,15 +114,15 @@ def show(arguments: Namespace) -> int:
 def verify(arguments: Namespace) -> int:
     """Check every point of a saved front."""
     with refused():
-        front = Front.load(arguments.front)
+        front = Front.load(arguments.front, trust=arguments.trust)
     if front.source is None:
-        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to fly")
+        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to simulate")
     if not arguments.problem and not front.source.address:
         raise WrongCall(f"problem '{front.source.name}' was stated in a script; say where: --problem file.py:function")
-    problem = load_problem(arguments.problem) if arguments.problem else load_problem(front.source.address, **front.source.data)
-    tolerance = arguments.tolerance or problem.verify_tolerance
     with refused():
-        front = Front.load(arguments.front, problem=problem)
+        problem = load_problem(arguments.problem) if arguments.problem else front.source.load()
+        tolerance = arguments.tolerance or problem.verify_tolerance
+        front = front.replace(problem=front.source.check(problem, arguments.front))
         checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
     print(verification_table(front, checks))
     failed = [check for check in checks if not check.ok]
@@ -131,7 +131,7 @@ def verify(arguments: Namespace) -> int:
     elif failed:
         print(f"\n{len(failed)} of {len(checks)} points fail.")
     else:
-        print(f"\nAll {len(checks)} points verify: flown anew, they stay within {tolerance:g}.")
+        print(f"\nAll {len(checks)} points verify: simulated anew, they stay within {tolerance:g}.")
     return DONE if checks and not failed else NO
 
 

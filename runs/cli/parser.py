@@ -174,9 +174,10 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
-    verify = _add(commands, "verify", "check every point of a saved front and fly it anew; exit 1 if any fails")
+    verify = _add(commands, "verify", "check every point of a saved front and simulate it anew; exit 1 if any fails")
     verify.add_argument("front", metavar="FRONT.nc")
-    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not say where to find it")
+    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
+    verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
 
