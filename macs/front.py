@@ -233,7 +233,8 @@ class Front(Points):
     def merge(fronts: Sequence[Front]) -> Front:
         """The non-dominated feasible points of several fronts of one problem; what they cost is summed.
 
-        Points of different meshes are taken at their word: a coarse mesh may promise more than can be flown, and so push out better points.
+        Points are compared by the objectives of their own meshes: those of a coarse mesh may be better than when simulated, and so dominate
+        points that are better in fact.
 
         Raises
         ------

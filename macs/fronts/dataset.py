@@ -34,6 +34,8 @@ from .labelled import (
     legal_names,
     named_columns,
     named_table,
+    read_attribute,
+    read_document,
     read_documents,
     read_limits,
     read_named,
@@ -42,7 +44,7 @@ from .labelled import (
     variable_table,
 )
 from .points import Points
-from .provenance import STATS, Source
+from .provenance import read_source, read_stats, source_attributes, stats_attributes
 
 if TYPE_CHECKING:
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
@@ -208,25 +210,6 @@ def split(arrays: Mapping[str, np.ndarray], names: Mapping[str, Iterable[str]]) 
     return found
 
 
-def stats_attributes(stats: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of `STATS` that are numbers, each as an attribute; versions, and the others together, as JSON."""
-    found = {key: _number(value) for key, value in stats.items() if key in STATS}
-    numbers = {key: value for key, value in found.items() if value is not None}
-    rest = {key: value for key, value in stats.items() if key not in numbers and key != "versions"}
-    return {**numbers, "versions": document(stats["versions"]), "stats": document(rest)}
-
-
-def _number(value: Any) -> float | int | list[int] | None:
-    """A number, or at least two whole ones, as an attribute of netCDF; None for anything else."""
-    if isinstance(value, float | np.floating):
-        return float(value)
-    several = value if isinstance(value, list) and len(value) > 1 else [value]
-    whole = [int(entry) for entry in several if isinstance(entry, int | np.integer | np.bool_) and abs(int(entry)) < 2**63]
-    if len(whole) < len(several):
-        return None
-    return whole if several is value else whole[0]
-
-
 def _numbers(values: Sequence[float | None]) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
 
@@ -270,39 +253,14 @@ def _attributes(front: Points) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "format_version": VERSION,
-        **_source(front.source),
+        **source_attributes(front.source),
         **stats_attributes(front.stats),
         "solver": document(front.solver),
         "message": front.message,
     }
 
 
-def _source(source: Source | None) -> dict[str, str]:
-    """Without the address if the data that it takes cannot be written down: then the problem has to be passed again."""
-    if source is None:
-        return {"problem": "", "fingerprint": "", "address": "", "data": "{}"}
-    try:
-        address, data = source.address, document(dict(source.data), strict=True)
-    except TypeError:
-        address, data = "", "{}"
-    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data}
-
-
 # Reading: everything raises ValueError for what no front can have
-
-
-def read_attribute(attrs: Mapping[str, Any], name: str, kinds: type | tuple[type, ...]) -> Any:
-    """An attribute of a kind."""
-    if name not in attrs:
-        raise ValueError(f"the attribute '{name}' is missing from it")
-    if not isinstance(attrs[name], kinds):
-        raise ValueError(f"the attribute '{name}' is of another kind than it should be")
-    return attrs[name]
-
-
-def read_document(attrs: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """An attribute that is a JSON object."""
-    return read_documents([read_attribute(attrs, name, str)], name, lambda value: isinstance(value, dict))[0]
 
 
 def root_columns(root: Labelled) -> dict[str, Any]:
@@ -326,9 +284,9 @@ def root_columns(root: Labelled) -> dict[str, Any]:
         "violations": read_named(root, "violations", "constraint"),
         "excursions": read_named(root, "excursions", "quantity"),
         "transcriptions": read_documents(root["transcription"], "transcription", _is_transcription),
-        "problem": _read_source(root.attrs),
+        "problem": read_source(root.attrs),
         "solver": read_document(root.attrs, "solver"),
-        "stats": _read_stats(root.attrs),
+        "stats": read_stats(root.attrs),
         "message": read_attribute(root.attrs, "message", str),
         "sort": False,
     }
@@ -351,31 +309,6 @@ def _own_columns(places: np.ndarray) -> np.ndarray:
     if not np.array_equal(places[columns], np.arange(len(columns))):
         raise ValueError("'place' does not number the entries of a decision vector")
     return columns
-
-
-def _read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    stats = read_document(attrs, "stats") | {"versions": read_document(attrs, "versions")}
-    for name, usual in STATS.items():
-        if name in attrs:
-            stats[name] = bool(attrs[name]) if isinstance(usual, bool) else attrs[name]
-        elif name not in stats:
-            raise ValueError(f"the attribute '{name}' is missing from it")
-    for name in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time", "tolerance"):
-        if not isinstance(stats[name], int | float) or not stats[name] >= 0:
-            raise ValueError(f"the attribute '{name}' is no number of at least 0")
-    counts = [*stats["failures"].values()] if isinstance(stats["failures"], dict) else [None]
-    if not all(isinstance(count, int) for count in counts) or not isinstance(stats["reproducible"], bool):
-        raise ValueError("the attribute 'stats' is not what it should be")
-    seeds = stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
-    if not all(seed is None or isinstance(seed, int) for seed in seeds):
-        raise ValueError("the attribute 'seed' is no whole number")
-    return stats
-
-
-def _read_source(attrs: Mapping[str, Any]) -> Source | None:
-    """None for a black box, which has no fingerprint."""
-    name, fingerprint, address = (read_attribute(attrs, key, str) for key in ("problem", "fingerprint", "address"))
-    return Source(name, fingerprint, address, read_document(attrs, "data")) if fingerprint else None
 
 
 def read_trajectories(root: Labelled, phases: Mapping[str, Group]) -> list[Trajectory | None] | None:

@@ -34,17 +34,14 @@ from .dataset import (
     group_names,
     phase_dataset,
     phase_names,
-    read_attribute,
-    read_document,
     read_trajectories,
     root_columns,
     root_dataset,
     split,
-    stats_attributes,
 )
-from .labelled import checked, document, variable_columns
+from .labelled import checked, document, read_attribute, read_document, variable_columns
 from .points import Points
-from .provenance import STATS
+from .provenance import STATS, stats_attributes
 
 LARGEST = 2**30
 """Bytes that a file may have."""

@@ -195,3 +195,17 @@ def read_documents(texts: Iterable[str], what: str, fits: Callable[[Any], bool])
                 raise ValueError(f"'{what}' is not what it should be: {text[:60]}")
         found.append(values[text])
     return found
+
+
+def read_attribute(attrs: Mapping[str, Any], name: str, kinds: type | tuple[type, ...]) -> Any:
+    """An attribute of a kind."""
+    if name not in attrs:
+        raise ValueError(f"the attribute '{name}' is missing from it")
+    if not isinstance(attrs[name], kinds):
+        raise ValueError(f"the attribute '{name}' is of another kind than it should be")
+    return attrs[name]
+
+
+def read_document(attrs: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """An attribute that is a JSON object."""
+    return read_documents([read_attribute(attrs, name, str)], name, lambda value: isinstance(value, dict))[0]

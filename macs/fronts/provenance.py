@@ -11,12 +11,15 @@ from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
 import problems
 from problems.catalogue import CASES
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 
 from ..evaluation.evaluator import Counts
+from .labelled import document, read_attribute, read_document
 
 
 @dataclass(frozen=True)
@@ -168,3 +171,62 @@ def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "reproducible": all(stats["reproducible"] for stats in several),
         "versions": {package: ", ".join(numbers) for package, numbers in found.items()},
     }
+
+
+# As attributes of a file
+
+
+def stats_attributes(stats: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of `STATS` that are numbers, each as an attribute; versions, and the others together, as JSON."""
+    found = {key: _number(value) for key, value in stats.items() if key in STATS}
+    numbers = {key: value for key, value in found.items() if value is not None}
+    rest = {key: value for key, value in stats.items() if key not in numbers and key != "versions"}
+    return {**numbers, "versions": document(stats["versions"]), "stats": document(rest)}
+
+
+def _number(value: Any) -> float | int | list[int] | None:
+    """A number, or at least two whole ones, as an attribute of netCDF; None for anything else."""
+    if isinstance(value, float | np.floating):
+        return float(value)
+    several = value if isinstance(value, list) and len(value) > 1 else [value]
+    whole = [int(entry) for entry in several if isinstance(entry, int | np.integer | np.bool_) and abs(int(entry)) < 2**63]
+    if len(whole) < len(several):
+        return None
+    return whole if several is value else whole[0]
+
+
+def source_attributes(source: Source | None) -> dict[str, str]:
+    """A source, without its address if the data that it takes cannot be written down: then the problem has to be passed again."""
+    if source is None:
+        return {"problem": "", "fingerprint": "", "address": "", "data": "{}"}
+    try:
+        address, data = source.address, document(dict(source.data), strict=True)
+    except TypeError:
+        address, data = "", "{}"
+    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data}
+
+
+def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """`stats` from its attributes. Raises ValueError for what it cannot be."""
+    stats = read_document(attrs, "stats") | {"versions": read_document(attrs, "versions")}
+    for name, usual in STATS.items():
+        if name in attrs:
+            stats[name] = bool(attrs[name]) if isinstance(usual, bool) else attrs[name]
+        elif name not in stats:
+            raise ValueError(f"the attribute '{name}' is missing from it")
+    for name in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time", "tolerance"):
+        if not isinstance(stats[name], int | float) or not stats[name] >= 0:
+            raise ValueError(f"the attribute '{name}' is no number of at least 0")
+    counts = [*stats["failures"].values()] if isinstance(stats["failures"], dict) else [None]
+    if not all(isinstance(count, int) for count in counts) or not isinstance(stats["reproducible"], bool):
+        raise ValueError("the attribute 'stats' is not what it should be")
+    seeds = stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
+    if not all(seed is None or isinstance(seed, int) for seed in seeds):
+        raise ValueError("the attribute 'seed' is no whole number")
+    return stats
+
+
+def read_source(attrs: Mapping[str, Any]) -> Source | None:
+    """A source from its attributes; None for a black box, which has no fingerprint. Raises ValueError for what it cannot be."""
+    name, fingerprint, address = (read_attribute(attrs, key, str) for key in ("problem", "fingerprint", "address"))
+    return Source(name, fingerprint, address, read_document(attrs, "data")) if fingerprint else None

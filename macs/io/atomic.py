@@ -67,8 +67,9 @@ def _target(path: str | PathLike[str]) -> tuple[Path, int | None]:
         pass
     except (OSError, ValueError) as error:
         # A name that is too long or has a NUL character, symbolic links in a circle, a file where a folder should be.
-        reason = getattr(error, "strerror", None) or str(error)
-        raise OSError(getattr(error, "errno", errno.EINVAL), f"cannot write '{path}': {reason}") from error
+        number = getattr(error, "errno", errno.EINVAL)
+        circle = "its symbolic links lead in a circle" if number == errno.ELOOP else ""
+        raise OSError(number, f"cannot write '{path}': {circle or getattr(error, 'strerror', None) or error}") from error
     if found is not None and stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(f"cannot write '{path}': it is a folder")
     if found is not None and not stat.S_ISREG(found.st_mode):

@@ -28,6 +28,8 @@ REFERENCE = 16
 """Bytes of a reference to a text, which is stored elsewhere in the file."""
 AT_ONCE = 2**26
 """Bytes that the texts that are read in one call may take, should a file refer to its longest text again and again."""
+HEAP = b"GCOL\1\0\0\0"
+"""How HDF5 begins the collections in which it keeps texts."""
 DIMENSION_ONLY = b"This is a netCDF dimension but not a netCDF variable"
 """What netCDF-4 calls a dimension without labels."""
 
@@ -139,8 +141,26 @@ def from_bytes(content: bytes) -> Group:
     """
     import h5py
 
+    _check_heaps(content)
     with h5py.File(io.BytesIO(content), "r") as file:
         return _Reader(len(content)).group(file)
+
+
+def _check_heaps(content: bytes) -> None:
+    """Raise ValueError for a collection of texts in which HDF5 would go in a circle, since one of its objects has no length."""
+    start, left = content.find(HEAP), len(content) // 16
+    while start >= 0:
+        end = start + int.from_bytes(content[start + 8 : start + 16], "little")
+        place = start + 16
+        while place + 16 <= end:
+            index, length = int.from_bytes(content[place : place + 2], "little"), int.from_bytes(content[place + 8 : place + 16], "little")
+            # Object 0 is the space that is free, its own head included.
+            step = length if index == 0 else 16 + (length + 7) // 8 * 8
+            left -= 1
+            if step < 16 or place + step > end or left < 0:
+                raise ValueError("its texts are damaged")
+            place += step
+        start = content.find(HEAP, start + 1)
 
 
 class _Reader:

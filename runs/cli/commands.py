@@ -263,11 +263,11 @@ def _ends(phase: Any) -> str:
 
 def verification_table(front: Front, checks: Sequence[Check]) -> str:
     """A row for each point, and the reasons of those that fail."""
-    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.flown, c.missed) for c in checks]
+    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.simulated, c.missed) for c in checks]
     rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
     headers = [
         ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],
-        ["", "stored - decision", "stored - anew", "anew", "flown", "flown", "stored - flown", ""],
+        ["", "stored - decision", "stored - anew", "anew", "simulated", "simulated", "stored - simulated", ""],
     ]
     table = text_table(headers, rows, [False] * 7 + [True])
     reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]

@@ -279,7 +279,7 @@ def test_verify_says_which_point_fails_and_why(saved, capsys):
     assert "points verify" in capsys.readouterr().out
     assert main(["verify", path, "--tolerance", "1e-13", "--rtol", "1e-9"]) == 1
     out = capsys.readouterr().out
-    assert "FAILS" in out and "point 0: flown, it ends" in out
+    assert "FAILS" in out and "point 0: simulated, it ends" in out
     assert "belongs to problem 'goddard'" in wrong(capsys, "verify", path, "--problem", "orbit_rise")
 
 
