@@ -134,7 +134,7 @@ def _read(content: bytes) -> tuple[Points, int]:
     whole = unsealed(content)
     if whole is None and SEALED in content:
         raise ValueError("it is cut short or damaged: it has no checksum")
-    root = netcdf.from_bytes(content if whole is None else whole)
+    root = netcdf.from_bytes(content, older=True) if whole is None else netcdf.from_bytes(whole)
     if root.attrs.get("format") != FORMAT:
         raise ValueError("it is a netCDF file of something else")
     version = read_attribute(root.attrs, "format_version", int)

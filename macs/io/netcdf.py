@@ -24,12 +24,12 @@ DEPTH = 3
 """Most levels of groups, the root included."""
 OVERHEAD = 64
 """Bytes that an array or a group takes in a file at the least, beside its values."""
-REFERENCE = 16
-"""Bytes of a reference to a text, which is stored elsewhere in the file."""
-AT_ONCE = 2**26
-"""Bytes that the texts that are read in one call may take, should a file refer to its longest text again and again."""
-HEAP = b"GCOL\1\0\0\0"
-"""How HDF5 begins the collections in which it keeps texts."""
+REFERENCE = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
+"""How an array refers to a text: its length in bytes, the address of a collection of texts, and its index there."""
+COLLECTION = b"GCOL\1\0\0\0"
+"""How HDF5 begins a collection of texts."""
+HEAD = 16
+"""Bytes before the objects of a collection, and before the content of each of them."""
 DIMENSION_ONLY = b"This is a netCDF dimension but not a netCDF variable"
 """What netCDF-4 calls a dimension without labels."""
 
@@ -124,12 +124,26 @@ def to_bytes(groups: Mapping[str, Labelled]) -> bytes:
                 variable = group.create_variable(name, labels.dimensions, dtype=dtype, data=values)
                 variable.attrs["long_name"], variable.attrs["units"] = labels.long_name, labels.units
             for key, value in data.attrs.items():
-                group.attrs[key] = value
+                group.attrs[key] = _fixed(value) if isinstance(value, str) else value
     return buffer.getvalue()
 
 
-def from_bytes(content: bytes) -> Group:
+def _fixed(text: str) -> np.ndarray:
+    """A text as an attribute that has its length in its type."""
+    import h5py
+
+    content = text.encode() or b"\0"
+    return np.array(content, dtype=h5py.string_dtype("utf-8", len(content)))
+
+
+def from_bytes(content: bytes, older: bool = False) -> Group:
     """The root of a file with all that is in it.
+
+    Parameters
+    ----------
+    content : bytes
+    older : bool
+        Whether attributes may be texts of variable length. `to_bytes` does not write them, as HDF5 allocates any length that they claim.
 
     Raises
     ------
@@ -141,33 +155,18 @@ def from_bytes(content: bytes) -> Group:
     """
     import h5py
 
-    _check_heaps(content)
+    reader = _Reader(content, older)
     with h5py.File(io.BytesIO(content), "r") as file:
-        return _Reader(len(content)).group(file)
-
-
-def _check_heaps(content: bytes) -> None:
-    """Raise ValueError for a collection of texts in which HDF5 would go in a circle, since one of its objects has no length."""
-    start, left = content.find(HEAP), len(content) // 16
-    while start >= 0:
-        end = start + int.from_bytes(content[start + 8 : start + 16], "little")
-        place = start + 16
-        while place + 16 <= end:
-            index, length = int.from_bytes(content[place : place + 2], "little"), int.from_bytes(content[place + 8 : place + 16], "little")
-            # Object 0 is the space that is free, its own head included.
-            step = length if index == 0 else 16 + (length + 7) // 8 * 8
-            left -= 1
-            if step < 16 or place + step > end or left < 0:
-                raise ValueError("its texts are damaged")
-            place += step
-        start = content.find(HEAP, start + 1)
+        return reader.group(file)
 
 
 class _Reader:
-    """Reads a file of `size` bytes, and no more values than would fit into it."""
+    """Reads the content of a file, and no more values than would fit into it."""
 
-    def __init__(self, size: int):
-        self._size = self._left = size
+    def __init__(self, content: bytes, older: bool):
+        self._content, self._left = content, len(content)
+        self._older = older
+        self._texts = _find_texts(content)
 
     def group(self, group: Any, level: int = 1) -> Group:
         """A group with all that is in it."""
@@ -175,7 +174,7 @@ class _Reader:
 
         if level > DEPTH:
             raise ValueError(f"it has groups at more than {DEPTH} levels")
-        found = Group({}, self._attributes(group), {})
+        found = Group({}, {name: self._attribute(name, group.attrs) for name in group.attrs}, {})
         for name in group:
             self._take(OVERHEAD, name)
             if group.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
@@ -200,45 +199,65 @@ class _Reader:
         text = _is_text(data.dtype)
         if not text and data.dtype.name not in NUMBERS:
             raise ValueError(f"'{name}' is of type {data.dtype}, neither a number of 64 bits nor a text")
-        plan = data.id.get_create_plist()
-        stored = data.id.get_storage_size()
-        count = math.prod(data.shape)
+        plan, count, stored = data.id.get_create_plist(), math.prod(data.shape), data.id.get_storage_size()
         # netCDF gives dimensions without entries an unlimited length, for which HDF5 needs chunks.
-        plain = plan.get_layout() in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS) or (not count and plan.get_layout() == h5py.h5d.CHUNKED)
+        plain = plan.get_layout() == (h5py.h5d.CONTIGUOUS if count else h5py.h5d.CHUNKED)
         if not plain or plan.get_nfilters() or plan.get_external_count():
             raise ValueError(f"'{name}' is not stored in this file as it is, but compressed, in pieces or elsewhere")
-        if max(data.shape, default=0) > self._size or stored != count * (REFERENCE if text else data.dtype.itemsize):
+        if max(data.shape, default=0) > len(self._content) or stored != count * (REFERENCE.itemsize if text else data.dtype.itemsize):
             raise ValueError(f"'{name}' has a shape of {data.shape}, but {stored} bytes are stored")
         self._take(stored, name)
-        return self._texts(name, data) if text else np.asarray(data[...])
-
-    def _texts(self, name: str, data: Any) -> np.ndarray:
-        """An array of str, read in blocks: how long texts are is only known when they are read, and many may refer to the same."""
+        if not text:
+            return np.asarray(data[...])
         if data.ndim != 1:
             raise ValueError(f"'{name}' has {data.ndim} dimensions, texts have 1")
-        block = max(1, AT_ONCE // self._size)
-        texts: list[str] = []
-        for start in range(0, len(data), block):
-            raw = data[start : start + block].tolist()
-            self._take(sum(map(len, raw)), name)
-            texts += [word.decode() for word in raw]
-        return words(texts)
+        references = np.frombuffer(self._content, REFERENCE, count, data.id.get_offset()) if count else np.empty(0, REFERENCE)
+        return words([self._text(name, *reference) for reference in references.tolist()])
 
-    def _attributes(self, group: Any) -> dict[str, Any]:
-        """Texts, numbers and lists of numbers; what netCDF and HDF5 note for themselves is not read."""
-        found: dict[str, Any] = {}
-        for name in group.attrs:
-            attribute = group.attrs.get_id(name)
-            text = _is_text(attribute.dtype) and attribute.shape in ((), (1,))
-            if not text and (attribute.dtype.name not in NUMBERS or len(attribute.shape) > 1):
-                continue
-            self._take(math.prod(attribute.shape) * attribute.dtype.itemsize, name)
-            value = group.attrs[name]
-            if text:
-                value = value if isinstance(value, str) else str(value[0])
-                self._take(len(value), name)
-            found[name] = value if text else value.item() if value.size == 1 else value.tolist()
-        return found
+    def _text(self, name: str, length: int, address: int, index: int) -> str:
+        """The text that a reference is to, as HDF5 would read it; but HDF5 allocates any length that a reference claims."""
+        start, size = self._texts.get((address, index), (0, 0))
+        if length > size:
+            raise ValueError(f"'{name}' refers to a text that is not there")
+        self._take(length, name)
+        return self._content[start : start + length].decode()
+
+    def _attribute(self, name: str, attributes: Any) -> Any:
+        """A text, a number or a list of numbers; None for anything else, such as what netCDF and HDF5 note for themselves."""
+        found = attributes.get_id(name)
+        fixed = found.dtype.kind == "S" and not found.shape
+        number = found.dtype.name in NUMBERS and len(found.shape) < 2
+        self._take(math.prod(found.shape) * found.dtype.itemsize, name)
+        if fixed:
+            return attributes[name].decode()
+        if number:
+            return attributes[name].item() if math.prod(found.shape) == 1 else attributes[name].tolist()
+        if self._older and _is_text(found.dtype) and not found.shape:
+            return str(attributes[name])
+        return None
+
+
+def _find_texts(content: bytes) -> dict[tuple[int, int], tuple[int, int]]:
+    """Where the texts of a file begin, and their lengths in bytes, by the address of their collection and their index in it.
+
+    Raises ValueError if an object of a collection has no length or ends beyond it; in such, HDF5 could go in a circle.
+    """
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    address, left = content.find(COLLECTION), len(content) // HEAD
+    while address >= 0:
+        end = address + int.from_bytes(content[address + 8 : address + 16], "little")
+        place = address + HEAD
+        while place + HEAD <= end:
+            index, length = int.from_bytes(content[place : place + 2], "little"), int.from_bytes(content[place + 8 : place + 16], "little")
+            # Object 0 is the space that is free, its own head included; objects take whole multiples of 8 bytes.
+            step = length if index == 0 else HEAD + (length + 7) // 8 * 8
+            left -= 1
+            if step < HEAD or place + step > min(end, len(content)) or left < 0:
+                raise ValueError("its texts are damaged")
+            found[address, index] = place + HEAD, length
+            place += step
+        address = content.find(COLLECTION, address + 1)
+    return found
 
 
 def words(texts: Any) -> np.ndarray:
@@ -249,6 +268,7 @@ def words(texts: Any) -> np.ndarray:
 
 
 def _is_text(dtype: np.dtype) -> bool:
+    """Whether this is a type of texts of variable length."""
     import h5py
 
     info = h5py.check_string_dtype(dtype)

@@ -425,7 +425,7 @@ def test_older_formats_are_read_with_a_warning(tmp_path, version):
 
 def test_an_older_format_is_not_believed_with_a_checksum_nor_this_one_without(tmp_path):
     old = gzip.decompress((Path(__file__).parent / "files" / "format2.nc.gz").read_bytes())
-    for content, why in ((sealed(old), "version 2, with a checksum"), (unsealed(files.to_bytes(flights(1))), "it has no checksum")):
+    for content, why in ((sealed(old), "a netCDF file of something else"), (unsealed(files.to_bytes(flights(1))), "it has no checksum")):
         (tmp_path / "front.nc").write_bytes(content)
         with pytest.raises(ValueError, match=why):
             Front.load(tmp_path / "front.nc")
@@ -471,7 +471,8 @@ def put(name: str, value, **options):
         place, _, last = name.rpartition("/")
         group = file[place or "/"]
         if last.startswith("@"):
-            group.attrs[last[1:]] = value
+            fixed = h5py.string_dtype("utf-8", len(value)) if isinstance(value, str) else None
+            group.attrs.create(last[1:], value, dtype=fixed)
             return
         if last in group:
             del group[last]
@@ -539,6 +540,15 @@ def long_texts(file: h5py.File) -> None:
     raise Replaced(bytes(content))
 
 
+def claim_length(file: h5py.File) -> None:
+    """A reference to a text of 4 GB."""
+    file.flush()
+    content = bytearray(file.id.get_file_image())
+    offset = file["note"].id.get_offset()
+    content[offset : offset + 4] = b"\xff" * 4
+    raise Replaced(bytes(content))
+
+
 class Replaced(Exception):  # noqa: N818 - carries the content of the file
     pass
 
@@ -586,12 +596,14 @@ FORGERIES = {
     "compressed": (put("violation", np.zeros(2), compression="gzip"), "compressed, in pieces or elsewhere"),
     "in chunks": (claim("violation", (10**9,), chunks=(10**6,)), "compressed, in pieces or elsewhere"),
     "filled": (claim("violation", (10**9,)), "but 0 bytes are stored"),
-    "long without an entry": (claim("objectives", (10**12, 0)), "but 0 bytes are stored"),
+    "long without an entry": (claim("objectives", (10**12, 0), chunks=(1, 1), maxshape=(None, None)), "but 0 bytes are stored"),
     "in another file": (claim("violation", (2,), external=[("/etc/hostname", 0, 16)]), "compressed, in pieces or elsewhere"),
     "virtual": (virtual, "compressed, in pieces or elsewhere"),
     "a soft link": (link("violation", h5py.SoftLink("/optimality")), "'violation' is a link to another place"),
     "a link to another file": (link("violation", h5py.ExternalLink("other.nc", "/violation")), "'violation' is a link to another place"),
     "a circle of groups": (link("_closest", lambda file: file["/"]), "groups at more than"),
+    "a text of variable length": (lambda file: file.attrs.create("message", "all is well"), "'message' is of another kind"),
+    "a text that is longer than the file": (lambda file: claim_length(file), "'note' refers to a text that is not there"),
     "many references to one text": (long_texts, "has more content than the file has bytes"),
     "two points closest": (lambda file: copy_root(file), "the closest point is one, not 2"),
 }
