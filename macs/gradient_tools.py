@@ -1,6 +1,6 @@
 """Gradient tools: single optima, the ends of a front, and sweeps along it, by exact derivatives on one mesh.
 
-They are exact where the problem is smooth, and local everywhere: each point is as good as the basin it was started in.
+They are exact where the problem is smooth, and local: the result depends on the start.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import secrets
 import time
 from collections.abc import Sequence
 from itertools import product
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from problems.problem import Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
-from transcription.nlp.scaling import objective_scales
+from transcription.nlp.scaling import nlp_scales
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
@@ -29,13 +28,9 @@ from .fronts.builders import nearest_misses, vectors_points
 from .fronts.points import Point
 from .fronts.provenance import costs
 from .gradients.multistart import MultistartSolver
-from .pareto.directions import simplex_lattice
-from .pareto.dominance import nondominated
+from .pareto.directions import divisions_below, simplex_lattice
+from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
-
-SAME = 1e-7
-"""Points whose objectives all differ by less than this fraction of their ranges are one point; dominance is told to the same digits."""
-
 
 ROUNDS = 3
 """How often points of a sweep, or its ends, are solved anew because another one turned out to be better for their purpose."""
@@ -43,10 +38,6 @@ ROUNDS = 3
 
 NO_RANGE, NOTHING = 1e-8, 1e-10
 """An objective that differs between the ends by less than these fractions of its size there, or of its scale, is in no conflict."""
-
-
-BETTER = 1e-6
-"""By what fraction of its range an objective is clearly better than at its end."""
 
 
 def optimize(
@@ -235,7 +226,7 @@ class _Job:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other, and so has none."""
         F = np.array([end.F for end in ends])
         ranges, sizes = np.ptp(F, axis=0), np.abs(F).max(axis=0)
-        return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * objective_scales(self.nlp)), ranges, 0.0)
+        return np.where(ranges > np.maximum(NO_RANGE * sizes, NOTHING * nlp_scales(self.nlp)), ranges, 0.0)
 
     def surpassed(self, ends: Sequence[Solved], found: Sequence[Solved]) -> bool:
         """Whether a sweep found an objective to be better than at its end, which then is a local optimum only."""
@@ -244,7 +235,7 @@ class _Job:
         return bool((best - F > BETTER * self._unit(self.ranges(ends))).any())
 
     def _unit(self, ranges: np.ndarray | None) -> np.ndarray:
-        scales = objective_scales(self.nlp)
+        scales = nlp_scales(self.nlp)
         return scales if ranges is None else np.where(ranges > 0, ranges, scales)
 
     def sifted(self, found: Sequence[Solved], ranges: np.ndarray | None = None) -> Front:
@@ -255,7 +246,7 @@ class _Job:
             return self.front([], None, message=f"no solve converged; {nearest_misses(nearest)}", closest=nearest)
         F = np.array([solved.F for solved in good])
         # To as many digits as the solves have; with all of them, of two equal points the one or the other might dominate.
-        kept = nondominated(np.round((F - F.min(axis=0)) / self._unit(ranges) / SAME))
+        kept = distinct(F, self._unit(ranges))
         left = {"did not converge": len(found) - len(good), "dominated or alike": int(np.count_nonzero(~kept))}
         message = ", ".join(f"{count} {word}" for word, count in left.items() if count)
         chosen = [solved for solved, keep in zip(good, kept, strict=True) if keep]
@@ -317,10 +308,7 @@ def targets(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> l
 def _down(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
     """From a lattice on the simplex between the ends, all ranges at once."""
     m = len(ends)
-    divisions = 1
-    while comb(divisions + m, m - 1) <= points:
-        divisions += 1
-    inner = [share for share in simplex_lattice(m, divisions) if share.max() < 1.0]
+    inner = [share for share in simplex_lattice(m, divisions_below(m, points)) if share.max() < 1.0]
     # An objective without a range has no weight, so that the least value is its limit.
     level = np.where(ranges > 0, ends, ends.max(axis=0))
     return [(share @ level, ranges) for share in inner]

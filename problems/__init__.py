@@ -1,6 +1,6 @@
-"""Floor 1: what is to be flown. Problems stated with CasADi expressions; a catalogue of cases."""
+"""Floor 1: optimal control problems, stated with CasADi expressions, and a catalogue of cases."""
 
-from .catalogue import describe, load, names
+from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .phase import Phase
 from .problem import Problem
@@ -15,6 +15,7 @@ __all__ = [
     "Problem",
     "Variable",
     "describe",
+    "is_catalogued",
     "load",
     "names",
 ]

@@ -1,4 +1,4 @@
-"""From a name or an address to a Problem."""
+"""The catalogue of cases: from a name or an address to a Problem."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from .problem import Problem
@@ -24,6 +24,8 @@ CASES: dict[str, tuple[str, str]] = {
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
 }
+FILE = "_problem_file_"
+"""Beginning of the names of modules that are read from files."""
 
 
 def names() -> tuple[str, ...]:
@@ -36,8 +38,16 @@ def describe(name: str) -> str:
     return CASES[name][1]
 
 
+def is_catalogued(address: str) -> bool:
+    """True for a name of the catalogue and for the address of one of its cases: then `load` runs no code but the project's own."""
+    return address in CASES or any(address == own for own, _ in CASES.values())
+
+
 def load(name: str, **data: Any) -> Problem:
-    """Make a problem.
+    """The problem of a case or an address.
+
+    The module or file that an address names is imported, which runs its code; see `is_catalogued`. The function is only called if it is a
+    plain one that is defined there, and is not annotated to return anything but a Problem.
 
     Parameters
     ----------
@@ -49,12 +59,12 @@ def load(name: str, **data: Any) -> Problem:
     Returns
     -------
     Problem
-        Its `address` and `data` say where it came from, so that a saved front finds it again.
+        Its `address` and `data` are kept, so that a saved front finds it again.
 
     Raises
     ------
     ValueError
-        There is no such case, file, module or function, or it does not return a Problem.
+        There is no such case, file, module or function, or it is none that makes a Problem.
     """
     address = CASES[name][0] if name in CASES else name
     place, _, function_name = address.rpartition(":")
@@ -63,10 +73,7 @@ def load(name: str, **data: Any) -> Problem:
         hint = f"; did you mean '{near[0]}'?" if near else ""
         known = ", ".join(CASES)
         raise ValueError(f"there is no problem '{name}'{hint} There are {known}, or give 'file.py:function' or 'package.module:function'")
-    module = _file_module(place) if place.endswith(".py") else _named_module(place, name)
-    function = getattr(module, function_name, None)
-    if not callable(function):
-        raise ValueError(f"'{place}' has no function '{function_name}'")
+    function = _builder(_file_module(place) if place.endswith(".py") else _named_module(place, name), function_name, name)
     try:
         problem = function(**data)
     except TypeError as error:
@@ -79,6 +86,26 @@ def load(name: str, **data: Any) -> Problem:
     return problem
 
 
+def _builder(module: ModuleType, function_name: str, name: str) -> FunctionType:
+    """The function of a module that makes a problem. Raises ValueError, before it is called, if it can be seen that it does not."""
+    function = getattr(module, function_name, None)
+    if not isinstance(function, FunctionType) or function.__module__ != module.__name__:
+        raise ValueError(f"'{name.rpartition(':')[0]}' has no function '{function_name}' of its own")
+    returned = function.__annotations__.get("return", "")
+    word = returned.strip("'\"") if isinstance(returned, str) else getattr(returned, "__name__", str(returned))
+    made = word.rpartition(".")[2] in ("Problem", "CompiledProblem")
+    # A file is the user's own; of what is installed, most functions without annotation do not make problems.
+    if (word and not made) or (not word and not (module.__name__.startswith(FILE) or _knows_problems(module))):
+        raise ValueError(f"problem '{name}': '{function_name}' is not known to return a Problem; annotate it with '-> Problem'")
+    return function
+
+
+def _knows_problems(module: ModuleType) -> bool:
+    """Whether a module has something of this package among its names."""
+    origins = (one.__name__ if isinstance(one, ModuleType) else getattr(one, "__module__", None) for one in vars(module).values())
+    return any(isinstance(origin, str) and origin.partition(".")[0] == __package__ for origin in origins)
+
+
 def _portable(name: str) -> str:
     """The address with which the same file is found from another folder."""
     place, _, function_name = name.rpartition(":")
@@ -89,7 +116,7 @@ def _file_module(place: str) -> ModuleType:
     path = Path(place).resolve()
     if not path.is_file():
         raise ValueError(f"there is no file '{place}'")
-    name = f"_problem_file_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
+    name = f"{FILE}{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ValueError(f"'{place}' is not a Python file")
@@ -110,6 +137,8 @@ def _file_module(place: str) -> ModuleType:
 
 
 def _named_module(place: str, name: str) -> ModuleType:
+    if place.partition(".")[0] in sys.stdlib_module_names:
+        raise ValueError(f"problem '{name}': '{place}' is of Python's own library, which has no problems")
     try:
         return importlib.import_module(place)
     except (ModuleNotFoundError, TypeError) as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, fields
 from typing import Any
 
 import casadi as ca
@@ -66,7 +67,7 @@ def within(inner: tuple[float, float], outer: tuple[float, float], what: str) ->
 
 
 def intersection(first: tuple[float, float], second: tuple[float, float], what: str) -> tuple[float, float]:
-    """What two intervals share; an error if they share nothing."""
+    """The intersection of two intervals; an error if it is empty."""
     lower, upper = max(first[0], second[0]), min(first[1], second[1])
     if lower > upper:
         raise ValueError(f"{what}: nothing lies both in ({first[0]:g}, {first[1]:g}) and in ({second[0]:g}, {second[1]:g})")
@@ -86,8 +87,8 @@ def scale(value: Any, default: float, what: str) -> float:
 def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
     """A row lower <= expression <= upper, of which one side may be missing.
 
-    What counts as one in it is, unless told, the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
-    the limit's size: so at the usual tolerance of 1e-6 none has to hold to more than nine digits, which scaled solvers cannot reach.
+    What counts as one in it is by default the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
+    the limit's size: so at the usual tolerance of 1e-6 none has to be met to more than nine digits, which scaled solvers cannot reach.
     """
     low, high = one_sided(lower, upper, what)
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
@@ -179,8 +180,32 @@ def check_count(name: str, value: Any, least: int) -> None:
         raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
 
 
+def check_choice(name: str, value: Any, choices: Iterable[str]) -> None:
+    """Raise ValueError unless `value` is one of these words."""
+    words = [*choices]
+    if not isinstance(value, str) or value not in words:
+        shown = " or ".join(map(repr, words)) if len(words) == 2 else f"one of {', '.join(map(repr, words))}"
+        raise ValueError(f"{name} must be {shown}, not {value!r}")
+
+
 def unknown(what: str, word: Any, known: Iterable[str]) -> str:
-    """What to say of a word that is none of those known: the nearest, and all."""
+    """The message for a word that is none of those known: the nearest, and all."""
     words = [*known]
     near = difflib.get_close_matches(str(word), words, n=1)
     return f"unknown {what} {word!r}{f', did you mean {near[0]}?' if near else ';'} there are {', '.join(words)}"
+
+
+def settings_of(value: Any) -> list[Field[Any]]:
+    """The settings of a dataclass as its constructor takes them: those that are also positional first."""
+    return sorted((one for one in fields(value) if one.init), key=lambda one: bool(one.kw_only))
+
+
+def short_repr(value: Any) -> str:
+    """A dataclass of settings as its constructor is called, without those that have their default value."""
+    shown = [f"{one.name}={given!r}" for one in settings_of(value) if not _is_default(given := getattr(value, one.name), one)]
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+def _is_default(value: Any, setting: Field[Any]) -> bool:
+    default = setting.default if setting.default_factory is MISSING else setting.default_factory()
+    return value is default or (type(value) is type(default) and bool(value == default))

@@ -1,4 +1,4 @@
-"""What a problem is once it is stated: plain data and named CasADi Functions, no symbols.
+"""Compiled problems: plain data and named CasADi Functions, no symbols.
 
 Everything above this floor reads a problem through these classes. They pickle, compare by their fingerprint, and never change.
 """
@@ -14,6 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .derived import Deriving
+
 FINGERPRINT_POINTS = 64
 
 
@@ -22,7 +24,7 @@ class Variable:
     """A state, control, parameter or time: its bounds, and how it is shown and scaled.
 
     `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
-    quantity of which `bounds` hold exactly one period.
+    quantity of which `bounds` are exactly one period.
     """
 
     name: str
@@ -70,8 +72,8 @@ class Link:
     states: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CompiledPhase:
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledPhase(Deriving):
     """One phase.
 
     Every Function takes `(x, u, t, s)`: states (nx), controls (nu), time, and `s = [t0, tf, *parameters]`. `dynamics` returns the rates
@@ -104,14 +106,18 @@ class CompiledPhase:
     size_scales: tuple[float, ...] = ()
     """... and how large they mostly are within the bounds."""
 
+    def __repr__(self) -> str:
+        names = ([v.name for v in group] for group in (self.states, self.controls))
+        return "CompiledPhase('{}', states=[{}], controls=[{}])".format(self.name, *(", ".join(group) for group in names))
+
     @property
     def n_quantities(self) -> int:
         """Length of the column `q` that objectives and constraints see: t0, tf, initials, finals, integrals, peaks."""
         return 2 + sum(f.size1_out(0) for f in (self.initials, self.finals, self.integrands, self.peaks))
 
 
-@dataclass(frozen=True, eq=False)
-class CompiledProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledProblem(Deriving):
     """A whole problem. `objectives` and `constraints` take `(q of phase 1, ..., q of phase n, parameters)`.
 
     `objectives` returns the column that is minimised (m); `constraints` the column that `limits` bounds.
@@ -127,9 +133,17 @@ class CompiledProblem:
     objectives: ca.Function
     constraints: ca.Function
     address: str = ""
-    """What `problems.load` made it from; empty for a problem built in a script."""
+    """The name or address that `problems.load` made it from; empty for a problem built in a script."""
     data: Mapping[str, Any] = field(default_factory=dict)
     """The keyword arguments that `problems.load` was given."""
+
+    def __repr__(self) -> str:
+        phases, goals = (", ".join(one.name for one in group) for group in (self.phases, self.goals))
+        return f"CompiledProblem('{self.name}', phases=[{phases}], objectives=[{goals}])"
+
+    def compile(self) -> CompiledProblem:
+        """Itself: so that every function of a Problem takes a compiled one as well."""
+        return self
 
     @property
     def signs(self) -> np.ndarray:
@@ -150,7 +164,7 @@ class CompiledProblem:
         """A hash of everything that decides what the problem's trajectories are: two problems with the same one are the same.
 
         Of each Function it takes the operations and the values at fixed points, to nine digits. Its serialised form would not do: that of
-        a table changes when somebody asks for its derivatives.
+        a table changes once its derivatives are asked for.
         """
         digest = hashlib.sha256()
         digest.update(repr((self.name, self.parameters, self.goals, self.limits, self.links)).encode())
@@ -167,7 +181,7 @@ class CompiledProblem:
 
 
 def _essence(function: ca.Function, ranges: Sequence[Sequence[tuple[float, float]]]) -> bytes:
-    """What a Function does: its operations, and its values at fixed points within the ranges of its inputs."""
+    """The identity of a Function: its operations, and its values at fixed points within the ranges of its inputs."""
     rng = np.random.default_rng(0)
     points = [np.array([rng.uniform(*limits, FINGERPRINT_POINTS) for limits in group]).reshape(-1, FINGERPRINT_POINTS) for group in ranges]
     values = np.array(function(*points)) if function.size1_out(0) else np.empty(0)

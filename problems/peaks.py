@@ -1,4 +1,4 @@
-"""What may be done with a peak, or the integral of an absolute value, where derivatives are used.
+"""Permitted uses of peaks, and of integrals of absolute values, where derivatives are used.
 
 The maximum over time is no smooth function, but a number not below any value is as good, as long as it pays to make it small: a peak may
 be minimised or bounded above. In the same way a number that is below neither a value nor its negative stands for the absolute value in an
@@ -24,7 +24,7 @@ NEGLIGIBLE = 1e-9
 def refuse_peaks(problem: CompiledProblem) -> None:
     """Raise a ValueError that names an objective or a constraint in which a peak is used otherwise, and the peak's phase.
 
-    Looked at are the signs of derivatives at points all over the ranges of what objectives and constraints see.
+    By the signs of derivatives at points all over the ranges of their arguments.
     """
     if not any(phase.peaks.size1_out(0) for phase in problem.phases):
         return
@@ -66,7 +66,7 @@ def with_sizes(problem: CompiledProblem) -> CompiledProblem:
 
 
 def _objectives(problem: CompiledProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Which rows are held down, and which up."""
+    """Which rows are limited from above, and which from below."""
     return np.full(len(problem.goals), True), np.full(len(problem.goals), False)
 
 
@@ -83,8 +83,8 @@ def _wrong(
     above: np.ndarray,
     below: np.ndarray,
 ) -> Iterator[tuple[int, int, int]]:
-    """Row, phase and column wherever a row that is held down by `above` falls, or one held up by `below` rises, with one of the `columns`
-    of a phase's quantities."""
+    """Row, phase and column wherever a row that is limited from above falls, or one limited from below rises, with one of the
+    `columns` of a phase's quantities."""
     if not len(above):
         return
     inputs = [ca.MX.sym(f"v{k}", function.size1_in(k)) for k in range(function.n_in())]

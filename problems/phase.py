@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import casadi as ca
 
 from . import checks
 from .compiled import CompiledPhase, Limit, Variable, vector_function
 
-if TYPE_CHECKING:
-    from .problem import Problem
-
 _KINDS = ("initial", "final", "integral", "peak")
 
 
 class Phase:
     """A stretch of time with its own states, controls and dynamics. Made by `Problem.phase`.
+
+    Parameters
+    ----------
+    name, t0, tf, duration, time_unit
+        See `Problem.phase`.
+    problem : str
+        Name of the problem, for messages.
+    parameters : mapping
+        Symbols of the problem's parameters by name: a live view, since parameters may be declared after the phase.
 
     Attributes
     ----------
@@ -25,9 +32,11 @@ class Phase:
         Time, and the times at which the phase begins and ends: always symbols, usable in any expression of the phase.
     """
 
-    def __init__(self, problem: Problem, name: str, t0: Any, tf: Any, duration: Any, time_unit: str) -> None:
-        self._problem = problem
+    def __init__(
+        self, name: str, t0: Any, tf: Any, duration: Any, time_unit: str, *, problem: str, parameters: Mapping[str, ca.MX]
+    ) -> None:
         self.name = name
+        self._problem, self._parameters = problem, parameters
         self._time_unit = time_unit
         self._t0_range = checks.fixed_or_interval(t0, f"phase '{name}': t0")
         self._tf_range = checks.fixed_or_interval(tf, f"phase '{name}': tf")
@@ -77,7 +86,7 @@ class Phase:
         what = self._new_name("state", name)
         limits = checks.interval(bounds, f"the bounds of {what}")
         if limits[0] == limits[1]:
-            raise ValueError(f"the bounds of {what} hold one value only, {limits[0]:g}; a constant is no state")
+            raise ValueError(f"the bounds of {what} are one value only, {limits[0]:g}; a constant is no state")
         ends = []
         for word, value in (("initial", initial), ("final", final)):
             end = limits if value is None else checks.fixed_or_interval(value, f"the {word} value of {what}")
@@ -175,11 +184,11 @@ class Phase:
         return self._symbols[name]
 
     def _known(self) -> dict[int, str]:
-        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._problem.parameters.values()]
+        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._parameters.values()]
         return {symbol.__hash__(): symbol.name() for symbol in own}
 
     def _expression(self, value: Any, what: str) -> ca.MX:
-        hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem.name}'"
+        hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"
         return checks.expression(value, self._known(), what, hint)
 
     def _quantity(self, kind: str, expr: Any) -> ca.MX:
@@ -193,11 +202,11 @@ class Phase:
             raise ValueError(f"phase '{self.name}': dynamics given for [{', '.join(given)}], states are [{', '.join(self._states)}]")
 
     def _quantity_symbols(self) -> list[ca.MX]:
-        """What objectives and constraints may use of this phase, in the order of `CompiledPhase.n_quantities`."""
+        """Symbols of this phase for objectives and constraints, in the order of `CompiledPhase.n_quantities`."""
         return [self.t0, self.tf, *(symbol for kind in _KINDS for symbol, _ in self._quantities[kind])]
 
     def _labels(self) -> dict[str, list[str]]:
-        """What to call each row of each compiled Function."""
+        """Labels of the rows of each compiled Function."""
         place = f"phase '{self.name}'"
         functions = {"initials": "initial", "finals": "final", "integrands": "integral", "peaks": "peak"}
         return {
@@ -215,7 +224,7 @@ class Phase:
             "x": [self._symbols[name] for name in self._states],
             "u": [self._symbols[name] for name in self._controls],
             "t": [self.time],
-            "s": [self.t0, self.tf, *self._problem.parameters.values()],
+            "s": [self.t0, self.tf, *self._parameters.values()],
         }
 
         def function(name: str, expressions: list[ca.MX]) -> ca.Function:

@@ -24,7 +24,7 @@ class Problem:
     Attributes
     ----------
     default_transcription, default_evaluations, default_inner, default_start, verify_tolerance : str, int, str, str or None, float
-        What the command line and studies use when they are told nothing else. A case may set its own.
+        What the command line and studies use by default. A case may set its own.
 
     Examples
     --------
@@ -46,7 +46,8 @@ class Problem:
         self.default_start: str | None = None
         self.verify_tolerance = 1e-2
         self._phases: dict[str, Phase] = {}
-        self._parameters: dict[str, tuple[Variable, ca.MX]] = {}
+        self._parameters: dict[str, Variable] = {}
+        self._symbols: dict[str, ca.MX] = {}
         self._objectives: dict[str, tuple[Objective, ca.MX]] = {}
         self._constraints: dict[str, tuple[Limit, ca.MX]] = {}
         self._links: list[Link] = []
@@ -63,8 +64,8 @@ class Problem:
 
     @property
     def parameters(self) -> Mapping[str, ca.MX]:
-        """Symbols of the parameters by name."""
-        return MappingProxyType({name: symbol for name, (_, symbol) in self._parameters.items()})
+        """Symbols of the parameters by name: a view, to which later parameters are added."""
+        return MappingProxyType(self._symbols)
 
     @property
     def objectives(self) -> Mapping[str, ca.MX]:
@@ -88,7 +89,7 @@ class Problem:
         Phase
         """
         checks.name_of("phase", name, self._phases, f"problem '{self.name}'")
-        self._phases[name] = Phase(self, name, t0, tf, duration, time_unit)
+        self._phases[name] = Phase(name, t0, tf, duration, time_unit, problem=self.name, parameters=self.parameters)
         return self._phases[name]
 
     def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None) -> ca.MX:
@@ -96,10 +97,9 @@ class Problem:
         place = f"problem '{self.name}'"
         what = f"parameter '{checks.name_of('parameter', name, self._parameters, place)}' of {place}"
         limits = checks.interval(bounds, f"the bounds of {what}")
-        symbol = ca.MX.sym(name)
-        default = limits[1] - limits[0] or 1.0
-        self._parameters[name] = Variable(name, *limits, unit, checks.scale(scale, default, what)), symbol
-        return symbol
+        self._parameters[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0] or 1.0, what))
+        self._symbols[name] = ca.MX.sym(name)
+        return self._symbols[name]
 
     def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
         """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases; `scale` as in `Phase.path`."""
@@ -153,7 +153,7 @@ class Problem:
             what = f"problem '{self.name}': the guess of parameter '{name}'"
             if name not in self._parameters:
                 raise ValueError(f"{what}: there is no such parameter; there are {', '.join(self._parameters) or 'none'}")
-            self._guesses[name] = checks.guessed(checks.number(value, what), self._parameters[name][0], what)
+            self._guesses[name] = checks.guessed(checks.number(value, what), self._parameters[name], what)
 
     def compile(self) -> CompiledProblem:
         """Check the whole and turn it into plain data and named CasADi Functions, which pickle.
@@ -170,7 +170,7 @@ class Problem:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
         links = [self._resolved(link) for link in self._links]
         phases = _narrowed([phase._compile() for phase in self._phases.values()], links)
-        parameters = tuple(variable for variable, _ in self._parameters.values())
+        parameters = tuple(self._parameters.values())
         groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(self._phases.values())}
         groups["p"] = list(self.parameters.values())
         goals = tuple(goal for goal, _ in self._objectives.values())

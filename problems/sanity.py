@@ -31,7 +31,7 @@ def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
 
 
 def samples(problem: CompiledProblem, count: int = 64) -> list[np.ndarray]:
-    """What objectives and constraints may see: columns of quantities of each phase and of parameters, (size, count) each."""
+    """Samples of the arguments of objectives and constraints: columns of quantities of each phase and of parameters, (size, count) each."""
     rng = np.random.default_rng(0)
     p = _within(rng, [(v.lower, v.upper) for v in problem.parameters])
     found = []
@@ -43,7 +43,7 @@ def samples(problem: CompiledProblem, count: int = 64) -> list[np.ndarray]:
 
 
 def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Samples of what objectives and constraints see of a phase, shape (n_quantities, SAMPLES)."""
+    """Samples of a phase's quantities, shape (n_quantities, SAMPLES)."""
     t0, tf = _times(phase, rng)
     share, s = rng.random(SAMPLES), np.vstack([t0, tf, p])
     first, last = _within(rng, phase.initial), _within(rng, phase.final)

@@ -1,4 +1,4 @@
-"""Floor 4: batches, statistics, files, people."""
+"""Floor 4: studies of many runs, their statistics and reports, and the command line."""
 
 from __future__ import annotations
 

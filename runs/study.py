@@ -1,32 +1,47 @@
-"""A study: every problem on every transcription by every solver, many independent runs of each. What it is; `executing` runs it."""
+"""Study: many independent runs of every solver on every problem and transcription, stated, run and reported."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields, replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from problems.checks import check_count, check_positive
 from transcription import Smooth
 
 from .batch import cells as combining
 from .batch import file as studyfile
 from .batch.cells import Cell
-from .batch.file import INNER, check_inner, sampling, written
-from .batch.store import Store, Summary
-from .measures.references import check_reference
+from .batch.store import Store, StoredRun, Summary
+from .batch.terms import INNER, check_inner, sampling, written
+from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
+from .execution.task import Payload, Task
+from .measures.references import ReferenceKey, check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
-from .report.published import check as check_paper
-from .report.published import check_against
+from .report.published import check_against, papers
 
 if TYPE_CHECKING:
     from .report.report import Report
-from .execution.task import Payload
 
 QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
+
+
+def _key(kind: Any = None, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
+    """The metadata of a field of `Study` that is a key of study files.
+
+    Parameters
+    ----------
+    kind : type
+        Of its values, see `checked`. None if it has a check of its own.
+    decides : bool
+        Whether it decides the runs' numbers, so that it must not change between two calls on one folder.
+    record : callable or None
+        Makes its value plain data for the study's record; None if the cells contain it.
+    """
+    return {"kind": kind, "decides": decides, "record": record}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +63,8 @@ class Study:
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
-        {label of a solver: what it works with where that is not what the others do}: any of transcription (one), evaluations, inner and
-        start. Reports compare it with the others on each of their transcriptions.
+        {label of a solver: terms of its own}: any of transcription (one), evaluations, inner and start. Reports
+        compare it with the others on each of their transcriptions.
     evaluations : int, or mapping, optional
         Budget of each run, or {label of a problem: budget}. Default: the problem's own.
     runs : int
@@ -57,60 +72,64 @@ class Study:
     seed : int
         The one that all seeds are spawned from.
     reference : optional
-        What reports measure fronts against; see `report`.
+        The reference that reports measure fronts against; see `report`.
     inner : str, optional
-        The inner level, by name. Default: the problem's own, which mostly is "auto".
+        The inner level, by name. Default: the problem's own, usually "auto".
     tolerance : float, default 1e-6
         As for `solve`.
     start : "uniform", "smooth", Smooth or mapping, optional
-        How the first candidates of a run are drawn, as for `solve`; a mapping holds settings of `transcription.Smooth`. Default: the
+        How the first candidates of a run are drawn, as for `solve`; a mapping has settings of `transcription.Smooth`. Default: the
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float, optional
         Simulate the points of each run, see `Front.simulate`; reports count only those that violate nothing by more than this, in
-        the constraints' scales, with their objectives as flown. Default: points are what the solver says.
+        the constraints' scales, with their objectives as simulated. Default: points count as the solver returns them.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
         One line, for lists.
     paper : sequence of mappings
-        Published tables to print beside ours; see `reporting.published`.
+        Published tables to print beside ours; see `report.published`.
     goal : mapping, optional
-        Of which objective reports draw the goal attainment, between which values; see `reporting.goal.Goal`.
+        Of which objective reports draw the goal attainment, between which values; see `report.goal.Goal`.
     nominal : str, optional
-        Label of the problem whose front reports fly under the data of all others, which have the same variables and objectives; see
-        `reporting.changed`.
+        Label of the problem whose front reports simulate under the data of all others, which have the same variables and objectives; see
+        `report.changed_data`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
     note : str
-        What readers of the report should know beforehand.
+        Text that stands at the beginning of the report.
+    trust : bool
+        Whether a report loads addresses that the study's folder names and that are not in the catalogue; see `load`. A study stated in
+        Python is the user's own words, so it does.
 
     Raises
     ------
     ValueError
-        Whatever does not make sense, before any work; the message names it.
+        A value is wrong; the message names it, before any work.
     """
 
-    name: str
+    name: str = field(metadata=_key(Text, decides=True))
     _: KW_ONLY
-    problems: Any
-    transcriptions: Any = None
-    solvers: Any
-    terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    evaluations: Any = None
-    runs: int
-    seed: int
-    reference: Any = None
-    inner: str | None = None
-    tolerance: float = 1e-6
-    start: Any = None
-    verify: float | None = None
-    time_limit: float | None = None
-    description: str = ""
-    paper: Sequence[Mapping[str, Any]] = ()
-    goal: Mapping[str, Any] | None = None
-    nominal: str | None = None
-    flights: bool = True
-    note: str = ""
+    problems: Any = field(metadata=_key(record=None))
+    transcriptions: Any = field(metadata=_key(record=None), default=None)
+    solvers: Any = field(metadata=_key(record=None))
+    terms: Mapping[str, Mapping[str, Any]] = field(metadata=_key(record=None), default_factory=dict)
+    evaluations: Any = field(metadata=_key(record=None), default=None)
+    runs: int = field(metadata=_key(Count))
+    seed: int = field(metadata=_key(Natural, decides=True))
+    reference: Any = field(metadata=_key(ReferenceKey), default=None)
+    inner: str | None = field(metadata=_key(decides=True, record=lambda inner: inner or INNER), default=None)
+    tolerance: float = field(metadata=_key(Positive, decides=True), default=1e-6)
+    start: Any = field(metadata=_key(decides=True, record=written), default=None)
+    verify: float | None = field(metadata=_key(Positive | None, decides=True), default=None)
+    time_limit: float | None = field(metadata=_key(Positive | None), default=None)
+    description: str = field(metadata=_key(Text), default="")
+    paper: Sequence[Mapping[str, Any]] = field(metadata=_key(), default=())
+    goal: Mapping[str, Any] | None = field(metadata=_key(), default=None)
+    nominal: str | None = field(metadata=_key(), default=None)
+    flights: bool = field(metadata=_key(Flag), default=True)
+    note: str = field(metadata=_key(Text), default="")
+    trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
@@ -119,7 +138,7 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(f"study: name must be a word, not {self.name!r}")
-        with studyfile.told(f"study '{self.name}'"):
+        with errors_begin_with(f"study '{self.name}'"):
             self._check_values()
             combined = combining.combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
@@ -138,17 +157,25 @@ class Study:
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
     @classmethod
-    def load(cls, source: str | PathLike[str]) -> Study:
+    def load(cls, source: str | PathLike[str], trust: bool = False) -> Study:
         """The study in a TOML file, or one that comes with the project, by name.
+
+        Parameters
+        ----------
+        source : path or str
+        trust : bool
+            Whether addresses of code in the file, and in its folder, may be loaded that are not in the catalogue: that runs the code.
 
         Raises
         ------
         ValueError
-            There is no such study, the file is not TOML, or a key or value in it makes no sense; the message names it.
+            There is no such study, the file is not TOML, a key or value in it is wrong, or an address in it is not trusted; the message
+            names it.
         """
-        given = studyfile.read(source)
-        with studyfile.told(str(source)):
-            return cls(**given)
+        keys = {key.name: key.default is MISSING and key.default_factory is MISSING for key in _KEYS} | {"name": False}
+        stated = studyfile.read(source, keys, trust)
+        with errors_begin_with(str(source)):
+            return cls(**stated, trust=trust)
 
     def run(
         self,
@@ -164,12 +191,12 @@ class Study:
         Parameters
         ----------
         out : path
-            A folder, made if it is not there; `store` says what is in it. A finished run in it is neither made again nor touched.
+            A folder, made if it does not exist; see `batch.store` for its files. A finished run in it is neither made again nor changed.
         jobs : int
             How many processes of this machine work at a time.
         executor : concurrent.futures.Executor, optional
-            Who does the work instead: threads, processes, a Dask client's `get_executor()`. Each of its workers keeps one process, in which
-            the runs happen; so a run that crashes or hangs takes none of them down.
+            The executor that makes the runs instead: threads, processes, a Dask client's `get_executor()`. Each of its workers keeps one
+            process for its runs, so a run that crashes or hangs ends none of the workers.
         retry : bool
             Make those runs again, too, that ended with an exception. Those that were killed or took too long always are.
         progress : bool
@@ -183,7 +210,7 @@ class Study:
         Raises
         ------
         ValueError
-            `out` holds another study, or is in use by another process.
+            `out` contains another study, or is in use by another process.
         OSError
             A run's file could not be written; those that are finished stay as they are.
         KeyboardInterrupt
@@ -191,10 +218,10 @@ class Study:
         """
         from .batch.running import execute
 
-        return execute(self, out, jobs=jobs, executor=executor, retry=retry, progress=progress)
+        return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
 
     def status(self, out: str | PathLike[str]) -> Summary:
-        """How many runs of each cell `out` has, and why others failed. Raises ValueError if it holds another study, or none."""
+        """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""
         store = Store.open(out)
         store.check(self.definition())
         return store.summary(self.runs)
@@ -207,19 +234,19 @@ class Study:
         figures: bool = True,
         progress: bool = False,
     ) -> Report:
-        """Tables and figures of the runs that `out` has; see `reporting.report.report`. Raises ValueError if it holds another study,
+        """Tables and figures of the runs that `out` has; see `report.report.report`. Raises ValueError if it contains another study,
         or none."""
         from .report.report import report
 
         Store.open(out).check(self.definition())
-        return report(out, foreign=foreign, figures=figures, progress=progress)
+        return report(out, foreign=foreign, figures=figures, progress=progress, trust=self.trust)
 
     def inner_of(self, cell: Cell) -> str:
         """The inner level of a cell's runs, by name."""
         return self._terms(cell).get("inner", self.inner or INNER)
 
     def sampling_of(self, cell: Cell) -> Smooth | str | None:
-        """What `solve` gets as its `start` in a cell's runs."""
+        """The argument `start` of `solve` in a cell's runs."""
         return sampling(self._terms(cell).get("start", self.start))
 
     def quick(self) -> Study:
@@ -240,43 +267,40 @@ class Study:
         return replace(self, name=f"{self.name}-quick", runs=runs, evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:
-        """All that decides the numbers, and what reports print, as plain data."""
+        """The study as plain data: the value of each key, the cells, and under "decides" the keys that decide the numbers."""
+        recorded = {one.name: one.metadata for one in _KEYS if one.metadata["record"] is not None}
         return {
-            "name": self.name,
-            "description": self.description,
-            "seed": int(self.seed),
-            "runs": int(self.runs),
-            "inner": self.inner or INNER,
-            "tolerance": float(self.tolerance),
-            "start": written(self.start),
-            "verify": self.verify,
-            "time_limit": self.time_limit,
-            "reference": studyfile.plain(self.reference),
-            "paper": studyfile.plain(self.paper),
-            "goal": studyfile.plain(self.goal),
-            "nominal": self.nominal,
-            "flights": self.flights,
-            "note": self.note,
+            **{name: key["record"](getattr(self, name)) for name, key in recorded.items()},
+            "decides": [name for name, key in recorded.items() if key["decides"]],
             "cells": [cell.to_dict() for cell in self.cells],
         }
 
+    def _task(self, run: StoredRun, checkpoint: Path) -> Task:
+        """The task that makes a run."""
+        return Task(
+            payload=self.payloads[run.cell.labels],
+            evaluations=run.cell.evaluations,
+            seed=run.seed,
+            inner=self.inner_of(run.cell),
+            tolerance=float(self.tolerance),
+            time_limit=self.time_limit,
+            start=self.sampling_of(run.cell),
+            verify=self.verify,
+            checkpoint=checkpoint,
+        )
+
     def _terms(self, cell: Cell) -> dict[str, Any]:
-        """What a cell's runs have of their own: the problem's inner level and start where the study names none, and the solver's terms."""
+        """The terms of a cell's runs: the problem's inner level and start where the study states none, and the solver's own."""
         return {**cell.terms, **self.terms.get(cell.solver, {})}
 
     def _check_values(self) -> None:
-        check_count("runs", self.runs, 1)
-        check_count("seed", self.seed, 0)
-        check_positive("tolerance", self.tolerance)
-        for name in ("time_limit", "verify"):
-            if getattr(self, name) is not None:
-                check_positive(name, getattr(self, name))
+        for key in _KEYS:
+            if key.metadata["kind"] is not None:
+                checked(getattr(self, key.name), key.metadata["kind"], key.name)
         sampling(self.start)
         if self.inner is not None:
             check_inner(self.inner)
-        check_paper(self.paper)
-        if not isinstance(self.flights, bool):
-            raise ValueError(f"flights must be True or False, not {self.flights!r}")
-        for name in ("description", "note"):
-            if not isinstance(getattr(self, name), str):
-                raise ValueError(f"{name} must be a line of text, not {getattr(self, name)!r}")
+        papers(self.paper)
+
+
+_KEYS = tuple(one for one in fields(Study) if one.metadata)

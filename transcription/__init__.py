@@ -1,6 +1,6 @@
-"""Floor 2: from a continuous problem to numbers and back: transcriptions, the inner level, trajectories, their independent check."""
+"""Floor 2: from a continuous problem to an NLP and back: transcriptions, the inner level, trajectories, their simulation."""
 
-from .base import NLP, Transcription
+from .base import NLP, Meshed, Transcription
 from .catalogue import from_dict, parse, word
 from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
@@ -14,6 +14,7 @@ __all__ = [
     "NLP",
     "InnerResult",
     "InnerSolver",
+    "Meshed",
     "MultipleShooting",
     "PhaseTrajectory",
     "PiecewisePolynomial",

@@ -1,4 +1,4 @@
-"""From the phases that a method writes to one NLP: what every transcription shares.
+"""From the phases that a method writes to one NLP, for all transcriptions.
 
 Times, parameters and links become variables, durations and the user's constraints rows, and the quantities of all phases meet in the
 objectives.
@@ -30,7 +30,7 @@ WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 class Assembly:
     """Lays out the variables of a problem and lets a method write each phase.
 
-    Linked quantities share one variable, so that links hold exactly; only where several phases lead into the same one do the further links
+    Linked quantities share one variable, so that links are exact; only where several phases lead into the same one do the further links
     become rows.
     """
 
@@ -138,7 +138,7 @@ class Assembly:
         return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
 
     def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
-        """What propagation leaves to satisfy."""
+        """The constraints that propagation leaves to satisfy."""
         left = [i for i, propagated in enumerate(rows.propagated) if not propagated]
         function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
@@ -147,7 +147,7 @@ class Assembly:
             list(self._writers.values()),
             (self._least, peaks),
             (function, lower, upper, scale),
-            # What hangs on hidden quantities is looked at where these are flown; elsewhere on demand.
+            # What depends on hidden quantities is evaluated where these are propagated; elsewhere on demand.
             (scores, rows.left) if self.layout.hidden else None,
         )
 
@@ -172,12 +172,12 @@ class Assembly:
         write = self.layout.write
         write(extended, self.parameters, np.array([[trajectory.parameters[v.name] for v in self.problem.parameters]]))
         for writer in self._writers.values():
-            flown = trajectory[writer.phase.name]
-            write(extended, writer.ends.statics[:2], np.array([[flown.t0, flown.tf]]))
-            states = flown.edge_states
+            phase = trajectory[writer.phase.name]
+            write(extended, writer.ends.statics[:2], np.array([[phase.t0, phase.tf]]))
+            states = phase.edge_states
             write(extended, writer.ends.initial, states[None, 0])
             write(extended, writer.ends.final, states[None, -1])
-            writer.interpolate(extended, flown)
+            writer.interpolate(extended, phase)
         Z = extended[:, : len(self.layout.variables)]
         lower, upper = (np.array([getattr(v, side) for v in self.layout.variables]) for side in ("lower", "upper"))
         return self.tighten(np.clip(Z, lower, upper))[0]

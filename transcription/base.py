@@ -3,38 +3,161 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 import numpy as np
 
+from problems.checks import check_count, settings_of, short_repr
 from problems.compiled import CompiledProblem, Variable
+from problems.derived import Deriving, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
+from .phases.mesh import PhaseMesh, as_meshes
+from .phases.reduced import Reduced
 from .trajectories.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from .phases.reduced import Reduced
+CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
+"""The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
 
 
 class Transcription(ABC):
     """A way to write a continuous problem with finitely many numbers.
 
-    An implementation is a frozen dataclass of its settings, in a file of its own, with the one method below. Whatever solves NLPs,
-    searches over them or looks at trajectories needs nothing else.
+    An implementation is a frozen dataclass of its settings, in a file of its own, with the method `transcribe`. Solvers of NLPs,
+    searches and trajectories need nothing else. One that has a `word` is registered: it is found in files and on the
+    command line.
+
+    Attributes
+    ----------
+    word : str
+        What the method is called on the command line, in lower case.
+    examples : str
+        How it is written there, for messages.
+    registered : dict
+        The methods that have a word, by name of the class.
     """
+
+    word: ClassVar[str] = ""
+    examples: ClassVar[str] = ""
+    registered: ClassVar[dict[str, type[Transcription]]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = short_repr  # type: ignore[method-assign]
+        if vars(cls).get("word"):
+            Transcription.registered[cls.__name__] = cls
 
     @abstractmethod
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP. Raises ValueError if the problem is stated wrongly or the method cannot express it."""
 
+    def nlp(self, problem: Problem | CompiledProblem) -> NLP:
+        """The NLP that `transcribe` makes, kept with the compiled problem: all that use both share it, and what is compiled of it."""
+        return _transcribed(problem.compile(), self)
+
     def to_dict(self) -> dict[str, Any]:
         """Name and settings as plain data, for files."""
-        return {"method": type(self).__name__, "settings": asdict(self)}  # type: ignore[call-overload]
+        return {"method": type(self).__name__, "settings": {one.name: getattr(self, one.name) for one in settings_of(self)}}
+
+    @classmethod
+    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
+        """A method as it is written on the command line, after its word: dfet:4x6:bernstein has numbers (4, 6) and options ("bernstein",).
+
+        By default the numbers are the settings that have no default value, and there are no options.
+
+        Raises
+        ------
+        ValueError
+            If it makes no sense.
+        """
+        if options or len(numbers) != len(cls._needed()):
+            raise ValueError(f"write it as {cls.examples}")
+        return cls(*numbers)
+
+    def to_word(self) -> str:
+        """The method as it is written on the command line, as far as that is possible: not all settings have a place there.
+
+        By default the settings that have no default value.
+        """
+        return f"{self.word}:{'x'.join(str(getattr(self, name)) for name in self._needed())}"
+
+    @classmethod
+    def _needed(cls) -> list[str]:
+        """Names of the settings that have no default value."""
+        return [one.name for one in settings_of(cls) if one.default is MISSING]
+
+
+@remembered
+def _transcribed(problem: CompiledProblem, transcription: Transcription) -> NLP:
+    return transcription.transcribe(problem)
+
+
+class Meshed(Transcription):
+    """A transcription on elements: any phase may have a mesh of its own, so that mesh refinement works on it.
+
+    An implementation is a frozen dataclass with these three settings among others (`order` may be a constant of the class), whose
+    `__post_init__` calls that of this class.
+
+    Attributes
+    ----------
+    elements, order : int
+        Number of equal elements, and degree of the states on them, of the phases that have no mesh of their own.
+    mesh : mapping or pairs, optional
+        Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
+    highest_order, most_elements : int
+        Limits of mesh refinement in each phase; of elements, there may be twice as many as it began with, if that is more.
+    """
+
+    elements: int
+    order: int
+    mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None
+    highest_order: ClassVar[int] = 10
+    most_elements: ClassVar[int] = 40
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        check_count(f"{name}: elements", self.elements, 1)
+        check_count(f"{name}: order", self.order, 0)
+        if self.mesh is not None:
+            try:
+                object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
+            except ValueError as error:
+                raise ValueError(f"{name}: {error}") from None
+
+    @property
+    def meshes(self) -> dict[str, PhaseMesh]:
+        """The phases that have a mesh of their own."""
+        return dict(self.mesh or ())
+
+    def mesh_of(self, phase: str) -> PhaseMesh:
+        """The mesh of a phase, by its name."""
+        return self.meshes.get(phase) or PhaseMesh.uniform(self.elements, self.order)
+
+    def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> Self:
+        """The same method on other meshes of some phases; `bounded`: with controls that stay within their bounds between nodes, too, where
+        the method has such."""
+        return replace(self, mesh={**self.meshes, **meshes})  # type: ignore[type-var]
+
+    def check_phases(self, problem: CompiledProblem) -> None:
+        """Raise ValueError if a mesh is given for a phase that the problem does not have."""
+        names = [phase.name for phase in problem.phases]
+        for name in self.meshes:
+            if name not in names:
+                raise ValueError(
+                    f"{type(self).__name__}: a mesh is given for phase '{name}'; the phases of '{problem.name}' are {', '.join(names)}"
+                )
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Transcription.to_dict`."""
+        plain = super().to_dict()
+        meshes = {name: mesh.to_dict() for name, mesh in self.meshes.items()} or None
+        return plain | {"settings": plain["settings"] | {"mesh": meshes}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +179,8 @@ class Profile:
     places: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class NLP:
+@dataclass(frozen=True, eq=False, repr=False)
+class NLP(Deriving):
     """Objectives F(z) and constraints g_lower <= g(z) <= g_upper of a vector z of n variables, in the user's units.
 
     Attributes
@@ -89,7 +212,7 @@ class NLP:
     unpack : callable
         A vector (n,) -> Trajectory.
     interpolate : callable
-        A Trajectory of the same problem, by whatever method or mesh -> the vector (n,) nearest to it: its times and parameters, its states
+        A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
     """
 
@@ -110,6 +233,10 @@ class NLP:
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
 
+    def __repr__(self) -> str:
+        sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"
+        return f"NLP('{self.problem.name}', {self.transcription!r}: {sizes})"
+
     @cached_property
     def lower(self) -> np.ndarray:
         """Lower bounds (n,)."""
@@ -127,7 +254,7 @@ class NLP:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """What counts as one in each variable (n,)."""
+        """The scales of the variables (n,)."""
         return np.array([v.scale for v in self.variables])
 
     @cached_property
@@ -136,22 +263,22 @@ class NLP:
         return np.array([v.period or 0.0 for v in self.variables])
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
-        """What is `guessed` of candidates (k, d), with the peaks that belong to it: vectors (k, n) for a solver to begin from."""
+        """Vectors (k, n) for a solver to begin from: those `guessed` of candidates (k, d), with the peaks that belong to them."""
         return self.tighten(self.guessed(candidates))
 
     def propagate(self, Z: np.ndarray) -> np.ndarray:
         """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
         equations, where that fails."""
-        return self.reduced.fly(Z).Z
+        return self.reduced.propagate(Z).Z
 
-    def fly(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `propagate` makes of vectors (k, n), with what `residuals` tells of that: in one go, where the method sees all that
-        these depend on on the way."""
-        flown = self.reduced.fly(Z)
-        if flown.scores is None:
-            return flown.Z, *self.residuals(flown.Z)
-        F, g = flown.scores
-        return flown.Z, F, self._residuals(flown.Z, g)
+    def propagate_and_score(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Propagated vectors (k, n), their objectives (k, m) and their residuals (k, n + r): `propagate`, then `residuals`, at once where
+        the method knows on the way all that these depend on."""
+        propagated = self.reduced.propagate(Z)
+        if propagated.scores is None:
+            return propagated.Z, *self.residuals(propagated.Z)
+        F, g = propagated.scores
+        return propagated.Z, F, self._residuals(propagated.Z, g)
 
     def evaluate(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Objectives (k, m), all minimised, and violations (k,) of vectors (k, n): the largest scaled residual of bounds and rows of g."""
@@ -192,7 +319,7 @@ class NLP:
         """Scaled residuals (k, n + r) of bounds and rows of g (k, r)."""
         n = Z.shape[1]
         residuals = np.empty((len(Z), n + g.shape[1]))
-        # Numbers that overflowed are told by what comes back, not by warnings.
+        # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore"):
             for part, values, lower, upper in (
                 (residuals[:, :n], Z, self.lower, self.upper),
@@ -241,6 +368,3 @@ def check_freedom(nlp: NLP) -> None:
         raise ValueError(
             f"problem '{nlp.problem.name}' leaves nothing to decide: no control, no parameter, no free time and no free initial state"
         )
-
-
-CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"

@@ -1,8 +1,7 @@
-"""First candidates that can be flown: smooth random profiles about what the user guessed.
+"""First candidates with smooth controls: random profiles about what the user guessed.
 
-Where a control has many nodes, values drawn one by one make a noise that averages to the middle of its bounds, all candidates fly much
-the same, and none of them anywhere useful. Nobody flies like that either. Of a profile that somebody has in mind, and of smooth deviations
-from it, a search has something to choose from.
+Where a control has many nodes, values drawn one by one are noise that averages to the middle of its bounds: the trajectories of all
+candidates are much alike, and none is useful. A guessed profile and smooth deviations from it give a search something to choose from.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from problems.checks import check_positive, short_repr
 from problems.problem import Problem
 
 from .base import NLP, Transcription
@@ -21,7 +21,7 @@ class Smooth:
     """Candidates drawn about the problem's guess (`phase.guess(...)`, `problem.guess(...)`), their controls as smooth profiles.
 
     It is what `solve(start="smooth")` of every solver begins with, as many as it needs, from the run's own generator. `draw` gives an array
-    of them, to look at or to give as `start`.
+    of them, to inspect or to give as `start`.
 
     A control is its guess, or where there is none the middle of its bounds, plus a random function of time: values of unit variance, whose
     correlation decreases with the time between them, d, in units of the phase's length, as exp(-d^2 / (2 length^2)), times `spread`, times
@@ -48,9 +48,12 @@ class Smooth:
     length: float = 0.2
     guess: bool = True
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         for name, value, most in (("spread", self.spread, 1), ("length", self.length, 10)):
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0 < value <= most:
+            check_positive(f"Smooth: {name}", value)
+            if value > most:
                 raise ValueError(f"Smooth: {name} must be in (0, {most}], not {value!r}")
         if not isinstance(self.guess, bool):
             raise ValueError(f"Smooth: guess must be True or False, not {self.guess!r}")

@@ -1,6 +1,6 @@
 """Long work that may be asked to end early, without every function in between knowing of it.
 
-Whoever starts the work says how to tell whether it is still wanted; a loop whose steps take long asks between them, and leaves the rest.
+The caller states how to find out whether the work is still wanted; a loop of long steps asks between them, and leaves out the rest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _ASKED: ContextVar[Callable[[], bool] | None] = ContextVar("stopping", default=N
 
 @contextmanager
 def stopped_by(asked: Callable[[], bool]) -> Iterator[None]:
-    """Within, `stopping()` is what `asked()` says. It must not raise: what was done so far is to come back."""
+    """Within, `stopping()` returns what `asked()` does, which must not raise: what was done so far is to be returned."""
     token = _ASKED.set(asked)
     try:
         yield

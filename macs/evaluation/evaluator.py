@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from transcription.inner.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
+from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
 

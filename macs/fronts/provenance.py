@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import problems
-from problems.catalogue import CASES
+from problems.catalogue import is_catalogued
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 
@@ -68,31 +67,19 @@ class Source:
             raise ValueError(
                 f"problem '{self.name}' was stated in a script, so it cannot be found by name: pass it, Front.load(path, problem=problem)"
             )
-        if not (self.trusted or _is_catalogued(self.address)):
+        if not (self.trusted or is_catalogued(self.address)):
             raise ValueError(
                 f"the file says that its problem '{self.name}' is made by the code at '{self.address}', which is not run unasked: "
                 "give problem=, or trust=True (--problem or --trust)"
             )
         try:
-            problem = _load(self.address, self.data)
+            problem = problems.load(self.address, **self.data)
         except (Exception, SystemExit) as error:
             raise ValueError(
                 f"problem '{self.name}' does not load from '{self.address}' ({error}): pass it, Front.load(path, problem=problem)"
             ) from error
         self.check(problem, "the front")
         return problem
-
-
-def _is_catalogued(address: str) -> bool:
-    """Whether this is a name or an address of the catalogue of problems."""
-    return address in CASES or address in [own for own, _ in CASES.values()]
-
-
-def _load(address: str, data: Mapping[str, Any]) -> Problem:
-    """`problems.load`, but of no module of Python itself, whose functions make no problems."""
-    if address.partition(":")[0].partition(".")[0] in sys.stdlib_module_names:
-        raise ValueError("a module of Python itself has no problems")
-    return problems.load(address, **data)
 
 
 STATS: dict[str, Any] = {

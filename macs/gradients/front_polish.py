@@ -10,12 +10,10 @@ analysis", Computers and Chemical Engineering 20(4), 1996.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from problems.checks import check_count, check_positive
-from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import Propagate
@@ -61,7 +59,7 @@ def polished(
     if time_limit is not None:
         check_positive("time_limit", time_limit)
     refuse_peaks(problem)
-    nlp = _written(problem, transcription)
+    nlp = transcription.nlp(problem)
     evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
     with working(time_limit, progress) as (show, interrupts):
         evaluator.before_batch = lambda: show(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
@@ -104,12 +102,6 @@ def _made_feasible(nlp: NLP, closest: Point | None, solves: CountedSolves) -> Ar
     found = solves(nlp.interpolate(closest.trajectory)[None], closest.F[None], ranges(closest.F[None])[None])
     good = found.status == CONVERGED
     return Archive(found.Z[good], found.F[good], found.violation[good])
-
-
-@lru_cache(maxsize=4)
-def _written(problem: CompiledProblem, transcription: Transcription) -> NLP:
-    """The NLP of a problem by a method: fronts of one problem share it, and all that is compiled of it."""
-    return transcription.transcribe(problem)
 
 
 ROUNDS = 3

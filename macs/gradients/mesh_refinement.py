@@ -10,8 +10,7 @@ import numpy as np
 
 from problems.checks import check_count, check_positive
 from transcription import from_dict
-from transcription.base import NLP
-from transcription.dfet.method import DFET
+from transcription.base import NLP, Meshed
 from transcription.inner import Ipopt
 from transcription.meshes.adaptation import COST, Verdict, judge, next_method
 from transcription.nlp.optimality import optimality
@@ -78,7 +77,7 @@ class _Refined:
 
     point: Point
     end: int | None
-    method: DFET
+    method: Meshed
     trajectory: Trajectory
     verdict: Verdict
     solved: SolvedPoint | None = None
@@ -136,8 +135,8 @@ class MeshRefinement:
     def _begin(self, i: int) -> _Refined:
         point, F = self.front[i], self.front.F
         method = None if point.transcription is None else from_dict(point.transcription)
-        if not isinstance(method, DFET) or point.trajectory is None:
-            raise ValueError(f"only meshes of DFET can be refined; point {i} is of {type(method).__name__}")
+        if not isinstance(method, Meshed) or point.trajectory is None:
+            raise ValueError(f"only meshes of DFET and other methods on elements can be refined; point {i} is of {type(method).__name__}")
         best: Any = np.flatnonzero(self.good[extremes(F[self.good])] == i) if len(self.good) > 1 else []
         verdict = self._judge(point.trajectory)
         return _Refined(point, int(best[0]) if len(best) else None, method, point.trajectory, verdict)
@@ -147,7 +146,7 @@ class MeshRefinement:
 
     def _polish(self) -> None:
         """Solve points that are not known to be optimal on the meshes that they have: rough controls would need finer ones."""
-        rough: dict[DFET, list[int]] = {}
+        rough: dict[Meshed, list[int]] = {}
         for i, point in self.points.items():
             if point.point.optimality is None or point.point.optimality > OPTIMAL:
                 rough.setdefault(point.method, []).append(i)
@@ -160,7 +159,7 @@ class MeshRefinement:
 
     def _round(self) -> None:
         """Solve every active point on a finer mesh, and judge it. Points that share a mesh follow each other."""
-        finer: dict[DFET, list[int]] = {}
+        finer: dict[Meshed, list[int]] = {}
         for i, point in self.points.items():
             if point.active:
                 settled = self._missed(point) <= COST * self.tolerance
@@ -174,7 +173,7 @@ class MeshRefinement:
             for i in _still_wanted(members):
                 self._solve(i, method, nlp)
 
-    def _solve(self, i: int, method: DFET, nlp: NLP) -> None:
+    def _solve(self, i: int, method: Meshed, nlp: NLP) -> None:
         point = self.points[i]
         solved = self.solver.solve(nlp, point.point.F, point.end, self._starts(i, nlp))
         if solved.status != CONVERGED:
@@ -190,7 +189,7 @@ class MeshRefinement:
         if point.active and earlier and min(latest) > 0.8 * min(earlier):
             point.active, point.trouble = False, "finer meshes do not help"
 
-    def _take(self, point: _Refined, method: DFET, solved: SolvedPoint) -> None:
+    def _take(self, point: _Refined, method: Meshed, solved: SolvedPoint) -> None:
         point.method, point.solved, point.trajectory = method, solved, solved.nlp.unpack(solved.z)
         point.verdict = self._judge(point.trajectory)
 
@@ -204,7 +203,7 @@ class MeshRefinement:
     def _missed(self, point: _Refined) -> float:
         """Difference of the simulated objectives from those of the mesh, in ranges of the front."""
         objectives = dict(zip(self.front.names, (point.F * self.problem.signs).tolist(), strict=True))
-        return missed(point.verdict.flight, objectives, self.ranges)
+        return missed(point.verdict.simulation, objectives, self.ranges)
 
     def _complaints(self, point: _Refined) -> list[str]:
         """Why a point does not meet the tolerance; empty if it does."""

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import count
-from math import comb
 
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
-from ..pareto.directions import across, simplex_lattice
-from ..pareto.dominance import extremes, nondominated
-from ..pareto.ranges import CURVE, SAME, keeps_promise, nearest, ranges, slack
+from ..pareto.directions import across, divisions_below, simplex_lattice
+from ..pareto.dominance import extremes
+from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
 
 PLACES = 500
 """How many places a surface has, at most."""
-
-
-BETTER = 1e-6
-"""By what part of the ranges a point has to be better to be worth another round."""
 
 
 ROUNDS = 6
@@ -87,7 +81,7 @@ def _descended(archive: Archive, solves: CountedSolves, exponent: float | None) 
     chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
     archive, waiting = archive.take(chosen), archive.take(~chosen)
     found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
-    kept = keeps_promise(found, archive.F, archive.violation, span)
+    kept = feasible_and_no_worse(found, archive.F, archive.violation, span)
     archive = Archive(
         np.where(kept[:, None], found.Z, archive.Z),
         np.where(kept[:, None], found.F, archive.F),
@@ -104,7 +98,7 @@ def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: floa
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
-    places = simplex_lattice(m, _divisions(m)) @ known
+    places = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
             break
@@ -117,11 +111,6 @@ def _covered(archive: Archive, solves: CountedSolves, limit: int, exponent: floa
             known = np.vstack([known, across((found.F - ideal) / between)])
             pool = _joined(Archive(found.Z, found.F, found.violation), pool)
     return _thinned(_front(pool, between), limit, exponent)
-
-
-def _divisions(m: int) -> int:
-    """Of the finest lattice that has no more than `PLACES` points."""
-    return next(d for d in count(1) if comb(d + m, m - 1) > PLACES)
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
@@ -137,7 +126,7 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     # From the least value of its own objective, which becomes a limit, all others together.
     both = solves(Z, F, np.where(one, 0.0, span))
     violation = np.where(kept, single.violation, best.violation)
-    good = keeps_promise(both, F, violation, span)
+    good = feasible_and_no_worse(both, F, violation, span)
     return Archive(np.where(good[:, None], both.Z, Z), np.where(good[:, None], both.F, F), np.where(good, both.violation, violation))
 
 
@@ -184,8 +173,8 @@ def _slides(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nd
 
 
 def _front(points: Archive, span: np.ndarray) -> Archive:
-    """Points that no other dominates, to as many digits as they have; of equal ones the first."""
-    return points.take(np.flatnonzero(nondominated(np.round((points.F - points.F.min(axis=0)) / span / SAME))))
+    """Points that are `distinct` and not dominated."""
+    return points.take(distinct(points.F, span))
 
 
 def _joined(one: Archive, two: Archive) -> Archive:

@@ -1,4 +1,4 @@
-"""Search directions: the weights of the scalar sub-problems that social agents own (Ricciardi and Vasile 2015)."""
+"""Directions of objectives: simplex lattices, weights of scalar sub-problems (Ricciardi and Vasile 2015), reference directions."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from math import comb
 import numpy as np
 
 from .archive import spread
+from .ranges import normalised
 
 
 def across(y: np.ndarray) -> np.ndarray:
-    """Points (k, m) on the plane through the origin that is square to the diagonal, along which all objectives fall alike."""
+    """Points (k, m) projected along the diagonal, on which all objectives fall alike, onto the plane through the origin."""
     return y - y.mean(axis=1, keepdims=True)
 
 
@@ -44,9 +45,7 @@ def pool(m: int, size: int) -> np.ndarray:
     if m == 2:
         angle = np.linspace(0.0, np.pi / 2, max(size, 2))[1:-1]
         return np.vstack([np.eye(2), np.stack([np.sin(angle), np.cos(angle)], axis=1)])
-    divisions = 1
-    while comb(divisions + m, m - 1) <= size:
-        divisions += 1
+    divisions = divisions_below(m, size)
     lattice = simplex_lattice(m, divisions)
     inner = lattice[lattice.max(axis=1) < 1.0]
     if divisions % m:
@@ -59,12 +58,6 @@ def draw(directions: np.ndarray, count: int, rng: np.random.Generator) -> np.nda
     m = directions.shape[1]
     chosen = np.concatenate([np.arange(m), rng.permutation(np.arange(m, len(directions)))])[:count]
     return np.concatenate([chosen, rng.choice(len(directions), count - len(chosen))])
-
-
-def normalised(F: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
-    """F (..., m) with the ideal point at 0 and the nadir at 1; an objective whose range is zero is only shifted."""
-    span = nadir - ideal
-    return (F - ideal) / np.where(span > 0.0, span, 1.0)
 
 
 def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
@@ -88,7 +81,7 @@ def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir:
 
 
 DEFAULT = 100
-"""Without any wish: the finest lattice that has no more directions. 100 for two objectives and 91 for three, as is customary."""
+"""By default: the finest lattice that has no more directions. 100 for two objectives and 91 for three, as is customary."""
 
 
 FINER = 4

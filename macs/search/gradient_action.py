@@ -11,7 +11,7 @@ import numpy as np
 
 from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..pareto.ranges import CURVE, keeps_promise, nearest, ranges
+from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
 from .state import NO_DIRECTION, SearchState
 
@@ -64,7 +64,7 @@ def individual_action(state: SearchState, box: Box, evaluator: Evaluator, F: flo
     if not len(found.F):  # the search is to end
         return []
     promised = agents.F[i] if feasible else np.full(m, np.inf)
-    if keeps_promise(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
+    if feasible_and_no_worse(found, promised[None], agents.violation[i : i + 1], ranges_of(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
 

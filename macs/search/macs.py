@@ -8,9 +8,8 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import Transcription
+from transcription.base import Meshed, Transcription
 from transcription.catalogue import parse
-from transcription.dfet.method import DFET
 
 from ..evaluation.box import box_of
 from ..evaluation.evaluator import Evaluation, Evaluator
@@ -142,8 +141,8 @@ class MACS(Settings, Solver):
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:
         """Refuse `mesh="adaptive"` for a method whose mesh cannot be refined, and `polish_on` where gradient solves are refused."""
-        if self.mesh == "adaptive" and not isinstance(transcription, DFET):
-            raise ValueError(f"MACS: mesh='adaptive' needs DFET, not {type(transcription).__name__}")
+        if self.mesh == "adaptive" and not isinstance(transcription, Meshed):
+            raise ValueError(f"MACS: mesh='adaptive' needs DFET or another method on elements, not {type(transcription).__name__}")
         if self.polish_on is not None:
             refuse_peaks(problem)
 

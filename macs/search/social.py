@@ -1,6 +1,9 @@
-"""Social actions: what agents try with what all have found, and where they start from next (Ricciardi and Vasile 2015)."""
+"""Social actions: proposals from population, archive and past improvements; directions of agents (Ricciardi and Vasile 2015)."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,9 +11,13 @@ from ..evaluation.box import Box
 from ..evaluation.evaluator import Evaluator
 from ..pareto import archive as archives
 from ..pareto import directions
+from ..pareto.ranges import normalised
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
 from .trials import Trials
+
+FEWEST = 4
+"""Fewest points that parents are drawn from, and fewest improvements that are an experience."""
 
 
 def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
@@ -57,10 +64,10 @@ def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: fl
 
 
 def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Move as others did when they improved: by normal deviates with the mean and the second moments of their displacements.
+    """Move like past improvements: by normal deviates with the mean and the second moments of their displacements.
 
-    What improves one point of a front tends to improve its neighbours, and steps that did so are longest where there is most to gain; this
-    is the estimate of a covariance from successful steps (Hansen and Ostermeier 2001), without its matrix.
+    A step that improves one point of a front tends to improve its neighbours, and such steps are longest where there is most to gain. This
+    estimates a covariance from successful steps (Hansen and Ostermeier 2001), without its matrix.
 
     Parameters
     ----------
@@ -79,33 +86,92 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
     return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
 
 
+@dataclass(frozen=True)
+class Surroundings:
+    """All that a social action may use, positions in the unit box.
+
+    Attributes
+    ----------
+    box : Box
+    X : array (k, d)
+        Positions of the social agents.
+    population, archive : arrays (n, d), (a, d)
+        Positions of all agents, and of the points of the archive.
+    experience : array (e, d)
+        Displacements of the last improvements.
+    settings : Settings
+    rng : numpy.random.Generator
+    """
+
+    box: Box
+    X: np.ndarray
+    population: np.ndarray
+    archive: np.ndarray
+    experience: np.ndarray
+    settings: Settings
+    rng: np.random.Generator
+
+
+def among_population(s: Surroundings) -> np.ndarray:
+    """DE/current-to-rand/1 with parents among the nearest agents."""
+    return current_to_rand(s.box, s.X, s.population, max(len(s.X), FEWEST), s.settings.F, s.rng)
+
+
+def among_archive(s: Surroundings) -> np.ndarray:
+    """DE/current-to-rand/1 with parents among the nearest points of the archive."""
+    return current_to_rand(s.box, s.X, s.archive, max(len(s.X), FEWEST), s.settings.F, s.rng)
+
+
+def along_experience(s: Surroundings) -> np.ndarray:
+    """Displacements like those of the last improvements."""
+    return follow_experience(s.box, s.X, s.experience, s.rng)
+
+
+def archive_probability(s: Surroundings) -> float | None:
+    """The larger the archive relative to the population, the more often it gives the parents; None while it is too small."""
+    if len(s.archive) < FEWEST:
+        return None
+    return 1.0 - float(np.exp(-len(s.archive) / len({row.tobytes() for row in s.population})))
+
+
+def experience_probability(s: Surroundings) -> float | None:
+    """The setting `experience`; None until there are enough improvements."""
+    return s.settings.experience if len(s.experience) >= FEWEST else None
+
+
+ACTIONS: tuple[tuple[Callable[[Surroundings], np.ndarray], Callable[[Surroundings], float | None]], ...] = (
+    (among_archive, archive_probability),
+    (along_experience, experience_probability),
+)
+"""Proposals (k, d), each with the probability that an agent takes it instead of an earlier one; the first of all is `among_population`. An
+action without a probability is left out."""
+
+
 def social_actions(state: SearchState, settings: Settings, box: Box, trials: Trials, evaluator: Evaluator) -> None:
-    """One proposal for each social agent: from the points near it, of the archive or of the population, or from what has helped others."""
+    """One proposal for each social agent, by one of the `ACTIONS`."""
     agents, rng = state.agents, state.rng
     rows = np.flatnonzero(agents.direction != NO_DIRECTION)
     if not rows.size:
         return
-    X = trials.positions(rows)
-    everyone = trials.positions()
     archive = box.to_unit(state.archive.Z[:, evaluator.free])
-    trial = current_to_rand(box, X, everyone, max(len(rows), 4), settings.F, rng)
-    if len(archive) > 3:
-        pick = rng.random(len(rows)) < 1.0 - np.exp(-len(archive) / len({row.tobytes() for row in everyone}))
-        trial = np.where(pick[:, None], current_to_rand(box, X, archive, max(len(rows), 4), settings.F, rng), trial)
-    if len(state.experience) > 3:
-        pick = rng.random(len(rows)) < settings.experience
-        trial = np.where(pick[:, None], follow_experience(box, X, state.experience, rng), trial)
+    around = Surroundings(box, trials.positions(rows), trials.positions(), archive, state.experience, settings, rng)
+    trial = among_population(around)
+    for propose, probability in ACTIONS:
+        share = probability(around)
+        if share is not None:
+            taken = rng.random(len(rows)) < share
+            trial = np.where(taken[:, None], propose(around), trial)
     if settings.social_moves:
-        trials.evaluate_and_accept(rows, X, trial, settings.keep_velocity)
+        trials.evaluate_and_accept(rows, around.X, trial, settings.keep_velocity)
     else:
-        trials.evaluate(agents.Z[rows], X, trial)
+        trials.evaluate(agents.Z[rows], around.X, trial)
 
 
 def assign(state: SearchState, settings: Settings, box: Box, evaluator: Evaluator) -> None:
-    """Give the social agents their directions, and send them to the points of the archive that are best for these.
+    """Give the social agents their directions, and place them on the points of the archive that are best for these.
 
-    While the archive has fewer points than there are objectives nobody is sent, or, as in the authors' code, the nearest of the agents
-    that own the orthogonal directions.
+    While the archive has fewer points than there are objectives, no agent is placed; or, as in the authors' code, the nearest of the
+    agents that own the orthogonal directions are.
     """
     agents, archive, m = state.agents, state.archive, state.directions.shape[1]
     social_count = min(settings.social_agents(m), len(agents))
@@ -122,7 +188,7 @@ def assign(state: SearchState, settings: Settings, box: Box, evaluator: Evaluato
         costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     elif settings.reseed == "spread":
         owners = owners[agents.direction[owners] < m]
-        apart = directions.normalised(archive.F[:, None] - agents.F[owners], np.zeros(m), state.nadir - state.ideal)
+        apart = normalised(archive.F[:, None] - agents.F[owners], np.zeros(m), state.nadir - state.ideal)
         costs = np.nan_to_num(np.linalg.norm(apart, axis=-1), nan=np.finfo(float).max)
     else:
         return

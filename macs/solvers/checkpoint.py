@@ -1,20 +1,18 @@
-"""The file that a run is kept in, so that the same call goes on where it was, however it ended.
+"""Keeps a run in a file, so that the same call continues it, whatever ended it.
 
-A file is a zip archive of numpy arrays, as `numpy.savez` writes them, each with a checksum. One of them, `document`, is JSON: what the file
-is, whom it belongs to, and the trees of `packing`, whose arrays are `array_0`, `array_1`, ... Nothing in it is pickled.
+The document of the file says which run it is, by which versions it was computed, and how it stands, in the trees of `packing`.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import logging
+import math
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, is_dataclass
 from os import PathLike
-from pathlib import Path
 from types import TracebackType
 from typing import Any, cast, get_type_hints
 
@@ -24,17 +22,21 @@ from ..evaluation.evaluator import Counts
 from ..fronts.labelled import document
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
+from . import checkpoint_file
 from .method import SearchMethod
 from .packing import pack, unpack
 
-FORMAT, VERSION = "MACS checkpoint", 1
 SECONDS, SHARE = 1.0, 20.0
-"""Between two writes there are at least so many seconds, and at least this many times what the last one took."""
+"""The time between two writes is at least so many seconds, and at least so many times what the last write took."""
 INSTEAD = "it was left as it is; make the call that it belongs to, name another file, or delete this one"
 HINTS = {
     "problem": "bounds, equations, objectives or data differ, or another CasADi",
     "evaluations": "a larger budget is another search; to add to what was found, give its front as start",
 }
+PARTS = ("belongs", "versions", "run", "state")
+"""Parts of the document."""
+RANKS = {"F": 2, "Z": 2, "violation": 1}
+"""Numbers of dimensions of the rows that each state has."""
 
 log = logging.getLogger(__name__)
 
@@ -48,11 +50,11 @@ class Kept:
     seed : int
     counts : Counts
     idle : int
-        How many iterations on end evaluated nothing.
+        Number of iterations since the last evaluation.
     elapsed : float
         Seconds of work so far.
     stopped : str
-        What ended the run by itself; empty as long as it is to go on.
+        Why the run ended by itself; empty as long as it has not.
     """
 
     seed: int
@@ -62,42 +64,43 @@ class Kept:
     stopped: str = ""
 
 
-class Unreadable(ValueError):  # noqa: N818 - what the file is
-    """The file holds no checkpoint, or one that is damaged or of another run."""
+class Unreadable(ValueError):  # noqa: N818 - the state of the file
+    """Raised for a file that is no checkpoint, is damaged, or belongs to another run."""
 
 
 class Checkpoint(AbstractContextManager["Checkpoint"]):
-    """Keeps one run in a file.
+    """A file that one run is kept in.
 
-    Left as a context, it writes what is not in the file yet. A write that fails does not stop the run: it is logged, tried again in time,
-    and `failure` says so.
+    On leaving the context, what is not in the file yet is written. A write that fails does not stop the run: it is logged and tried again
+    later, and `failure` gives the reason.
 
     Parameters
     ----------
     path : path
-    solver : Solver
+    solver : SearchMethod
         The class of its state is the one that its `makes_state` is annotated to return.
     belongs : mapping
-        Everything but the seed that decides what the run does, as data.
+        Everything but the seed that decides the results of the run, as data.
 
     Attributes
     ----------
     failure : str
         Why the file is behind the run; empty if it is not.
     mixed : bool
-        Whether other versions, of this package or of what it computes with, had a part in the run.
+        Whether other versions, of this package or of those that it computes with, had a part in the run.
 
     Raises
     ------
     ValueError
-        If the solver does not say what its state is.
+        If the class of the solver's state is not known.
     """
 
     def __init__(self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any]) -> None:
         self.path, self.failure = path, ""
-        self._state_class, self._belongs = _state_class(solver), _read_json(document(dict(belongs)))
+        self._state_class, self._solver = _state_class(solver), type(solver).__name__
+        self._belongs = _read_json(document(dict(belongs)))
         self._versions = [versions()]
-        self._waiting: tuple[dict[str, Any], list[np.ndarray]] | None = None
+        self._waiting: tuple[dict[str, Any], dict[str, np.ndarray]] | None = None
         self._written, self._took = time.perf_counter(), 0.0
 
     @property
@@ -106,47 +109,56 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         return len(self._versions) > 1
 
     def read(self, seed: int | None) -> tuple[Any, Kept] | None:
-        """The solver's state, and the rest, of the run of this seed, or whichever for None; None if there is no file.
+        """The solver's state, and how the run of this seed (None: of any seed) stands; None if there is no file.
 
         Raises
         ------
         Unreadable
-            If the file cannot be read, is no checkpoint, is damaged, or belongs to another run: then the message says what differs.
+            If the file cannot be read, is no checkpoint, is damaged, or belongs to another run. The message names the field that is wrong
+            or differs.
         """
         try:
-            content = Path(self.path).read_bytes()
+            return self._read(seed)
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise Unreadable(f"checkpoint {self.path} cannot be read: {error.strerror or error}") from error
+            raise Unreadable(f"checkpoint '{self.path}' cannot be read: {error.strerror or error}") from error
+        except ValueError as error:
+            raise Unreadable(f"'{self.path}' {' '.join(str(error).split())}; {INSTEAD}") from error
+
+    def _read(self, seed: int | None) -> tuple[Any, Kept]:
+        """As `read`; the message of a ValueError continues after the name of the file."""
+        header, arrays = checkpoint_file.read(self.path)
+        if not isinstance(header, dict) or header.keys() != {*PARTS} or not isinstance(header["belongs"], dict):
+            raise ValueError(f"is no valid checkpoint: its document does not consist of {', '.join(PARTS)}")
         try:
-            header, arrays = _from_bytes(content)
-            theirs, kept = dict(header["belongs"]), unpack(header["run"], Kept, arrays, "run")
-            known = [*header["versions"]]
-        except Exception as error:
-            # Whatever a damaged or foreign file provokes in numpy or in what follows, the file is what is wrong.
-            raise Unreadable(f"{self.path} does not hold a checkpoint that can be read: {_reason(content, error)}; {INSTEAD}") from error
-        mine = self._belongs | {"seed": kept.seed if seed is None else seed}
-        differences = [*_differences(theirs | {"seed": kept.seed}, mine)]
-        if differences:
-            raise Unreadable(f"checkpoint {self.path} belongs to another run: {'; '.join(differences)}. {INSTEAD.capitalize()}")
-        try:
+            kept = unpack(header["run"], Kept, arrays, "run")
+            _check_counts(kept)
+            mine = self._belongs | {"seed": kept.seed if seed is None else seed}
+            differences = [*_differences(header["belongs"] | {"seed": kept.seed}, mine)]
+            if differences:
+                raise ValueError(f"belongs to another run: {'; '.join(differences)}")
             state = unpack(header["state"], self._state_class, arrays, "state")
+            _check_points(state)
+            known = unpack(header["versions"], list[dict[str, str]], arrays, "versions")
+            if arrays:
+                raise TypeError(f"{min(arrays)} is unknown")
         except TypeError as error:
-            raise Unreadable(f"checkpoint {self.path} is of another {self._state_class.__name__}: {error}; {INSTEAD}") from error
+            raise ValueError(f"cannot be continued by this {self._solver}: {error}") from error
         self._versions = [*(one for one in known if one != versions()), versions()]
         if self.mixed:
-            log.warning("checkpoint %s was written by other versions: the rest of the run may differ in its last bits", self.path)
+            log.warning("checkpoint '%s' was written by other versions: the rest of the run may differ in its last bits", self.path)
         return state, kept
 
     def keep(self, state: Any, kept: Kept) -> None:
-        """Take note of how the run stands."""
-        arrays: list[np.ndarray] = []
+        """Note how the run stands, for the next write. Raises TypeError for a state that is not as the contract of a solver has it."""
+        arrays: dict[str, np.ndarray] = {}
         trees = {"run": pack(kept, Kept, arrays, "run"), "state": pack(state, self._state_class, arrays, "state")}
+        _check_points(state)
         self._waiting = trees, arrays
 
     def write_in_time(self) -> None:
-        """Write what is not in the file yet, if the last time is long enough ago."""
+        """Write what is not in the file yet, if the last write is long enough ago."""
         if time.perf_counter() - self._written > max(SECONDS, SHARE * self._took):
             self.write()
 
@@ -158,10 +170,10 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         if self._waiting is None:
             return
         trees, arrays = self._waiting
-        header = {"format": FORMAT, "version": VERSION, "belongs": self._belongs, "versions": self._versions, **trees}
         began = time.perf_counter()
         try:
-            write_whole(self.path, _to_bytes(header, arrays))
+            header = {"belongs": self._belongs, "versions": self._versions, **trees}
+            write_whole(self.path, checkpoint_file.to_bytes(header, arrays))
         except OSError as error:
             if not self.failure:
                 log.warning("checkpoint: %s; the search goes on without", error.strerror or error)
@@ -173,7 +185,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
 
 def keeps(solver: SearchMethod) -> bool:
-    """Whether a checkpoint can keep a run of this solver: whether it says what its state is."""
+    """Whether a checkpoint can keep a run of this solver: whether the class of its state is known."""
     try:
         _state_class(solver)
     except ValueError:
@@ -192,40 +204,38 @@ def _state_class(solver: SearchMethod) -> type:
     return cast(type, found)
 
 
-def _to_bytes(header: Mapping[str, Any], arrays: list[np.ndarray]) -> bytes:
-    buffer = io.BytesIO()
-    text = np.frombuffer(json.dumps({**header, "arrays": len(arrays)}).encode(), dtype=np.uint8)
-    named: dict[str, Any] = {f"array_{i}": array for i, array in enumerate(arrays)}
-    np.savez(buffer, document=text, **named)
-    return buffer.getvalue()
+def _check_counts(kept: Kept) -> None:
+    """Raise TypeError for a number that no run can have."""
+    counts = {f"counts.{name}": count for name, count in vars(kept.counts).items() if name != "failures"}
+    failures = {f"counts.failures[{status!r}]": count for status, count in kept.counts.failures.items()}
+    for name, number in {"seed": kept.seed, "idle": kept.idle, "elapsed": kept.elapsed, **counts, **failures}.items():
+        if not 0 <= number < math.inf:
+            raise TypeError(f"run.{name} is {number}, a number of at least 0 expected")
 
 
-def _from_bytes(content: bytes) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """Raises whatever comes if it is no checkpoint."""
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        header = json.loads(file["document"].tobytes())
-        if header["format"] != FORMAT:
-            raise ValueError("it is a file of something else")
-        if header["version"] != VERSION:
-            raise ValueError(f"its format is version {header['version']}, this MACS reads version {VERSION}")
-        return header, [file[f"array_{i}"] for i in range(header["arrays"])]
-
-
-def _reason(content: bytes, error: Exception) -> str:
-    if not content:
-        return "it is empty"
-    if not content.startswith(b"PK"):
-        return "it is a file of something else"
-    return str(error) if isinstance(error, ValueError) else f"it is cut short or damaged ({error})"
+def _check_points(state: Any) -> None:
+    """Raise TypeError unless the points of a state are what the contract of a solver says: rows of floats, those of the archive finite."""
+    columns: dict[str, int] = {}
+    for name in ("archive", "closest"):
+        for part, rank in RANKS.items():
+            where, array = f"state.{name}.{part}", getattr(getattr(state, name), part)
+            if array.dtype != float or array.ndim != rank:
+                raise TypeError(f"{where} is an array of {array.dtype} with {array.ndim} dimensions; float64 with {rank} expected")
+            if len(array) != (rows := len(getattr(state, name).F)):
+                raise TypeError(f"{where} has {len(array)} rows, {rows} expected")
+            if rank == 2 and array.shape[1] != columns.setdefault(part, array.shape[1]):
+                raise TypeError(f"{where} has {array.shape[1]} columns, {columns[part]} expected")
+            if name == "archive" and not np.isfinite(array).all():
+                raise TypeError(f"{where} has a value that is not finite")
 
 
 def _read_json(text: str) -> Any:
-    """As data that can be compared: NaN, too, is equal to itself."""
+    """Data that can be compared: each NaN is the same word."""
     return json.loads(text, parse_constant=str)
 
 
 def _differences(theirs: Any, mine: Any, name: str = "") -> Iterator[str]:
-    """What differs, in words, with what there is to say of it."""
+    """Sentences about what differs, with hints."""
     if isinstance(theirs, dict) and isinstance(mine, dict):
         for key in dict.fromkeys([*mine, *theirs]):
             found = list(_differences(theirs.get(key), mine.get(key), f"{name}.{key}" if name else key))

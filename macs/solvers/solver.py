@@ -98,7 +98,7 @@ class Solver(SearchMethod):
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
         solver = inner_solver(inner)
-        nlp = transcription.transcribe(problem)
+        nlp = transcription.nlp(problem)
         self.check_transcription(transcription, nlp.problem)
         check_freedom(nlp)
         self.check_objectives(len(nlp.problem.goals))

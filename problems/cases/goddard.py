@@ -67,7 +67,7 @@ def reference(points: int = 2001, longest: float = 250.0) -> np.ndarray:
 
 
 LAW = "linear tangent law"
-"""What `optimal_flight` is by."""
+"""The method of `optimal_flight`."""
 
 
 def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
@@ -111,7 +111,7 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
 
 
 def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Where a flight goes: height over distance."""
+    """Coordinates of a trajectory by label: height over distance."""
     return {"x [km]": values["x"], "y [km]": values["y"]}
 
 
@@ -124,7 +124,7 @@ def _speed(tf: float) -> float:
 def _ends(tf: float) -> tuple[float, float]:
     """The inverse hyperbolic sines of the tangent of the thrust angle, at the beginning and at the end of a flight of duration `tf`."""
     # The tangent z = tan u runs linearly from p = sinh a to q = sinh b, so dt = tf/(p - q) dz, and sin u = z/sqrt(1 + z^2). vy(tf) = 0
-    # says that the mean of sin u, (cosh a - cosh b)/(sinh a - sinh b) = tanh((a + b)/2), is g/THRUST: the sum of a and b is known, and
+    # means that the mean of sin u, (cosh a - cosh b)/(sinh a - sinh b) = tanh((a + b)/2), is g/THRUST: the sum of a and b is known, and
     # the height fixes their difference.
     total = 2.0 * np.arctanh(GRAVITY / THRUST)
 

@@ -1,9 +1,9 @@
 """Choosing where to land on rough ground: effort of the diverts against hazard of the sites. As many local fronts as there are hollows.
 
 Landers that descend in a given time may end their horizontal flight, at rest, wherever they like; the farther, the more effort. The ground
-gets safer towards a plain in the distance and is full of hollows, each of which is a trap for whoever follows slopes: of some two hundred,
-each of the landers has to find the right one. The true front is known because effort and hazard are both plain functions of the site: the
-least effort to get there is a closed form.
+gets safer towards a plain in the distance and is full of hollows, each of which is a trap for searches that follow slopes: each of the
+landers has to find the right one of some two hundred. The true front is known because effort and hazard are both plain functions of the
+site: the least effort to get there is a closed form.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def problem(landers: int = LANDERS) -> Problem:
 
 
 def hazard(x: Any, y: Any, cos: Any = np.cos) -> Any:
-    """How dangerous it is to land at (x, y) km."""
+    """The hazard of landing at (x, y) km."""
     slope = ((x - PLAIN[0]) ** 2 + (y - PLAIN[1]) ** 2) / FAR**2
     k = 2 * np.pi / HOLLOW
     return slope + ROUGH * (2 - cos(k * x) - cos(k * (y + 0.3 * x)))

@@ -33,7 +33,7 @@ def problem_full() -> Problem:
 def reference() -> np.ndarray:
     """The true front by indirect shooting on the necessary conditions, one solve for each flight time from 20 to 80 in steps of 0.25.
 
-    The table beside this file also holds the initial costates, from which anyone can check each row by integrating state and costate: at
+    The table beside this file also has the initial costates, from which each row can be checked by integrating state and costate: at
     the end the costate is the gradient of the energy.
 
     Returns
@@ -51,7 +51,7 @@ def reference_with_costates() -> np.ndarray:
 
 
 LAW = "indirect shooting"
-"""What `optimal_flight` is by."""
+"""The method of `optimal_flight`."""
 
 
 def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarray]:
@@ -82,21 +82,21 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
         raise ValueError(f"orbit_rise: the flight time must be from {table[0, 0]:g} to {table[-1, 0]:g} TU, not {flight_time}")
     times = np.linspace(0.0, flight_time, points)
 
-    def flown(costate: np.ndarray) -> np.ndarray:
+    def propagated(costate: np.ndarray) -> np.ndarray:
         start = np.array([START_RADIUS, 0.0, 0.0, START_RADIUS**-0.5, *costate])
         return solve_ivp(_with_costates, (0.0, flight_time), start, "DOP853", times, rtol=1e-11, atol=1e-12).y
 
     def missing(costate: np.ndarray) -> np.ndarray:
-        r, vr, _, vt, *last = flown(costate)[:, -1]
+        r, vr, _, vt, *last = propagated(costate)[:, -1]
         return np.array(last) - [1 / r**2, vr, vt]  # at the end the costate is the gradient of the energy
 
     found = root(missing, [np.interp(flight_time, table[:, 0], column) for column in table[:, 2:].T], tol=1e-11)
-    r, vr, theta, vt, _, toward_vr, toward_vt = flown(found.x)
+    r, vr, theta, vt, _, toward_vr, toward_vt = propagated(found.x)
     return {"time": times, "r": r, "vr": vr, "theta": theta, "vt": vt, "u": np.arctan2(toward_vt, toward_vr)}
 
 
 def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Where a flight goes, in the plane of its orbit."""
+    """Coordinates of a trajectory by label, in the plane of its orbit."""
     r, theta = values["r"], values["theta"]
     return {"r cos theta [DU]": r * np.cos(theta), "r sin theta [DU]": r * np.sin(theta)}
 

@@ -1,1 +1,1 @@
-"""Studies on disk: cells, files, stores, locks, and the running of what is missing."""
+"""Studies on disk: their files, cells and folders, and the running of the runs that are missing."""

@@ -1,4 +1,4 @@
-"""From what a study is given to its cells: every problem with each of its transcriptions and every solver, by labels."""
+"""Cells of a study: every problem with each of its transcriptions and every solver, by labels."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from transcription import Transcription, parse, word
 
+from ..data.schema import errors_begin_with, plain
 from ..execution.task import Payload
-from .file import check as check_terms
-from .file import of_problem, plain, told
+from .terms import check_terms, terms_of_problem
 
 
 def combine(
@@ -36,7 +36,7 @@ def combine(
 ) -> list[tuple[Cell, Payload]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
 
-    Parameters are those of `Study`. Raises ValueError that names what makes no sense.
+    Parameters are those of `Study`. Raises ValueError that names the problem, transcription, solver or term that is wrong.
     """
     stated = {label: _problem(label, given) for label, given in _labelled("problems", problems, _name_of_problem).items()}
     methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers, _name_of_solver).items()}
@@ -46,13 +46,13 @@ def combine(
     own_budgets = {}
     for label, given in terms.items():
         if "evaluations" in given:
-            with told(f"terms of '{label}'"):
+            with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
     combined = []
     for label, problem in stated.items():
         compiled = _compiled(label, problem)
-        with told(f"problems: '{label}'"):
-            theirs = of_problem(problem, inner, start)
+        with errors_begin_with(f"problems: '{label}'"):
+            theirs = terms_of_problem(problem, inner, start)
         common = [one for one in methods if "transcription" not in terms.get(one, {})]
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         offered += [
@@ -68,7 +68,7 @@ def combine(
                 budget = own_budgets.get(method_label, budgets)[label]
                 own |= {"evaluations": budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
-                with told(place):
+                with errors_begin_with(place):
                     method.check_objectives(len(compiled.goals))
                     method.check_transcription(scheme, compiled)
                 details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method.about()}
@@ -79,17 +79,17 @@ def combine(
 
 
 def problems(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, CompiledProblem]:
-    """The problems of what `combine` gave, by label."""
+    """The problems of combined cells, by label."""
     stated = {cell.problem: payload[0] for cell, payload in combined}
     return {label: pickle.loads(payload)[0] for label, payload in stated.items()}
 
 
 def solvers(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, Solver]:
-    """The solvers of what `combine` gave, by label."""
+    """The solvers of combined cells, by label."""
     return {label: pickle.loads(payload) for label, payload in {cell.solver: payload[1] for cell, payload in combined}.items()}
 
 
-def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:
+def _labelled(key: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:
     """{label: one} for one, several, or a mapping of them."""
     if isinstance(given, Mapping):
         found = dict(given)
@@ -98,13 +98,13 @@ def _labelled(what: str, given: Any, name_of: Callable[[Any], str]) -> dict[str,
         for one in given if isinstance(given, list | tuple) else [given]:
             label = name_of(one)
             if label in found:
-                raise ValueError(f"{what}: '{label}' is there twice; give each a label, {{label: ...}}")
+                raise ValueError(f"{key}: '{label}' is there twice; give each a label, {{label: ...}}")
             found[label] = one
     if not found:
-        raise ValueError(f"{what}: there are none")
+        raise ValueError(f"{key}: there are none")
     for label in found:
         if not isinstance(label, str) or not label.strip():
-            raise ValueError(f"{what}: a label must be a word, not {label!r}")
+            raise ValueError(f"{key}: a label must be a word, not {label!r}")
     return found
 
 
@@ -117,7 +117,7 @@ def _name_of_solver(one: Any) -> str:
 
 
 def _name_of_scheme(one: Any) -> str:
-    """As on the command line, where it can be said there: so the same method has the same label, however it was given."""
+    """The label of a transcription: its word on the command line if it has one, so the same method always has the same label."""
     if not isinstance(one, Transcription):
         return str(one)
     about = one.to_dict()
@@ -131,17 +131,17 @@ def _problem(label: str, given: Any) -> Problem | CompiledProblem:
         return name
     if not isinstance(name, str):
         raise ValueError(f"problems: '{label}' must be a name, a Problem, or a table with its name as problem = ..., not {given!r}")
-    with told("problems", anything=f"'{name}' does not load"):
+    with errors_begin_with("problems", anything=f"'{name}' does not load"):
         return load(name, **data)
 
 
 def _compiled(label: str, problem: Problem | CompiledProblem) -> CompiledProblem:
-    with told("problems", anything=f"'{label}' is stated wrongly"):
+    with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
         return problem.compile() if isinstance(problem, Problem) else problem
 
 
 def _identity(problem: CompiledProblem) -> dict[str, Any]:
-    """What a problem is told by. Where its file lies is none of it: a study may move."""
+    """The data that identify a problem. The place of its file is not among them: a study may move."""
     return {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
 
 
@@ -161,7 +161,7 @@ def _named_schemes(given: Any) -> dict[str, Transcription]:
 
 def _scheme(label: str, given: Any) -> Transcription:
     if isinstance(given, str):
-        with told("transcriptions"):
+        with errors_begin_with("transcriptions"):
             return parse(given)
     if not isinstance(given, Transcription):
         raise ValueError(f"transcriptions: '{label}' must be a word such as dfet:4x6 or a Transcription, not {given!r}")
@@ -175,7 +175,7 @@ def _solver(label: str, given: Any) -> Solver:
     name = settings.pop("solver", None)
     if not isinstance(name, str):
         raise ValueError(f"solvers: '{label}' must be a name, a Solver, or a table with its name as solver = \"macs\", not {given!r}")
-    with told("solvers"):
+    with errors_begin_with("solvers"):
         return catalogue.solver(name, **settings)
 
 
@@ -189,30 +189,30 @@ def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> d
     return {label: int(budget) for label, budget in found.items()}
 
 
-def _by_problem(what: str, given: Mapping[str, Any], problems: Mapping[str, Any]) -> dict[str, Any]:
+def _by_problem(key: str, given: Mapping[str, Any], problems: Mapping[str, Any]) -> dict[str, Any]:
     """A value for each problem, by labels."""
     for label in given:
         if label not in problems:
-            raise ValueError(f"{what}: there is no problem '{label}'; there are {', '.join(problems)}")
+            raise ValueError(f"{key}: there is no problem '{label}'; there are {', '.join(problems)}")
     for label in problems:
         if label not in given:
-            raise ValueError(f"{what}: none for problem '{label}'")
+            raise ValueError(f"{key}: none for problem '{label}'")
     return {label: given[label] for label in problems}
 
 
-def _own(what: str, label: str, problem: Problem | CompiledProblem, name: str) -> Any:
+def _own(key: str, label: str, problem: Problem | CompiledProblem, name: str) -> Any:
     if isinstance(problem, CompiledProblem):
-        raise ValueError(f"{what}: problem '{label}' is compiled and has none of its own; say which")
+        raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
     return getattr(problem, name)
 
 
-def _pickled(place: str, *what: Any) -> bytes:
+def _pickled(place: str, *parts: Any) -> bytes:
     """Bytes that another process can make the same of: one thing, or a tuple of several."""
-    for one in what:
+    for one in parts:
         if type(one).__module__ == "__main__":
             raise ValueError(f"{place}: other processes cannot import {type(one).__name__} from a script; put it into a module of its own")
     try:
-        return pickle.dumps(what if len(what) > 1 else what[0])
+        return pickle.dumps(parts if len(parts) > 1 else parts[0])
     except Exception as error:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error
 
@@ -223,7 +223,7 @@ LONGEST = 80
 
 @dataclass(frozen=True)
 class Cell:
-    """What all runs of a cell have in common.
+    """The data that all runs of a cell share.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Cell:
     evaluations : int
         Budget of each run.
     details : mapping
-        Plain data that decides the runs' numbers: addresses, fingerprint, settings. What another study in the same folder is told by.
+        Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
     """
 
     problem: str
@@ -248,7 +248,7 @@ class Cell:
 
     @property
     def terms(self) -> Mapping[str, Any]:
-        """What its runs have instead of what the study says: its solver's terms, and what its problem says where the study does not."""
+        """The terms of its runs that differ from the study's: those of its solver, and of its problem where the study states none."""
         return self.details.get("terms", {})
 
     @property
@@ -258,7 +258,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """For people: goddard, dfet:4x6, macs."""
+        """The labels in one line: goddard, dfet:4x6, macs."""
         return ", ".join(self.labels)
 
     @property
@@ -282,11 +282,6 @@ class Cell:
         """As plain data, for the study's record."""
         names = {"problem": self.problem, "transcription": self.transcription, "solver": self.solver, "folder": self.folder}
         return names | {"evaluations": self.evaluations, "details": dict(self.details)}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Cell:
-        """From what `to_dict` gave."""
-        return cls(data["problem"], data["transcription"], data["solver"], data["evaluations"], data["details"])
 
     def _digest(self) -> bytes:
         return hashlib.sha256(json.dumps(self.labels).encode()).digest()

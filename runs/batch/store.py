@@ -1,12 +1,12 @@
-"""The folder of a study: what is in it, who may write to it, and how what is in it is read.
+"""The folder of a study, read and written.
 
-study.json      what the study is, and how many runs of each cell there are to be
-CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is finished once it has one, which nobody touches any more
-CELL/RUN.json   of a finished run: how it converged; of any other: how it ended, with a traceback
-CELL/RUN.checkpoint, CELL/RUN.samples   of a run that is going on, or was: where it goes on. Its own process writes these two
-.lock           held by the process that runs the study, as long as it lives
+study.json      the definition of the study, and the number of runs of each cell
+CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is finished once it has one, which is never changed again
+CELL/RUN.json   the record of a run: of a finished one its history, of any other its status and traceback
+CELL/RUN.checkpoint, CELL/RUN.samples   the state of a run that has begun and not ended, written by its own process
+.lock           the lock of the process that runs the study
 
-Every file is written whole, the others by the process that runs the study alone.
+Every file is written whole, all but checkpoints and samples by the process that runs the study. Those in JSON are records with a checksum.
 """
 
 from __future__ import annotations
@@ -18,35 +18,57 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from zlib import crc32
 
+import msgspec
 import numpy as np
 
 from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.text import duration, text_table
 
+from ..data import records
+from ..data.addresses import load_front
+from ..data.schema import Count, Natural, Positive, checked, errors_begin_with
+from ..execution.samples import History
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
+from ..measures.simulation_record import SimulationRecord
 from .cells import Cell
-from .file import same
 from .lock import locked
 
 MISSING, UNREADABLE = "missing", "unreadable"
 
 
-FORMAT = "macs study"
+FORMAT, VERSION = "macs study", 2
+"""Of study.json."""
 
 
-VERSION = 1
+class Definition(msgspec.Struct):
+    """The part of a study's definition that its folder needs."""
+
+    name: str
+    seed: Natural
+    runs: Count
+    cells: list[Cell]
+    decides: list[str]
+    verify: Positive | None = None
 
 
-FREE = ("description", "runs", "time_limit", "reference", "paper", "goal", "nominal", "flights", "note", "cells")
-"""What may differ between two calls, or is compared on its own; everything else decides the numbers."""
+class RunRecord(msgspec.Struct):
+    """The record of a run, see `Outcome`; `front` is the checksum of its front's file. By default that of a run without a record."""
+
+    status: Literal["finished", "crashed", "timeout", "out of memory", "killed", "missing"] = "missing"
+    message: str = ""
+    traceback: str = ""
+    wall_time: float = 0.0
+    history: History = {}
+    simulated: SimulationRecord = {}
+    front: int | None = None
 
 
 @dataclass(frozen=True)
-class Run:
+class StoredRun:
     """One run of a cell, as the folder has it.
 
     Attributes
@@ -56,7 +78,7 @@ class Run:
         1, 2, ...
     seed : int
     status : str
-        "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": there is a front that cannot be read.
+        "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": its front or its record is damaged.
     message, traceback : str
         Why it is not finished; of a finished one with an empty front, why that is empty.
     wall_time : float
@@ -64,10 +86,12 @@ class Run:
     history : mapping
         Of a finished run: "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" (a list of objectives, all minimised) at
         about thirty counts, the last being its front's. Empty if its file is gone.
-    flown : mapping
-        Of a finished run whose points were flown: see `Outcome.flown`.
+    simulated : mapping
+        Of a finished run whose points were simulated: see `Outcome.simulated`.
     path : Path
-        Where its front is, or would be.
+        Of its front, whether it exists or not.
+    trust : bool
+        Whether its problem may be loaded from an address that is not in the catalogue.
     """
 
     cell: Cell
@@ -78,35 +102,36 @@ class Run:
     traceback: str = field(repr=False)
     wall_time: float
     history: Mapping[str, Any] = field(repr=False)
-    flown: Mapping[str, Any] = field(repr=False)
+    simulated: Mapping[str, Any] = field(repr=False)
     path: Path
+    trust: bool = False
 
     @property
     def finished(self) -> bool:
-        """Whether there is a front."""
+        """Whether it has a front."""
         return self.status == FINISHED
 
     @cached_property
     def front(self) -> Front:
-        """Its front, read when it is asked for. Raises ValueError or FileNotFoundError if there is none to read."""
-        return Front.load(self.path)
+        """Its front, read at first use. Raises ValueError or FileNotFoundError if it cannot be read."""
+        return load_front(self.path, self.trust)
 
 
 @dataclass(frozen=True)
 class Summary:
-    """How a study stands.
+    """The state of a study.
 
     Attributes
     ----------
     name : str
     path : Path
-    runs : tuple of Run
+    runs : tuple of StoredRun
         All that there are to be, cell by cell.
     """
 
     name: str
     path: Path
-    runs: tuple[Run, ...] = field(repr=False)
+    runs: tuple[StoredRun, ...] = field(repr=False)
 
     def count(self, *statuses: str) -> int:
         """How many runs have one of the statuses."""
@@ -128,15 +153,14 @@ class Summary:
         return self.count(MISSING)
 
     @property
-    def cells(self) -> dict[Cell, tuple[Run, ...]]:
+    def cells(self) -> dict[Cell, tuple[StoredRun, ...]]:
         """Runs by cell."""
-        found: dict[str, list[Run]] = {}
+        found: dict[str, list[StoredRun]] = {}
         for run in self.runs:
             found.setdefault(run.cell.folder, []).append(run)
         return {runs[0].cell: tuple(runs) for runs in found.values()}
 
     def __str__(self) -> str:
-
         return summary_text(self)
 
 
@@ -147,46 +171,48 @@ class Store:
     ----------
     path : Path
     definition : dict
-        What `Study.definition` gave: "name", "seed", "runs", "reference", "paper", and so on.
+        As of `Study.definition`: "name", "seed", "runs", "reference", "paper", and so on.
     cells : tuple of Cell
     """
 
-    def __init__(self, path: Path, definition: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, definition: Mapping[str, Any], trust: bool = False) -> None:
         self.path = path
         self.definition = dict(definition)
-        self.cells = tuple(Cell.from_dict(data) for data in definition["cells"])
+        self.cells = tuple(checked(definition, Definition).cells)
+        self.trust = trust
 
     @classmethod
-    def open(cls, out: str | PathLike[str]) -> Store:
+    def open(cls, out: str | PathLike[str], trust: bool = False) -> Store:
         """The folder of a study. Raises ValueError if there is none, or it cannot be read."""
         path = Path(out)
         record = path / "study.json"
+        if not path.is_dir():
+            raise ValueError(f"there is no folder '{out}'" if not path.exists() else f"'{out}' is not a folder")
         try:
-            if not path.is_dir():
-                raise ValueError(f"there is no folder '{out}'" if not path.exists() else f"'{out}' is not a folder")
-            data = json.loads(record.read_text(encoding="utf-8"))
-            if data.get("format") != FORMAT:
-                raise ValueError(f"'{record}' is no study's")
-            if data["version"] > VERSION:
-                raise ValueError(f"'{out}' was written by a later MACS: update MACS")
-            return cls(path, data["study"])
+            data = records.from_bytes(record.read_bytes())
+            if data["format"] != FORMAT:
+                raise ValueError("it is not the record of a study")
+            if data["version"] != VERSION:
+                raise ValueError(f"another version of MACS wrote it (format {data['version']}, not {VERSION}): use that version")
+            return cls(path, data["study"], trust)
         except FileNotFoundError:
-            raise ValueError(f"'{out}' holds no study: there is no study.json in it") from None
+            raise ValueError(f"'{out}' contains no study: there is no study.json in it") from None
         except OSError as error:
             raise ValueError(f"'{out}' cannot be read: {error.strerror or error}") from error
-        except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
-            raise ValueError(f"'{record}' cannot be read: {type(error).__name__}: {error}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"'{record}' cannot be read: {error}") from error
 
     @classmethod
     @contextmanager
     def claim(cls, out: str | PathLike[str], definition: Mapping[str, Any]) -> Iterator[Store]:
-        """The folder of this study, made if there is none, and no other process's as long as this is entered. Its record says how many runs
-        were ever asked for.
+        """The folder of this study, made if it does not exist, and locked within the context.
+
+        Its record has the largest number of runs ever asked for.
 
         Raises
         ------
         ValueError
-            It holds another study, or other things, or another process has claimed it.
+            It contains another study, or other files, or another process has locked it.
         OSError
             It cannot be written.
         """
@@ -198,12 +224,12 @@ class Store:
             latest = {**definition, "runs": max(definition["runs"], known.definition["runs"] if known else 0)}
             if known is None or latest != known.definition:
                 record = {"format": FORMAT, "version": VERSION, "study": latest}
-                write_whole(path / "study.json", json.dumps(record, indent=1).encode() + b"\n")
+                write_whole(path / "study.json", records.to_bytes(record, indent=1))
             yield cls(path, latest)
 
     @classmethod
     def _suits(cls, path: Path, definition: Mapping[str, Any]) -> Store | None:
-        """What is in a folder; None if it is new. Raises ValueError if it holds something else."""
+        """The study in a folder; None if the folder is new. Raises ValueError if it contains something else."""
         if (path / "study.json").exists():
             store = cls.open(path)
             store.check(definition)
@@ -212,65 +238,65 @@ class Store:
             raise ValueError(f"'{path}' is not a folder")
         others = sorted(one.name for one in path.iterdir() if not one.name.startswith(".")) if path.exists() else []
         if others:
-            raise ValueError(f"'{path}' holds no study but other things, '{others[0]}' for one; give a folder of its own")
+            raise ValueError(f"'{path}' contains no study but other things, '{others[0]}' for one; give a folder of its own")
         return None
 
     def check(self, definition: Mapping[str, Any]) -> None:
-        """Raise ValueError that says what differs unless this is the same study; only the number of runs and the time limit may differ."""
-        here, there = ({key: one[key] for key in one if key not in FREE} for one in (definition, self.definition))
-        ours = {cell.name: cell.to_dict() for cell in map(Cell.from_dict, definition["cells"])}
-        theirs = {cell.name: cell.to_dict() for cell in self.cells}
-        different = same(there, here)
+        """Raise ValueError with the first difference unless this is the same study: what decides its numbers, and its cells."""
+        here, there = ({key: one.get(key) for key in definition["decides"]} for one in (definition, self.definition))
+        ours, theirs = ({cell.name: cell.to_dict() for cell in cells} for cells in (checked(definition, Definition).cells, self.cells))
+        different = _difference(there, here)
         for name in (*theirs, *ours):
             if not different and (name in ours) != (name in theirs):
                 different = f"cell '{name}' is {'there but not here' if name in theirs else 'here but not there'}"
-            different = different or same(theirs[name], ours[name], f"{name}: ")
+            different = different or _difference(theirs[name], ours[name], f"{name}: ")
         if different:
-            raise ValueError(f"'{self.path}' holds another study: {different}; give another folder")
+            raise ValueError(f"'{self.path}' contains another study: {different}; give another folder")
 
-    # What is in it
+    # Its runs
 
-    def runs(self, count: int | None = None) -> Iterator[Run]:
+    def runs(self, count: int | None = None) -> Iterator[StoredRun]:
         """All runs there are to be, cell by cell: finished, failed, unreadable and missing ones. By default as many as were asked for."""
         for cell in self.cells:
             for number in range(1, (self.definition["runs"] if count is None else count) + 1):
                 yield self.run(cell, number)
 
-    def run(self, cell: Cell, number: int) -> Run:
+    def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        path, record = self.front_path(cell, number), _record(self.record_path(cell, number))
-        status, message = record.get("status", MISSING), str(record.get("message", ""))
-        if path.exists():
-            status = FINISHED
-            try:
-                _check(path, record)
-            except (ValueError, OSError) as error:
-                status, message = UNREADABLE, str(error)
-        elif status not in (CRASHED, TIMEOUT, MEMORY, KILLED):
-            status, message = MISSING, ""
-        return Run(
+        path, record, status, message = self.front_path(cell, number), RunRecord(), UNREADABLE, ""
+        try:
+            record = self._record(cell, number)
+            if path.exists():
+                self._check_front(path, record)
+        except (ValueError, OSError) as error:
+            message = str(error)
+        else:
+            status = FINISHED if path.exists() else MISSING if record.status == FINISHED else record.status
+            message = record.message if status != MISSING else ""
+        return StoredRun(
             cell=cell,
             number=number,
             seed=cell.seed(self.definition["seed"], number),
             status=status,
             message=message,
-            traceback=str(record.get("traceback", "")),
-            wall_time=record["wall_time"] if isinstance(record.get("wall_time"), float) else 0.0,
-            history=record["history"] if isinstance(record.get("history"), dict) else {},
-            flown=record["flown"] if isinstance(record.get("flown"), dict) else {},
+            traceback=record.traceback,
+            wall_time=record.wall_time,
+            history=record.history,
+            simulated=record.simulated,
             path=path,
+            trust=self.trust,
         )
 
     def summary(self, count: int | None = None) -> Summary:
-        """How it stands."""
+        """The state of the study, with the runs that were asked for or `count` of each cell."""
         return Summary(self.definition["name"], self.path, tuple(self.runs(count)))
 
     def front_path(self, cell: Cell, number: int) -> Path:
-        """Where the front of a run is."""
+        """Path of the front of a run."""
         return self.path / cell.folder / f"{number:04d}.nc"
 
     def record_path(self, cell: Cell, number: int) -> Path:
-        """Where it is said how a run went."""
+        """Path of the record of a run."""
         return self.path / cell.folder / f"{number:04d}.json"
 
     def checkpoint_path(self, cell: Cell, number: int) -> Path:
@@ -280,35 +306,52 @@ class Store:
         return path
 
     def keep(self, cell: Cell, number: int, outcome: Outcome) -> None:
-        """Write what came of a run; its front last, which is what makes it finished: then it has no more need of a checkpoint. Raises
-        OSError if that cannot be written."""
+        """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
+        cannot be written."""
         front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
-        about = {"status": outcome.status, "message": outcome.message, "seed": cell.seed(self.definition["seed"], number)}
-        about |= {"wall_time": outcome.wall_time, "traceback": outcome.traceback, "history": outcome.history, "flown": outcome.flown}
-        about |= {"crc32": crc32(outcome.front)} if outcome.status == FINISHED else {}
-        write_whole(record, json.dumps(about).encode())
+        content = {"status": outcome.status, "message": outcome.message, "traceback": outcome.traceback, "wall_time": outcome.wall_time}
+        content |= {"history": outcome.history, "simulated": outcome.simulated}
+        content |= {"front": crc32(outcome.front)} if outcome.status == FINISHED else {}
+        write_whole(record, records.to_bytes(content))
         if outcome.status == FINISHED:
             if front.exists():
-                # Nobody could read it, but it is not ours to throw away.
+                # It could not be read, but it is the user's to delete.
                 front.replace(front.with_name(f"{front.name}.unreadable"))
             write_whole(front, outcome.front)
             for path in (checkpoint, samples_path(checkpoint)):
                 path.unlink(missing_ok=True)
 
+    def _record(self, cell: Cell, number: int) -> RunRecord:
+        """The record of a run. Raises ValueError or OSError if it cannot be read."""
+        path = self.record_path(cell, number)
+        try:
+            with errors_begin_with(f"its record '{path}' is damaged"):
+                found: RunRecord = checked(records.from_bytes(path.read_bytes()), RunRecord)
+                return found
+        except FileNotFoundError:
+            return RunRecord()
 
-def _check(path: Path, record: Mapping[str, Any]) -> None:
-    """Raise ValueError or OSError unless a front can be read: at once, where its content is what was written; else by reading it."""
-    if crc32(path.read_bytes()) != record.get("crc32"):
-        Front.load(path)
+    def _check_front(self, path: Path, record: RunRecord) -> None:
+        """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
+        loaded."""
+        if record.status == MISSING:
+            Front.load(path)
+        elif crc32(path.read_bytes()) != record.front:
+            raise ValueError(f"'{path}' is damaged: its content is not what was written")
 
 
-def _record(path: Path) -> dict[str, Any]:
-    """What is said of a run; nothing where there is no such file, or it is damaged."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError):
-        return {}
-    return data if isinstance(data, dict) else {}
+def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "") -> str:
+    """The first difference between two tables of plain data, in words; empty if there is none."""
+    for key in (*one, *(key for key in other if key not in one)):
+        name = f"{place}{key}"
+        first, second = one.get(key), other.get(key)
+        if isinstance(first, Mapping) and isinstance(second, Mapping):
+            inner = _difference(first, second, f"{name}.")
+            if inner:
+                return inner
+        elif first != second:
+            return f"{name} is {json.dumps(first)} there and {json.dumps(second)} here"
+    return ""
 
 
 LINE = 200
@@ -316,7 +359,7 @@ LINE = 200
 
 
 WORTH = 20
-"""Most failures told one by one."""
+"""Most failures listed one by one."""
 
 
 def summary_text(summary: Summary) -> str:

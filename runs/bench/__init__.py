@@ -1,5 +1,5 @@
-"""Ratios against the alternatives, measured side by side in one run: inner levels in `inner`, on the batches of `cases`; populations flown
-in one call in `population`; searches in `search`, batches of them in `study`."""
+"""Benchmarks: ratios against the alternatives, measured side by side in one run. Inner levels in `inner`, on the batches of `cases`;
+populations simulated in one call in `population`; searches in `search`, batches of them in `study`."""
 
 from .command import KINDS, bench
 

@@ -1,4 +1,4 @@
-"""What the inner levels are compared on: the published cases, and two that are hard on the fast path."""
+"""Cases of the benchmark of inner levels: the published ones, and two that are hard for the fast path."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from problems import Problem, load
 from transcription import DFET, NLP
+from transcription.base import CONVERGED
 from transcription.inner import Auto
-from transcription.inner.base import CONVERGED
 
 BATCH = 10
 """Candidates in a batch, as the search sends them: one for each agent."""
@@ -38,11 +38,11 @@ class Case:
         Candidates near feasible points, starting from their states; else uniformly random ones, from a first guess.
     tolerance : float
     propagates : bool
-        Every candidate is feasible as it is flown, as far as the bounds of states let it: propagation alone is an inner level here.
+        Every candidate is feasible when it is propagated, within the bounds of states: propagation alone is an inner level here.
     quick : bool
         Also part of the quick benchmark.
     asked : mapping
-        What "auto" has to reach: "speed" at least, "moved" at most.
+        Target of "auto": "speed" at least, "moved" at most.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Case:
     asked: Mapping[str, float] = field(default_factory=dict)
 
     def batch(self, nlp: NLP, rng: np.random.Generator) -> Batch:
-        """One more."""
+        """A batch of candidates of the case, with a warm start if it has one."""
         lower, upper, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
         cold = lower + rng.random((BATCH, len(span))) * span
         if not self.warm:

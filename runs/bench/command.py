@@ -1,4 +1,4 @@
-"""`macs bench`: measures, prints and saves what there is, also after Ctrl-C."""
+"""`macs bench`: measures, prints and saves, also after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
         if rows:
             print(REPORTS[kind](rows), end="\n\n", flush=True)
         if ended:
-            print("interrupted: this is what there was to say by then", file=sys.stderr)
+            print("interrupted: these are the values measured until then", file=sys.stderr)
             break
     if path:
         save(path, measured)
@@ -38,7 +38,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
 
 
 def _run(kind: str, rows: list[Row], quick: bool) -> bool:
-    """Measure; whether somebody pressed Ctrl-C."""
+    """Measure; returns whether Ctrl-C was pressed."""
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),

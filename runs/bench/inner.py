@@ -1,4 +1,4 @@
-"""Inner levels side by side: the same batches, in turn, so that a noisy machine hits all alike."""
+"""Benchmark of inner levels: the same batches in turn, so that a noisy machine affects all alike."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import numpy as np
 from macs.io.console import Steps
 from macs.io.text import text_table
 from transcription import NLP
+from transcription.base import CONVERGED
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, Newton, Propagate
-from transcription.inner.base import CONVERGED
 from transcription.numerics.batched import compiler
 
 from .cases import BATCH, INNER, Batch, Case
@@ -27,12 +27,12 @@ EXACT_TOLERANCE = 1e-11
 AT_LEAST = 5e-3
 """Seconds for which a fast solver repeats a batch, so that the clock and a hiccup matter less."""
 RANGES = 20
-"""Random candidates whose feasible points say how large the objectives' ranges are."""
+"""Random candidates whose feasible points give the objectives' ranges."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
+    """Size of a measurement: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
     and whether functions are measured interpreted too, where they can be compiled."""
 
     least: int = 5
@@ -47,7 +47,7 @@ QUICK = Effort(least=2, rounds=6, seconds=1.0, checked=1, interpreted=False)
 
 @dataclass
 class Contender:
-    """An inner level and the NLP that it works on; `when` says whether that may be compiled, see `compiling`."""
+    """An inner level and the NLP that it works on; `when` is whether that may be compiled, see `compiling`."""
 
     row: Row
     solver: InnerSolver
@@ -59,7 +59,7 @@ class Contender:
             return self.solver.solve(self.nlp, candidates, warm, tolerance=tolerance)
 
     def timed(self, candidates: np.ndarray, warm: np.ndarray | None, tolerance: float) -> tuple[float, InnerResult]:
-        """Seconds for each candidate, and what came of them."""
+        """Seconds for each candidate, and the results."""
         began, times = time.perf_counter(), 0
         while True:
             result = self.solve(candidates, warm, tolerance)
@@ -69,7 +69,7 @@ class Contender:
 
 
 def bench_inner(rows: list[Row], effort: Effort, cases: Sequence[Case] = INNER) -> None:
-    """Measure all cases; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    """Measure all cases; `rows` are filled as values become known, also if `Stopped` ends it."""
     with Steps("inner levels", len(cases)) as steps:
         for case in cases:
             steps.begin(case.name)
@@ -88,7 +88,7 @@ def _measure(case: Case, rows: list[Row], effort: Effort, steps: Steps) -> None:
     for i, (candidates, warm) in enumerate(batches):
         steps.check()
         exact = EXACT.solve(nlp, candidates, warm, tolerance=EXACT_TOLERANCE) if i < effort.checked else None
-        # Nobody is always the one to come after the slow one.
+        # The order changes, so that none always follows the slow one.
         turn = i % len(contenders)
         timed = {id(c): c.timed(candidates, warm, case.tolerance) for c in contenders[turn:] + contenders[:turn]}
         baseline, _ = timed[id(contenders[0])]
@@ -169,9 +169,9 @@ def compiling(when: str) -> Iterator[None]:
 
 
 def report(rows: Sequence[Row]) -> str:
-    """What was measured, what it means, and what was asked."""
+    """The measured values, their meaning, and the targets."""
     used = compiler()
-    compiled = f"Functions are compiled ({Path(used).name}) unless a row says otherwise." if used else "No function is compiled."
+    compiled = f"Functions are compiled ({Path(used).name}) unless a row states otherwise." if used else "No function is compiled."
     lines = [
         "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
         f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few; in all: the ratio",
@@ -207,13 +207,13 @@ def _overall(row: Row) -> float:
 
 
 def _verdicts(rows: Sequence[Row]) -> list[str]:
-    """What was asked of the default inner level, and whether it was met."""
+    """The targets of the default inner level, and whether they were reached."""
     asked = {case.name: case.asked for case in INNER}
     found = {(row.case, row.who): row for row in rows}
     cells = []
 
-    def verdict(case: str, what: str, value: str, *met: bool) -> None:
-        cells.append([case, what, value, "met" if all(met) else "MISSED in all" if any(met) else "MISSED"])
+    def verdict(case: str, target: str, value: str, *met: bool) -> None:
+        cells.append([case, target, value, "met" if all(met) else "MISSED in all" if any(met) else "MISSED"])
 
     for (case, who), row in found.items():
         if who != DEFAULT:

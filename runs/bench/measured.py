@@ -1,4 +1,4 @@
-"""What was measured: numbers of each round or seed, their spread, as tables and as a file."""
+"""Measured values of each round or seed and their spread, as tables and as a file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Row:
     values: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, **values: float) -> None:
-        """One more of each quantity; what is no number is left out."""
+        """Add a value of each quantity; values that are not numbers are left out."""
         for name, value in values.items():
             known = self.values.setdefault(name, [])
             if np.isfinite(value):
                 known.append(float(value))
 
     def of(self, name: str, how: Callable = np.median) -> float:
-        """The median of a quantity, or what else `how` makes of its values; NaN where there are none."""
+        """The median of a quantity, or another statistic `how` of its values; NaN if there are none."""
         values = self.values.get(name)
         return float(how(values)) if values else np.nan
 
@@ -48,7 +48,7 @@ class Row:
 
 
 Column = tuple[str, str, Callable[[Row], str]]
-"""Two lines of header, and what to write for a row."""
+"""Two lines of header, and the text of a row."""
 
 
 def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:

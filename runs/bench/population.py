@@ -1,4 +1,4 @@
-"""Populations: all candidates of a generation flown in one call, against one after the other."""
+"""Benchmark of populations: all candidates of a generation propagated in one call, against one after the other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ASKED = 2_500
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds, how often each contender works in one, of which the quickest counts, candidates, and on what."""
+    """Size of a measurement: rounds, calls of each contender in a round, of which the quickest counts, candidates, and the case."""
 
     rounds: int = 5
     calls: int = 5
@@ -37,7 +37,7 @@ QUICK = Effort(rounds=2, calls=2)
 
 
 def bench_population(rows: list[Row], effort: Effort) -> None:
-    """Measure; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    """Measure; `rows` are filled as values become known, also if `Stopped` ends it."""
     problem, method = load(CASE), parse(effort.method)
     X = Smooth().draw(problem, method, effort.candidates, np.random.default_rng(0))
     case = f"{CASE}, {effort.method}, {effort.candidates} candidates"
@@ -61,15 +61,15 @@ def bench_population(rows: list[Row], effort: Effort) -> None:
 
 
 def _flier(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
-    """What flies candidates (k, d), with functions that are compiled or not, see `compiling`."""
+    """The function that propagates candidates (k, d), compiled or not, see `compiling`."""
     with compiling(when):
         nlp = method.transcribe(load(CASE))
 
-    def fly(candidates: np.ndarray) -> None:
+    def propagate(candidates: np.ndarray) -> None:
         with compiling(when):
             Propagate().solve(nlp, candidates)
 
-    return fly
+    return propagate
 
 
 def _timed(work: Callable[[], None]) -> float:
@@ -79,12 +79,12 @@ def _timed(work: Callable[[], None]) -> float:
 
 
 def report(rows: Sequence[Row]) -> str:
-    """What was measured, and what was asked."""
+    """The measured values, and the targets."""
     speed = next(row for row in rows if row.who == TOGETHER).of("candidates", np.max)
     verdict = "met" if speed >= ASKED else "MISSED"
     lines = [
-        "POPULATIONS: what a population search sends, flown and scored in one call, against one candidate after the other, in turn;",
-        "median, least and greatest of few rounds. Candidates a second tell of the machine and of what else it does.",
+        "POPULATIONS: the candidates of a population search, propagated and scored in one call, against one after the other, in turn;",
+        "median, least and greatest of few rounds. Candidates a second depend on the machine and its load.",
         "",
         table(rows, COLUMNS),
         "",

@@ -1,4 +1,4 @@
-"""MACS against what a user would do instead: gradient sweeps from many starts, on the same mesh, in the same time."""
+"""Benchmark of searches: MACS against gradient sweeps from many starts, on the same mesh, in the same time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OURS, THEIRS = "MACS", "sweeps"
 
 @dataclass(frozen=True)
 class Search:
-    """A case on its own mesh, the truth, the budgets of the whole and of the quick benchmark (0: not in it), and what ratio is asked."""
+    """A case on its own mesh, the truth, the budgets of the whole and of the quick benchmark (0: not in it), and the target ratio."""
 
     name: str
     reference: Callable[[], np.ndarray]
@@ -46,7 +46,7 @@ CASES = (
 
 
 def bench_search(rows: list[Row], seeds: Sequence[int], quick: bool, cases: Sequence[Search] = CASES) -> None:
-    """Measure all cases, with each seed; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    """Measure all cases, with each seed; `rows` are filled as values become known, also if `Stopped` ends it."""
     cases = [case for case in cases if case.quick or not quick]
     with Steps("searches", 2 * len(seeds) * len(cases)) as steps:
         for case in cases:
@@ -98,7 +98,7 @@ def _sweeps(problem: Problem, method: Transcription, seconds: float, seed: int, 
 
 
 def report(rows: Sequence[Row]) -> str:
-    """What was measured, and what was asked."""
+    """The measured values, and the targets."""
     ratios = {row.case: row.spread("ratio") for row in rows if row.who == OURS}
     asked = {case.name: case.asked for case in CASES}
     lines = [

@@ -1,4 +1,4 @@
-"""Studies: two processes against one, and what a study takes beyond its runs."""
+"""Benchmark of studies: two processes against one, and the time of a study beyond that of its runs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ LIMIT = "arithmetic alone"
 SPIN = "total = 0\nfor i in range({}):\n    total += i * i"
 """Arithmetic that needs nothing but a core."""
 FASTER, BEYOND = 1.7, 0.05
-"""What is asked: how many times as fast two processes are at least, and what share of its runs' time a study takes beyond it at most."""
+"""Targets: the least ratio of speeds of two processes to one, and the largest share of its runs' time that a study takes beyond it."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: rounds, runs in each, an even number, and the evaluations of a run."""
+    """Size of a measurement: rounds, runs in each, an even number, and the evaluations of a run."""
 
     rounds: int = 3
     runs: int = 8
@@ -39,14 +39,14 @@ QUICK = Effort(rounds=1, runs=6, evaluations=500, spin=5_000_000)
 
 
 def bench_study(rows: list[Row], effort: Effort) -> None:
-    """Measure; `rows` get what is known as soon as it is, also if `Stopped` ends it."""
+    """Measure; `rows` are filled as values become known, also if `Stopped` ends it."""
     batch = Study("bench", problems="goddard", solvers="macs", evaluations=effort.evaluations, runs=effort.runs, seed=1)
     case = f"goddard, {effort.runs} runs of {effort.evaluations}"
     pair, limit = {1: Row(case, ONE), 2: Row(case, TWO)}, Row(LIMIT, TWO)
     with Steps("studies", 2 * effort.rounds) as steps:
         for i in range(effort.rounds):
             taken = {}
-            # Nobody is always the first.
+            # None is always the first.
             for jobs in (1, 2) if i % 2 == 0 else (2, 1):
                 steps.begin(f"{pair[jobs].who}, round {i + 1}")
                 taken[jobs] = _timed(batch, jobs)
@@ -69,7 +69,7 @@ def _timed(batch: Study, jobs: int) -> tuple[float, float]:
 
 
 def _spun(count: int, at_once: int) -> float:
-    """Seconds that two processes of plain arithmetic take, so many at a time."""
+    """Seconds of two processes of plain arithmetic, `at_once` at a time."""
     began = time.perf_counter()
     for _ in range(2 // at_once):
         running = [subprocess.Popen([sys.executable, "-c", SPIN.format(count)]) for _ in range(at_once)]
@@ -79,15 +79,15 @@ def _spun(count: int, at_once: int) -> float:
 
 
 def report(rows: Sequence[Row]) -> str:
-    """What was measured, and what was asked."""
+    """The measured values, and the targets."""
     found = {row.who: row for row in rows if row.case != LIMIT}
     speed, beyond = found[TWO].of("speed"), found[ONE].of("beyond")
     lines = [
         "STUDIES: a whole study with two processes against one, in turn; median, least and greatest of few rounds. Runs' time: that of all",
         "runs together, as multiples of what they take one at a time; above 1, runs that go on side by side slow each other down. Beyond:",
-        "what the study takes beyond its runs' time, as a share of it: writing files, waiting for the last run, and a second or two for",
-        "each process to start once, which weighs more here than in a study of many long runs. Arithmetic alone: what two processes",
-        "gain on this machine that share nothing and wait for nothing.",
+        "the time of the study beyond its runs', as a share of it: writing files, waiting for the last run, and a second or two for",
+        "each process to start once, which weighs more here than in a study of many long runs. Arithmetic",
+        "alone: the same ratio of two processes that share nothing and wait for nothing.",
         "",
         table(rows, COLUMNS),
         "",

@@ -1,4 +1,4 @@
-"""`python -m runs.cli.parser`."""
+"""`python -m runs.cli`."""
 
 import sys
 

@@ -1,19 +1,19 @@
-"""What commands answer: exit codes, and a line for a wrong call."""
+"""Exit codes of commands, and the error for a wrong call."""
 
 from __future__ import annotations
 
 from typing import Any
 
-DONE, NO, WRONG, INTERRUPTED = 0, 1, 2, 130
-"""Exit codes: done; the answer is no; the call was wrong; Ctrl-C."""
+DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
+"""Exit codes: done; failed (nothing feasible, a check not passed, runs missing); the call was wrong; Ctrl-C."""
 
 
-class WrongCall(Exception):  # noqa: N818 - whoever called is to be told, in one line
-    """What the user asked for makes no sense. The text says why, in their words."""
+class WrongCall(Exception):  # noqa: N818 - a message to the user in one line
+    """The user's call is wrong. The text is the reason, in the user's words."""
 
 
-class refused:  # noqa: N801 - reads as a statement
-    """A ValueError inside is the caller's mistake."""
+class wrong_call_on_value_error:  # noqa: N801 - reads as a statement
+    """A context in which a ValueError becomes a `WrongCall`."""
 
     def __enter__(self) -> None:
         return None

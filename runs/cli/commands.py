@@ -1,4 +1,4 @@
-"""The commands behind the command line: each takes the parsed arguments, prints, and returns an exit code."""
+"""Commands of the command line: each takes the parsed arguments, prints, and returns an exit code."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from transcription.inner import NAMED
 
 from ..batch import file as studyfile
 from . import study_commands
-from .answers import DONE, NO, WrongCall, refused
+from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
 
 MESHES = ("fixed", "adaptive")
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
@@ -46,10 +46,10 @@ def list_all(arguments: Namespace) -> int:
 
 
 def solve(arguments: Namespace) -> int:
-    """Search, fly every point, print, save, draw."""
+    """Search, simulate every point, print, save, draw."""
     problem = load_problem(arguments.problem)
     method = problem.default_transcription if arguments.transcription is None else arguments.transcription
-    with refused():
+    with wrong_call_on_value_error():
         scheme = transcription.parse(method) if isinstance(method, str) else method
     mesh = choose(arguments.mesh, MESHES, "kind of mesh")
     solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, problem.verify_tolerance)
@@ -60,7 +60,7 @@ def solve(arguments: Namespace) -> int:
     check_picture(arguments.plot)
     if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
-    with refused():
+    with wrong_call_on_value_error():
         front = solver.solve(
             problem,
             scheme,
@@ -74,20 +74,20 @@ def solve(arguments: Namespace) -> int:
     try:
         front.save(out)
     except OSError:
-        # The disk filled up while the search went on: what it found is shown at least.
+        # The disk filled up while the search went on: its result is at least shown.
         print(front.table())
         raise
     scales = objective_scales(front)
-    flown = [as_flown(point, scales) for point in front]
-    defects = [defect for defect, _ in flown]
-    print(front.table(defects=defects, columns={"objectives off": [off for _, off in flown]}))
-    missing = sum(not max(pair) <= problem.verify_tolerance for pair in flown)
+    simulated = [as_simulated(point, scales) for point in front]
+    defects = [defect for defect, _ in simulated]
+    print(front.table(defects=defects, columns={"objectives off": [off for _, off in simulated]}))
+    missing = sum(not max(pair) <= problem.verify_tolerance for pair in simulated)
     if missing:
-        print(f"{missing} of {len(front)} points, flown, miss by more than {problem.verify_tolerance:g}: see `macs verify {out}`.")
+        print(f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}: see `macs verify {out}`.")
     print(f"\nfront saved in {out}")
     if arguments.plot:
         draw(front, arguments.plot)
-    return DONE if len(front) else NO
+    return DONE if len(front) else FAILED
 
 
 def show(arguments: Namespace) -> int:
@@ -97,7 +97,7 @@ def show(arguments: Namespace) -> int:
         check_target(arguments.csv)
         if Path(arguments.csv).resolve() == Path(arguments.front).resolve():
             raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
-    with refused():
+    with wrong_call_on_value_error():
         front = Front.load(arguments.front)
     point = None if arguments.point is None else find_point(front, arguments.point)
     if arguments.plot and point is not None and point.trajectory is None:
@@ -113,13 +113,13 @@ def show(arguments: Namespace) -> int:
 
 def verify(arguments: Namespace) -> int:
     """Check every point of a saved front."""
-    with refused():
+    with wrong_call_on_value_error():
         front = Front.load(arguments.front, trust=arguments.trust)
     if front.source is None:
         raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to simulate")
     if not arguments.problem and not front.source.address:
-        raise WrongCall(f"problem '{front.source.name}' was stated in a script; say where: --problem file.py:function")
-    with refused():
+        raise WrongCall(f"problem '{front.source.name}' was stated in a script; give it: --problem file.py:function")
+    with wrong_call_on_value_error():
         problem = load_problem(arguments.problem) if arguments.problem else front.source.load()
         tolerance = arguments.tolerance or problem.verify_tolerance
         front = front.replace(problem=front.source.check(problem, arguments.front))
@@ -131,8 +131,8 @@ def verify(arguments: Namespace) -> int:
     elif failed:
         print(f"\n{len(failed)} of {len(checks)} points fail.")
     else:
-        print(f"\nAll {len(checks)} points verify: simulated anew, they stay within {tolerance:g}.")
-    return DONE if checks and not failed else NO
+        print(f"\nAll {len(checks)} points verify: simulated, they stay within {tolerance:g}.")
+    return DONE if checks and not failed else FAILED
 
 
 def bench(arguments: Namespace) -> int:
@@ -146,11 +146,11 @@ def bench(arguments: Namespace) -> int:
     return DONE
 
 
-# What the arguments mean
+# Arguments
 
 
 def load_problem(address: str, **data: Any) -> Problem:
-    """A problem by name or address; whatever goes wrong in the user's own file is told in one line."""
+    """A problem by name or address; an error in the user's own file is one line."""
     try:
         problem = problems.load(address, **data)
         problem.compile()
@@ -163,26 +163,26 @@ def load_problem(address: str, **data: Any) -> Problem:
 
 def make_solver(name: str, plain: bool = False, mesh: str = "fixed", polish_on: str | None = None, verify: float | None = None) -> Solver:
     """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive", or polished on another
-    transcription to hold within `verify`."""
-    with refused():
+    transcription so that its points are feasible when simulated, within `verify`."""
+    with wrong_call_on_value_error():
         solver = solver_class(name)
         known = inspect.signature(solver).parameters
         if plain and "refine" not in known:
-            raise WrongCall(f"--no-refine makes no sense for solver '{name}', which never uses derivatives")
+            raise WrongCall(f"--no-refine does not apply to solver '{name}', which never uses derivatives")
         if mesh != "fixed" and "mesh" not in known:
-            raise WrongCall(f"--mesh {mesh} makes no sense for solver '{name}', which leaves meshes as they are")
+            raise WrongCall(f"--mesh {mesh} does not apply to solver '{name}', which does not change meshes")
         if polish_on and "polish_on" not in known:
-            raise WrongCall(f"--polish-on {polish_on} makes no sense for solver '{name}', which does not polish")
+            raise WrongCall(f"--polish-on {polish_on} does not apply to solver '{name}', which does not polish")
         settings: dict[str, Any] = {"refine": False} if plain else {}
         settings |= {"mesh": mesh} if mesh != "fixed" else {}
         settings |= {"polish_on": polish_on, "verify": verify} if polish_on else {}
         return solver(**settings)
 
 
-def choose(word: str, known: Iterable[str], what: str) -> str:
+def choose(word: str, known: Iterable[str], kind: str) -> str:
     """`word`, if it is known; else WrongCall with the ones that are."""
     if word not in known:
-        raise WrongCall(unknown(what, word, known))
+        raise WrongCall(unknown(kind, word, known))
     return word
 
 
@@ -211,20 +211,20 @@ def check_picture(path: str | None) -> None:
             raise WrongCall(f"cannot draw '{path}': a picture is one of .{', .'.join(PICTURES[:5])}")
 
 
-# What is printed
+# Output
 
 
-def as_flown(point: Point, scales: np.ndarray) -> tuple[float, float]:
-    """Largest defect of a point's flight, and by how much its objectives differ from those flown, in `scales` (m,)."""
+def as_simulated(point: Point, scales: np.ndarray) -> tuple[float, float]:
+    """The largest defect of a simulated point, and by how much its objectives differ from those simulated, in `scales` (m,)."""
     if point.trajectory is None:
         return np.inf, np.inf
     flight = point.simulate()
     return flight.max_defect, missed(flight, point.objectives, scales)
 
 
-def draw(what: Front | Point, path: str) -> None:
+def draw(drawn: Front | Point, path: str) -> None:
     """Draw a front, or a point's flight."""
-    save_picture(what, path)
+    save_picture(drawn, path)
     print(f"picture in {path}")
 
 
@@ -248,7 +248,7 @@ def describe(front: Front, point: Point) -> str:
 
 
 def _ends(phase: Any) -> str:
-    """What states and controls begin and end with, and between which values they are at the ends of elements and the nodes between."""
+    """Initial and final values of states and controls, and their least and greatest values at the nodes."""
     ends = [phase.at(time) for time in (phase.t0, phase.tf)]
 
     def row(v: Any, first: float, last: float) -> list[str]:

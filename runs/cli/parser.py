@@ -1,7 +1,7 @@
-"""The command line: what can be called, and how a call ends.
+"""The parser of the command line, and the end of a call.
 
-Exit codes: 0 done; 1 the answer is no (nothing feasible, a point that does not verify); 2 the call was wrong: one line on stderr says how,
-and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
+Exit codes: 0 done; 1 failed (nothing feasible, a point that does not verify, runs missing); 2 the call was wrong: one line on stderr with
+the reason, and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
 """
 
 from __future__ import annotations
@@ -27,37 +27,43 @@ examples:
   macs study status out/goddard-table3
   macs bench inner --quick
 
-exit codes: 0 done, 1 the answer is no, 2 the call was wrong"""
+exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong"""
 
 
 BENCH = """\
-Ratios against the alternatives, measured side by side in one run, with their spread: absolute times would tell of the machine.
+Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
-population  120 re-entries flown and scored in one call, as a population search sends them, against one after the other
+population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
 study       a study with two processes against one, and how much longer it takes than its runs do
 
-A benchmark informs. What it was asked to reach is printed beside what was measured; the exit code is 0 either way, since on a noisy
-machine a ratio that is missed once says little. Ctrl-C prints what was measured so far. MACS_COMPILE=0 keeps functions from being
+Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
+machine proves little. Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being
 compiled; where there is a C compiler, the whole inner benchmark and that of populations show both."""
 
 
 STUDY = """\
 Batches of independent runs: every problem of a study by every solver. A run is a file in the study's folder, written once, whole.
 
-macs study run STUDY     makes the runs that are missing. Stopped, killed, or with more --runs, the same command goes on; what is finished
-                         is neither made again nor touched. A run that crashes, hangs beyond the study's time_limit or is killed is
+macs study run STUDY     makes the runs that are missing. Stopped, killed, or with more --runs, the same command goes on; finished runs
+                         are neither made again nor changed. A run that crashes, hangs beyond the study's time_limit or is killed is
                          recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
-macs study status DIR    tells how it stands.
+macs study status DIR    the number of finished, failed and missing runs, and the reasons of failures.
+macs study report DIR    tables, statistics and figures.
+
+A study file or a study's folder may name code by address (my_problem.py:build). Outside the catalogue it is loaded only with --trust.
 
 The exit code is 1 while any run is missing or failed."""
 
 
 TRANSCRIPTION = (
-    "such as dfet:4x6 (4 elements of order 6), shooting:200:linear (200 nodes; controls constant, linear or spline) or "
-    "multiple-shooting:40x5:rk8 (40 intervals of 5 steps; Runge-Kutta scheme) (default: the problem's own)"
+    "such as dfet:4x6 (4 elements of order 6) or shooting:200 (200 nodes); an unknown word shows how all are written "
+    "(default: the problem's own)"
 )
+
+
+TRUST = "load problems and references that the files name by address, outside the catalogue: this runs their code"
 
 
 class Parser(argparse.ArgumentParser):
@@ -141,7 +147,7 @@ def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> 
 
 
 def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
-    solve = _add(commands, "solve", "search a problem for its front, fly every point, save the front")
+    solve = _add(commands, "solve", "search a problem for its front, simulate every point, save the front")
     solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
     solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
@@ -158,7 +164,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument(
         "--polish-on",
         metavar="T",
-        help="polish the front on this transcription by gradients in the end, so that its points hold when flown",
+        help="polish the front on this transcription by gradients in the end, so that its points are feasible when simulated",
     )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
@@ -174,7 +180,7 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
-    verify = _add(commands, "verify", "check every point of a saved front and simulate it anew; exit 1 if any fails")
+    verify = _add(commands, "verify", "check every point of a saved front and simulate it again; exit 1 if any fails")
     verify.add_argument("front", metavar="FRONT.nc")
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
@@ -183,22 +189,24 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
-    study = _add(commands, "study", "batches of runs: make what is missing of them, see how they stand")
+    study = _add(commands, "study", "batches of runs: make those that are missing, show their state, report on them")
     study.formatter_class = argparse.RawDescriptionHelpFormatter
     study.description = STUDY
     actions = study.add_subparsers(dest="action", metavar="ACTION", required=True, parser_class=Parser)
     run = _add(actions, "run", "make the runs that are missing; the same again resumes where it stopped")
     run.add_argument("study", metavar="STUDY", help="a name of `macs list`, or a TOML file")
     run.add_argument("--out", metavar="DIR", help="the study's folder (default: out/NAME)")
-    run.add_argument("--runs", metavar="N", type=_positive, help="so many of each cell (default: the study's own)")
+    run.add_argument("--runs", metavar="N", type=_positive, help="number of runs of each cell (default: the study's own)")
     run.add_argument("--jobs", metavar="N", type=_positive, help="processes of this machine that work at a time (default: 1)")
     run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
     run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
+    run.add_argument("--trust", action="store_true", help=TRUST)
     status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
     status.add_argument("folder", metavar="DIR")
-    report = _add(actions, "report", "tables, statistics and figures of what there is, in DIR/report")
+    report = _add(actions, "report", "tables, statistics and figures of the finished runs, in DIR/report")
     report.add_argument("folder", metavar="DIR")
+    report.add_argument("--trust", action="store_true", help=TRUST)
     report.add_argument("--no-figures", action="store_true", help="tables only, which is quicker")
     report.add_argument(
         "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
@@ -213,7 +221,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
-    bench.add_argument("--csv", metavar="FILE", help="write what was measured to a file too, one number a line")
+    bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
 
 
 def _unknown_option(word: str, parser: Parser) -> str:
@@ -236,11 +244,11 @@ def _tolerance(text: str) -> float:
     return _number(text, float, "a number above 0", lambda value: 0 < value < float("inf"))
 
 
-def _number(text: str, kind: Callable[[str], Any], what: str, fits: Callable[[Any], bool]) -> Any:
+def _number(text: str, kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool]) -> Any:
     try:
         value = kind(text)
     except ValueError:
         value = None
     if value is None or not fits(value):
-        raise argparse.ArgumentTypeError(f"'{text}' is not {what}")
+        raise argparse.ArgumentTypeError(f"'{text}' is not {name}")
     return value

@@ -8,51 +8,51 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from .answers import DONE, INTERRUPTED, NO, WrongCall, refused
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, wrong_call_on_value_error
 
 
 def study(arguments: Namespace) -> int:
-    """Run a study, tell how one stands, or report on it."""
+    """Run a study, show its state, or report on it."""
     return {"run": run, "status": status, "report": report}[arguments.action](arguments)
 
 
 def run(arguments: Namespace) -> int:
     """Make the runs that are missing."""
-    from ..batch.running import Deserted
-    from ..execution.crew import cluster
+    from ..batch.running import WorkersLost
+    from ..execution.workers import cluster
     from ..study import Study
 
     if arguments.dask and arguments.jobs:
         raise WrongCall("--jobs is for this machine, --dask for a cluster: give one of them")
-    with refused():
-        batch = Study.load(arguments.study)
+    with wrong_call_on_value_error():
+        batch = Study.load(arguments.study, trust=arguments.trust)
         batch = batch if arguments.runs is None else replace(batch, runs=arguments.runs)
         batch = batch.quick() if arguments.quick else batch
     out = Path(arguments.out or Path("out") / batch.name)
-    again = "what is finished is kept, the same command goes on from there"
+    again = "finished runs are kept; the same command goes on from there"
     try:
-        with refused(), cluster(arguments.dask) if arguments.dask else nullcontext() as executor:
+        with wrong_call_on_value_error(), cluster(arguments.dask) if arguments.dask else nullcontext() as executor:
             summary = batch.run(out, jobs=arguments.jobs or 1, executor=executor, retry=arguments.retry, progress=True)
     except KeyboardInterrupt:
         print(f"interrupted; {again}", file=sys.stderr)
         return INTERRUPTED
-    except Deserted as error:
+    except WorkersLost as error:
         print(error, file=sys.stderr)
-        return NO
+        return FAILED
     except OSError as error:
         raise WrongCall(f"{error.strerror or error}; {again}") from error
     print(f"{summary}\n\nin {out}")
-    return DONE if summary.finished == len(summary.runs) else NO
+    return DONE if summary.finished == len(summary.runs) else FAILED
 
 
 def status(arguments: Namespace) -> int:
-    """How a study stands."""
+    """The state of a study."""
     from ..batch.store import Store
 
-    with refused():
+    with wrong_call_on_value_error():
         summary = Store.open(arguments.folder).summary()
     print(summary)
-    return DONE if summary.finished == len(summary.runs) else NO
+    return DONE if summary.finished == len(summary.runs) else FAILED
 
 
 def report(arguments: Namespace) -> int:
@@ -69,8 +69,8 @@ def report(arguments: Namespace) -> int:
             raise WrongCall(f"--join {word}: write NAME=FILE")
         foreign.setdefault(name, []).append(path)
     try:
-        with refused():
-            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True)
+        with wrong_call_on_value_error():
+            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True, trust=arguments.trust)
     except Stopped:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -1,1 +1,1 @@
-"""How runs are made: a run in a process, the processes, whoever else makes them, and what is told meanwhile."""
+"""Processes that make runs: a run in a process, the processes of this machine and of executors, and the samples of a run."""

@@ -1,4 +1,4 @@
-"""A process of one's own for runs that may crash, hang, or eat all the memory: it is watched, ended and started anew."""
+"""A child process for runs that may crash, hang or use up the memory: it is watched, ended and restarted."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from typing import Any
 from .task import KILLED, TIMEOUT, Outcome, Report, Task
 
 GRACE = 0.5
-"""Seconds beyond its limit in which a run that hangs says where."""
+"""Seconds beyond its limit in which a run that hangs writes its traceback."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS")
 """All 1 in the process: more would round differently from machine to machine, and take the cores of other runs."""
-SAID = 4000
-"""Characters kept of the last words of a process that died."""
+LAST_OUTPUT = 4000
+"""Characters kept of the output of a process that died."""
 
 
 class Child:
-    """One process and what it is at; for one thread, but `close` may be called from any."""
+    """One process that makes runs one after the other; for one thread, but `close` may be called from any."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -35,14 +35,14 @@ class Child:
         self._lock = threading.Lock()
 
     def perform(self, task: Task, report: Report | None = None) -> Outcome:
-        """Make a run. One whose process is killed from outside is begun once more; after that, it is an outcome."""
+        """The outcome of a run. If its process is killed from outside, the run is begun once more."""
         outcome = self._attempt(task, report)
         if outcome.status == KILLED and not self._closed:
             outcome = self._attempt(task, report)
         return outcome
 
     def close(self) -> None:
-        """End the process, now, whatever it is at; nothing more can be asked of it."""
+        """End the process now; no run can be made with it any more."""
         with self._lock:
             self._closed = True
         self._end()
@@ -67,7 +67,7 @@ class Child:
                 report(*message[1:])
 
     def _begin(self, task: Task) -> bool:
-        """Have the process begin a task; one that is gone by now, as after a long time without any, is replaced."""
+        """Send a task to the process, which is replaced if it has ended, as after a long time without tasks."""
         for _ in range(2):
             with self._lock:
                 if self._closed:
@@ -102,7 +102,7 @@ class Child:
         threading.Thread(target=_listen, args=(self._process.stdout, self._inbox), daemon=True).start()
 
     def _killed(self, seconds: float) -> Outcome:
-        """What to say of a process that died."""
+        """The outcome of a run whose process died."""
         if self._closed:
             return Outcome(KILLED, "the study was stopped", wall_time=seconds)
         code = self._reap()
@@ -139,13 +139,13 @@ class Child:
                     pipe.close()
 
     def _text(self) -> str:
-        """What the process said last."""
+        """The last output of the process."""
         self._words.seek(0)
-        return self._words.read().decode(errors="replace")[-SAID:].strip()
+        return self._words.read().decode(errors="replace")[-LAST_OUTPUT:].strip()
 
 
 def _listen(channel: Any, inbox: queue.SimpleQueue[Any]) -> None:
-    """Pass on what a process says; None when it says no more."""
+    """Pass on the messages of a process; None at its end."""
     try:
         while True:
             inbox.put(pickle.load(channel))
@@ -164,7 +164,7 @@ _own = threading.local()
 
 
 def perform_apart(task: Task) -> Outcome:
-    """Make a run in a process of its own, which the thread that asks keeps for its next one: what an executor's workers are given."""
+    """The outcome of a run in a child process, which the calling thread keeps for its next run: the function that executors call."""
     if not hasattr(_own, "child"):
         _own.child = Child()
     return _own.child.perform(task)

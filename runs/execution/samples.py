@@ -1,29 +1,44 @@
-"""How a run went: its archive at some counts, noted as it goes, and kept beside its checkpoint so that a run that goes on has all of it."""
+"""Samples of a run: its archive at some counts, stored beside its checkpoint so that a resumed run has its whole history."""
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from macs.io.atomic import write_whole
 
+from ..data import records
+from ..data.schema import checked
+
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30
-"""At how many evaluation counts, at most and evenly spaced, the archive is noted, besides the end."""
+"""Largest number of samples, evenly spaced in evaluations, besides the one at the end."""
 EVERY = 0.25
 """Seconds between reports."""
 
 log = logging.getLogger(__name__)
 
 Report = Callable[[int, float], Any]
-"""Called now and then with evaluations and seconds spent so far."""
+"""Called at intervals with the evaluations and seconds so far."""
+
+
+class History(TypedDict, total=False):
+    """How a run converged, by columns with an entry for each sample; empty if it is not known.
+
+    Keys are its costs so far, "elapsed" seconds, and "F": the objectives (k, m) of its archive, all minimised.
+    """
+
+    evaluations: list[int]
+    inner_iterations: list[int]
+    gradient_solves: list[int]
+    elapsed: list[float]
+    F: list[list[list[float]]]
 
 
 class Samples:
-    """Notes the archive at some counts, and reports now and then; costs next to nothing.
+    """Samples of the archive at some counts, and reports of the progress at intervals.
 
     Parameters
     ----------
@@ -31,17 +46,17 @@ class Samples:
         Evaluations of the run.
     report : callable, optional
     path : Path, optional
-        A file in which they are kept. Those in it that a run which goes on comes by once more are made anew.
+        A file in which they are stored. A resumed run replaces those after the count at which it begins.
 
     Attributes
     ----------
     columns : dict
-        "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample; see `work.Outcome`.
+        The columns of its `History`.
     """
 
     def __init__(self, budget: int, report: Report | None = None, path: Path | None = None) -> None:
         self._step, self._next, self._report, self._told, self._path = max(1, budget // NUMBER), 0, report, 0.0, path
-        self.columns: dict[str, list[Any]] = {key: [] for key in (*COUNTS, "elapsed", "F")}
+        self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
         self._before, self._behind = _read(path), False
 
     def note(self, progress: Any) -> None:
@@ -58,15 +73,20 @@ class Samples:
             self._report(progress.evaluations, progress.elapsed)
 
     def add(self, counts: Any, elapsed: float, F: Any) -> None:
-        """One more."""
+        """Add a sample."""
         self._take_up(counts["evaluations"] + 1)
         for key in COUNTS:
             self.columns[key].append(int(counts[key]))
         self.columns["elapsed"].append(float(elapsed))
         self.columns["F"].append(F.tolist())
 
+    @property
+    def history(self) -> History:
+        """The columns."""
+        return History(**self.columns)  # type: ignore[typeddict-item]
+
     def _take_up(self, evaluations: int) -> None:
-        """At first: what was noted before this count."""
+        """Take over, at the first call, the stored samples before this count."""
         if self._before is None:
             return
         count = sum(before < evaluations for before in self._before["evaluations"])
@@ -77,16 +97,21 @@ class Samples:
     def _write(self) -> None:
         assert self._path is not None
         try:
-            write_whole(self._path, json.dumps(self.columns).encode())
+            write_whole(self._path, records.to_bytes(self.columns))
             self._behind = False
-        except OSError as error:  # as for a checkpoint: no reason to stop, and the next time it may be possible
+        except OSError as error:  # as for a checkpoint: the run goes on, and the next write may succeed
             log.warning("%s", error)
 
 
 def _read(path: Path | None) -> dict[str, list[Any]] | None:
-    """What a file holds; None if there is none, or it is damaged: then the history begins where the run goes on."""
-    try:
-        columns = None if path is None else json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    """The columns in a file; None if there is none, or it is damaged: then the history begins where the run is resumed."""
+    if path is None or not path.exists():
         return None
-    return columns if isinstance(columns, dict) and columns.keys() == {*COUNTS, "elapsed", "F"} else None
+    try:
+        columns = checked(records.from_bytes(path.read_bytes()), History)
+        if columns.keys() != History.__annotations__.keys():
+            raise ValueError(f"it has {', '.join(columns)}")
+    except (OSError, ValueError) as error:
+        log.warning("'%s' is damaged, so the history of its run is not complete: %s", path, error)
+        return None
+    return columns

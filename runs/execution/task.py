@@ -1,4 +1,4 @@
-"""One run, in whatever process: a task goes in, an outcome comes out, both plain data."""
+"""One run in any process: from a task to its outcome, both plain data."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from macs.solvers.checkpoint import Unreadable, keeps
 
-from ..measures.simulation_record import record
-from .samples import Report, Samples
+from ..measures.simulation_record import SimulationRecord, record
+from .samples import History, Report, Samples
 
 if TYPE_CHECKING:
     from macs.front import Front
@@ -33,8 +33,8 @@ Payload = tuple[bytes, bytes]
 class Task:
     """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled.
 
-    `checkpoint` is the file that it is kept in while it lasts, where whoever makes it can write to that folder, as on this machine or on
-    a cluster with one file system.
+    `checkpoint` is the file of its state while it lasts, used if its process can write to that folder, as on this machine or on a cluster
+    with one file system.
     """
 
     payload: Payload = field(repr=False)
@@ -50,23 +50,23 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run.
+    """The outcome of a run.
 
     Attributes
     ----------
     status : str
         "finished", "crashed" (by an exception), "timeout", "out of memory" or "killed".
     message, traceback : str
-        Why it is not finished, in a line and in full.
+        The reason why it is not finished, in one line and in full.
     front : bytes
         The content of its front's file, if it is finished.
     wall_time : float
-        Seconds, as far as it came.
+        Seconds until its end.
     history : dict
         "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
         minimised. The last sample is the front itself.
-    flown : dict
-        If the points of the front were to be flown: see `flown.record`.
+    simulated : dict
+        If the points of the front were to be simulated: see `simulation_record.record`.
     """
 
     status: str
@@ -74,12 +74,12 @@ class Outcome:
     traceback: str = field(default="", repr=False)
     front: bytes = field(default=b"", repr=False)
     wall_time: float = 0.0
-    history: dict[str, list[Any]] = field(default_factory=dict, repr=False)
-    flown: dict[str, Any] = field(default_factory=dict, repr=False)
+    history: History = field(default_factory=History, repr=False)
+    simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 
 def perform(task: Task, report: Report | None = None) -> Outcome:
-    """Make a run here and now, or what is left of it. An exception is an outcome."""
+    """The outcome of a run, made in this process from its checkpoint or its beginning. An exception is an outcome."""
     began = time.perf_counter()
     try:
         problem, scheme = _unpacked(task.payload[0])
@@ -92,10 +92,10 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
             return Outcome(KILLED, f"it was stopped: {front.stats['stopped']}", wall_time=time.perf_counter() - began)
         content = to_bytes(front)
         samples.add(front.stats, front.stats["wall_time"], front.F)
-        # What was spent before it was taken up again is known to the front alone.
+        # The front alone knows the time before the run was resumed.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
-        flights = _flown(task, front)
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, flown=flights)
+        found = _simulated(task, front)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.history, simulated=found)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
@@ -107,7 +107,7 @@ def samples_path(checkpoint: Path) -> Path:
 
 
 def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, Samples]:
-    """The front, and how it came about. A checkpoint that is of no use any more is begun anew."""
+    """The front of a run and its samples. With a checkpoint that cannot be used, the run begins again."""
     kept = task.checkpoint if task.checkpoint and os.access(task.checkpoint.parent, os.W_OK | os.X_OK) and keeps(solver) else None
     while True:
         samples = Samples(task.evaluations, report, samples_path(kept) if kept else None)
@@ -125,28 +125,25 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
             )
         except Unreadable as error:
             assert kept is not None
-            log.warning("%s: it is begun anew", error)
+            log.warning("%s: the run begins again", error)
             kept.unlink()
         else:
             return front, samples
 
 
-def _flown(task: Task, front: Front) -> dict[str, Any]:
-    """What the points turn out to be in the air, if that is wanted. If it cannot be found out, the run is none the worse for it."""
+def _simulated(task: Task, front: Front) -> SimulationRecord:
+    """The points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not lost by it."""
     if task.verify is None:
         return {}
     try:
         return record(front, task.verify)
     except Exception:
-        log.warning("the points of a front could not be flown; the report will try again", exc_info=True)
+        log.warning("the points of a front could not be simulated; the report tries again", exc_info=True)
         return {}
 
 
 @lru_cache(maxsize=8)
 def _unpacked(payload: bytes) -> tuple[Any, Any]:
-    """Problem and transcription; the runs that one process makes of them share an NLP, and all that is compiled of it."""
+    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
     problem, scheme = pickle.loads(payload)
-    nlp = scheme.transcribe(problem)
-    # It hides the method in this one value, which nobody else has.
-    object.__setattr__(scheme, "transcribe", lambda _: nlp)
     return problem, scheme

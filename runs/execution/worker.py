@@ -1,8 +1,8 @@
 """A process that makes one run after the other, `python -m runs.execution.worker`: tasks come in on stdin, reports and outcomes go out on
 stdout.
 
-Whatever a user's problem prints goes to stderr, so does the traceback of a crash or of a run that is taking too long. It ends when nobody
-can want anything more of it: as soon as stdin is closed, also in the middle of a run, and after a while without a task.
+The output of a user's problem goes to stderr, and so does the traceback of a crash or of a run that takes too long. The process ends as
+soon as stdin is closed, also in the middle of a run, and after a time without a task.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sys
 import threading
 from typing import Any
 
-# All that a run needs is there before the first one begins: its time is its own.
+# Imported before the first run begins, so that the time of a run does not include it.
 import h5netcdf  # noqa: F401
 
 import macs.fronts.files  # noqa: F401
@@ -27,7 +27,7 @@ PATIENCE = 60.0
 
 
 def main() -> None:
-    """Serve until there is no more to do."""
+    """Make runs until stdin is closed or no task has come for `PATIENCE` seconds."""
     channel = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     faulthandler.enable()
@@ -35,7 +35,7 @@ def main() -> None:
     threading.Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), tasks), daemon=True).start()
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
 
-    def say(*words: Any) -> None:
+    def send(*words: Any) -> None:
         pickle.dump(words, channel)
         channel.flush()
 
@@ -46,14 +46,14 @@ def main() -> None:
             return
         if task.time_limit is not None:
             faulthandler.dump_traceback_later(task.time_limit)
-        say("began")
-        outcome = perform(task, lambda evaluations, elapsed: say("report", evaluations, elapsed))
+        send("began")
+        outcome = perform(task, lambda evaluations, elapsed: send("report", evaluations, elapsed))
         faulthandler.cancel_dump_traceback_later()
-        say("outcome", outcome)
+        send("outcome", outcome)
 
 
 def _listen(channel: Any, tasks: queue.SimpleQueue[Any]) -> None:
-    """Pass tasks on; whoever sends them is gone when there are no more."""
+    """Pass tasks on; end the process when stdin is closed, which means that the sender has ended."""
     try:
         while True:
             tasks.put(pickle.load(channel))
@@ -62,7 +62,7 @@ def _listen(channel: Any, tasks: queue.SimpleQueue[Any]) -> None:
 
 
 if __name__ == "__main__":
-    # Ctrl-C is for whoever started this.
+    # Ctrl-C is for the parent process.
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

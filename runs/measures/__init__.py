@@ -1,1 +1,1 @@
-"""Numbers about fronts: indicators, what they are measured against, statistics, attainment, convergence. Arrays and Fronts in."""
+"""Measures of fronts, as arrays or Fronts: indicators and their references, statistics, attainment surfaces, convergence."""

@@ -1,7 +1,8 @@
-"""Empirical attainment surfaces: what many runs of one solver attain, and how many of them (Fonseca and others; exact, by moocore).
+"""Empirical attainment surfaces: the objectives that many runs of one solver attain (Fonseca and others; exact, by moocore).
 
-A point is attained by a run if a point of that run's front is nowhere worse. The surface of k of n runs is the border of what at least k of
-them attain: k = 1 the best surface, k = n the worst, half of them the median. A run whose front is empty attains nothing, and counts.
+A point is attained by a run if a point of that run's front is nowhere worse. The surface of k of n runs is the border of the region that
+at least k of them attain: k = 1 the best surface, k = n the worst, half of them the median. A run whose front is empty attains nothing,
+and counts.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from macs.front import Front
 
-from .indicators import Points, extent, minimised, truth
+from .indicators import Points, minimised
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,45 +38,35 @@ class Attainment:
     signs: np.ndarray
 
     def of(self, k: int) -> np.ndarray:
-        """Corners (p, m), in the user's units and senses, of what at least k of the runs attain."""
+        """Corners (p, m), in the user's units and senses, of the surface that at least k runs attain."""
         if not 1 <= k <= self.runs:
             raise ValueError(f"surfaces are of 1 to {self.runs} runs, not of {k}")
         return self.levels[k] * self.signs
 
     def percent(self, share: float) -> np.ndarray:
-        """Corners (p, m) of what at least `share` per cent of the runs attain, 0 < share <= 100."""
+        """Corners (p, m) of the surface that at least `share` per cent of the runs attain, 0 < share <= 100."""
         return self.of(self.count(share))
 
     def count(self, share: float) -> int:
-        """How many runs `share` per cent are: the next whole number of them."""
+        """The number of runs that `share` per cent are, rounded up."""
         if not 0 < share <= 100:
             raise ValueError(f"a share of the runs is more than 0 and at most 100 per cent, not {share}")
         return max(1, int(np.ceil(share * self.runs / 100 - 1e-9)))
 
     @property
     def best(self) -> np.ndarray:
-        """What any run attains."""
+        """Corners of the surface that any run attains."""
         return self.of(1)
 
     @property
     def median(self) -> np.ndarray:
-        """What half of the runs attain."""
+        """Corners of the surface that half of the runs attain."""
         return self.percent(50)
 
     @property
     def worst(self) -> np.ndarray:
-        """What all runs attain."""
+        """Corners of the surface that all runs attain."""
         return self.of(self.runs)
-
-    def volumes(self, reference: Points, *, known: Front | None = None, point: float = 1.1) -> np.ndarray:
-        """Hypervolume (n,) of each surface, from 1 to n runs, normalised as `runs.hypervolume` has it; 0 of an empty one.
-
-        `known` says the senses of a reference that is an array; without it all columns are minimised.
-        """
-        ideal, unit = extent(truth(reference, known))
-        corner = np.full(len(unit), point)
-        surfaces = [np.ascontiguousarray((self.levels[k] - ideal) / unit) for k in range(1, self.runs + 1)]
-        return np.array([moocore.hypervolume(surface, ref=corner) if len(surface) else 0.0 for surface in surfaces])
 
 
 def attainment(fronts: Sequence[Points]) -> Attainment:
@@ -128,7 +119,7 @@ def _surfaces(filled: Sequence[np.ndarray], runs: int, m: int) -> dict[int, np.n
 
 
 def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """The border (q, 2) of what the corners (p, 2) of a surface dominate, for drawing.
+    """The border (q, 2) of the region that the corners (p, 2) of a surface dominate, for drawing.
 
     Parameters
     ----------

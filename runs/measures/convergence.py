@@ -10,12 +10,12 @@ import numpy as np
 from .statistics import summarise
 
 History = tuple[np.ndarray, np.ndarray]
-"""Moments (k,), increasing - evaluations, inner iterations, seconds - and what the indicator was from there on, (k,)."""
+"""Increasing moments (k,) - evaluations, inner iterations or seconds - and the indicator (k,) from each of them on."""
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Median and quartiles (g,) over the runs at moments `x` (g,); infinite where so many runs had nothing."""
+    """Median and quartiles (g,) over the runs at moments `x` (g,); infinite where that share of the runs had no front."""
 
     x: np.ndarray
     lower: np.ndarray
@@ -37,7 +37,7 @@ def band(histories: Sequence[History], *, larger: bool = False, moments: int = 4
     larger : bool
         Whether larger values are better.
     moments : int
-        All moments of all runs are taken if they are no more than this; else so many, evenly among them.
+        All moments of all runs are taken if they are no more than this; else this many, evenly among them.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""How good a front is, as numbers: distances to a reference and from it, and the volume that it dominates.
+"""Quality indicators of fronts: distances to a reference and from it, and the dominated volume.
 
-Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False; `Scale` says so
-in words, for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
+Objectives are normalised by the range of the reference, 0 at its ideal and 1 at its nadir, unless `normalise` is False; `Scale` states
+it for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
 is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns are minimised.
 
-Against a sparse reference, or one of three and more objectives, all five are what moocore and pymoo compute. A dense reference of two
+Against a sparse reference, or one of three and more objectives, all five are as moocore and pymoo compute them. A dense reference of two
 objectives is the curve through its points, which those packages do not have: there `gd` is less than theirs, by up to half the spacing of
 the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by how many points lie on it.
 """
@@ -23,7 +23,7 @@ from macs.pareto.dominance import nondominated
 JOINED = 0.02
 """Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
 SAMPLES = 2001
-"""How many points, evenly along its length, such a reference is looked at from."""
+"""Number of points, evenly along its length, that represent such a reference."""
 
 Points = Front | np.ndarray
 
@@ -32,7 +32,7 @@ def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool 
     """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
 
     A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
-    about a quarter of their spacing. With `curve=False` it is its points alone, always, as published tables mostly have it.
+    about a quarter of their spacing. With `curve=False` it is its points alone, always, as most published tables have it.
     """
     F, R = _pair(front, reference, normalise)
     return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
@@ -48,7 +48,7 @@ def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool
 
 
 def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
-    """As `igd`, but only what a point is *worse* than the reference in each objective counts (Ishibuchi et al. 2015)."""
+    """As `igd`, but an objective counts only where a point is worse than the reference in it (Ishibuchi et al. 2015)."""
     F, R = _pair(front, reference, normalise)
     return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
@@ -87,9 +87,6 @@ def hypervolume_at(front: Points, point: Sequence[float]) -> float:
     return float(moocore.hypervolume(np.ascontiguousarray(F), ref=np.multiply(point, signs))) if len(F) else 0.0
 
 
-# Plain distances, for arrays whose senses do not matter
-
-
 def extent(R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ideal (m,) of the rows of R (k, m), minimised, and how far it is from there to their nadir; 1 where all are the same."""
     range_ = np.ptp(R, axis=0)
@@ -102,30 +99,13 @@ def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.nda
     return (F - lower) / unit, (reference - lower) / unit
 
 
-def distance_to_curve(F: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Distance of each point (n, 2) to the polygon through the reference (k, 2), in the order given, in units of its range."""
-    points, curve = normalised(F, reference)
-    return _to_segments(points, curve[:-1], np.diff(curve, axis=0))
-
-
-def inverted_distance(F: np.ndarray, reference: np.ndarray, samples: int = SAMPLES) -> float:
-    """Mean distance of the polygon through the reference, sampled evenly along its length, from the nearest point."""
-    points, curve = normalised(F, reference)
-    return mean_distance(_along(curve, samples), points)
-
-
-def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:
-    """Mean distance of the points of the reference (k, m) from the nearest of F (n, m), in the units that they have."""
-    return float(np.linalg.norm(reference[:, None] - F, axis=2).min(axis=1).mean())
-
-
-def minimised(points: Points, known: Front | None, what: str = "the front") -> np.ndarray:
+def minimised(points: Points, known: Front | None, name: str = "the front") -> np.ndarray:
     """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of the front `known`, if any.
 
     Raises
     ------
     ValueError
-        For an array that is not (n, m), has another number of objectives than `known`, or holds NaN or infinite values.
+        For an array that is not (n, m), has another number of objectives than `known`, or has NaN or infinite values.
     """
     if isinstance(points, Front):
         return points.F[points.status == CONVERGED]
@@ -134,13 +114,13 @@ def minimised(points: Points, known: Front | None, what: str = "the front") -> n
         raise ValueError(f"objectives must be an array (n, m), not one of shape {rows.shape}")
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
-        raise ValueError(f"row {bad[0]} of {what} is not finite: {rows[bad[0]].tolist()}; a failed point is no point of a front")
+        raise ValueError(f"row {bad[0]} of {name} is not finite: {rows[bad[0]].tolist()}; a failed point is no point of a front")
     if not rows.size:
         return rows if known is None else np.empty((0, len(known.goals)))
     if known is None:
         return rows
     if rows.shape[1] != len(known.goals):
-        raise ValueError(f"{what} has {rows.shape[1]} objectives, the other {len(known.goals)}: {', '.join(known.names)}")
+        raise ValueError(f"{name} has {rows.shape[1]} objectives, the other {len(known.goals)}: {', '.join(known.names)}")
     return rows * [goal.sign for goal in known.goals]
 
 

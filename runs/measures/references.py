@@ -1,4 +1,4 @@
-"""What a front is measured against: a file, the closed form of a case, or the non-dominated union of fronts."""
+"""References that fronts are measured against: a file, the closed form of a case, or the non-dominated union of fronts."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
@@ -27,8 +28,14 @@ if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
 
 
+ReferenceKey = Annotated[
+    str | dict[str, str] | None,
+    Meta(description="'union', 'truth', the name of a case, a file, or one of these by problem"),
+]
+
+
 def union(fronts: Sequence[Points]) -> Points:
-    """The non-dominated points of several fronts: the reference of those who have no truth.
+    """The non-dominated points of several fronts: the reference of a problem whose true front is not known.
 
     Parameters
     ----------
@@ -43,7 +50,7 @@ def union(fronts: Sequence[Points]) -> Points:
     Raises
     ------
     ValueError
-        If there is none, if they differ in problem or objectives, or if an array holds NaN or infinite values.
+        If there is none, if they differ in problem or objectives, or if an array has NaN or infinite values.
     """
     if not len(fronts):
         raise ValueError("there is no front to take the union of")
@@ -61,7 +68,7 @@ def union(fronts: Sequence[Points]) -> Points:
 
 
 def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "foreign") -> Front:
-    """A Front of objectives (n, m) alone, in the user's units and senses: points of another program, taken at their word."""
+    """A Front of objectives (n, m) alone, in the user's units and senses: points of another program, as it states them."""
     values = minimised(objectives, None)
     n = len(values)
     return Front(
@@ -75,13 +82,13 @@ def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "for
     )
 
 
-def room(case: str) -> ModuleType:
-    """The module that a problem comes from, in which there may also be
+def module_of(case: str) -> ModuleType:
+    """The module of a case. It may also have
 
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
-    - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, what it is by;
-    - `track(values) -> {label: values, label: values}`: where a flight goes, across and up, from its states by name;
-    - `plot(flights) -> {name: Figure}`: its own pictures of one flight or many, of whatever has a `trajectory`.
+    - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, its name;
+    - `track(values) -> {label: values, label: values}`: the track of a flight, across and up, from its states by name;
+    - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`.
 
     Parameters
     ----------
@@ -101,11 +108,11 @@ def room(case: str) -> ModuleType:
 
 
 def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:
-    """The true front (k, m) of a case, see `room`; of one with other `data` than its own, none is known.
+    """The true front (k, m) of a case, see `module_of`; of one with other `data` than its own, none is known.
 
     Raises ValueError if there is no such case, or its front is not known.
     """
-    module = room(case)
+    module = module_of(case)
     if data:
         changed = ", ".join(f"{name} = {value!r}" for name, value in data.items())
         raise ValueError(f"no true front of '{case}' with {changed} is known; measure against a file or the union")
@@ -117,8 +124,8 @@ def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np
 
 
 def called(case: str) -> tuple[str, bool]:
-    """What `closed_form` gives of a case, in words, and whether it is the truth: unless the case's `REFERENCE` says that it is less."""
-    what = getattr(room(case), "REFERENCE", None)
+    """The name of a case's closed form, and whether it is the truth; it is not if the case names it by `REFERENCE`."""
+    what = getattr(module_of(case), "REFERENCE", None)
     return (what, False) if what else ("the true front", True)
 
 
@@ -130,7 +137,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
     path : path
     goals : m Objectives
         Of the problem that the table is of. Its columns are found by their headers, "flight time [s]" or "flight time"; without a header
-        the first m columns are the objectives in their order. Rows that say in a column "status" that they did not converge are left out.
+        the first m columns are the objectives in their order. Rows whose column "status" is not converged are left out.
         Values are in the user's units and senses. Not needed for .nc.
 
     Raises
@@ -146,7 +153,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
             raise ValueError(f"'{path}' has the objectives {_words(front.goals)}, not {_words(goals)}")
         return front
     if not goals:
-        raise ValueError(f"'{path}' is a table: to read it, say which objectives it is of")
+        raise ValueError(f"'{path}' is a table: to read it, state the objectives that it is of")
     with Path(path).open(newline="", encoding="utf-8-sig") as file:
         lines = [(i, [cell.strip() for cell in row]) for i, row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row)]
     if not lines:
@@ -190,7 +197,7 @@ def _words(goals: Sequence[Objective]) -> str:
 
 @dataclass(frozen=True)
 class Reference:
-    """What fronts are measured against.
+    """A reference front.
 
     Attributes
     ----------
@@ -220,7 +227,7 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
     Returns
     -------
     Reference or None
-        None: the union of what was found.
+        None: the union of all runs.
 
     Raises
     ------
@@ -246,13 +253,17 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
     return Reference(foreign(closed_form(given), goals, "truth"), f"{what} of {given}", true)
 
 
+def reference_addresses(given: Any) -> list[str]:
+    """The addresses of code in a study's reference."""
+    stated = given.values() if isinstance(given, Mapping) else [given]
+    return [one for one in stated if isinstance(one, str) and one not in ("union", "truth") and Path(one).suffix not in (".nc", ".csv")]
+
+
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
-    for name, one in (given if isinstance(given, Mapping) else dict.fromkeys(stated, given)).items():
+    for name in given if isinstance(given, Mapping) else stated:
         if name not in stated:
             raise ValueError(f"reference: {unknown('problem', name, stated)}")
-        if one is not None and not isinstance(one, str):
-            raise ValueError(f"reference must be 'union', 'truth', the name of a case, a file, or one of these by problem, not {one!r}")
     for name, problem in stated.items():
         try:
             look_up(given, name, problem.address, problem.data, problem.goals)

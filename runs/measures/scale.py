@@ -1,4 +1,4 @@
-"""In what indicators were measured, in words: whoever reads a table must see what was normalised by what, and where volumes end."""
+"""The normalisation of indicators in words, for the captions of tables: the ranges, the reference, and the corner of volumes."""
 
 from __future__ import annotations
 
@@ -26,11 +26,9 @@ class Scale:
         The same in ranges of the reference from its ideal, as `hypervolume` has it.
     names, units : tuples of m str
     what : str
-        What the reference is: "the closed form", "the union of 60 runs".
+        Name of the reference: "the closed form", "the union of 60 runs".
     count : int
         How many points it has.
-    normalise : bool
-        Whether indicators are in these ranges, or in the objectives' own units.
     curve : bool
         Whether the points of the reference are taken as the curve through them; see `runs.measures.indicators.gd`.
     """
@@ -43,7 +41,6 @@ class Scale:
     units: tuple[str, ...]
     what: str
     count: int
-    normalise: bool = True
     curve: bool = False
 
     @staticmethod
@@ -53,20 +50,19 @@ class Scale:
         like: Front | None = None,
         what: str = "the reference",
         point: float = 1.1,
-        normalise: bool = True,
         curve: bool = True,
     ) -> Scale:
-        """What the indicators of `runs.measures.indicators` do with a reference.
+        """The normalisation by a reference that the indicators of `runs.measures.indicators` use.
 
         Parameters
         ----------
         reference : Front or array (k, m)
         like : Front, optional
-            One of the fronts that are measured against it: says names, units and senses where the reference is an array. Without it all
+            One of the fronts that are measured against it: it has names, units and senses where the reference is an array. Without it all
             columns are minimised.
         what : str
-            What the reference is, for captions.
-        point, normalise, curve
+            Name of the reference, for captions.
+        point, curve
             As the indicators were given them.
         """
         known = reference if isinstance(reference, Front) else like
@@ -87,7 +83,6 @@ class Scale:
             units=known.units if known is not None else ("",) * m,
             what=what,
             count=len(R),
-            normalise=normalise,
             curve=curve and bool(pieces(R)),
         )
 
@@ -95,11 +90,9 @@ class Scale:
         """Two sentences for a caption."""
         how = ", the curve through them" if self.curve else ""
         points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
-        if self.normalise:
-            ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
-            volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
-            return f"Objectives normalised to {ends} of {points}. {volume}"
-        return f"Objectives in their own units, against {points}. Hypervolume up to {self._all(self.corner)}."
+        ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
+        volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
+        return f"Objectives normalised to {ends} of {points}. {volume}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, for a file beside the numbers."""

@@ -1,31 +1,44 @@
-"""What the points of a run turn out to be in the air, as plain data for its record."""
+"""Objectives, violations and final states of a run's points after independent simulation, as plain data for its record."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
 from macs.front import Front
 
+
+class SimulationRecord(TypedDict, total=False):
+    """Objectives "F" (n, m), all minimised, and "violation" (n,) of a front's points as simulated, and "ends" of their trajectories:
+    {phase: {state: final values (n,)}}. Empty if they were not simulated."""
+
+    F: list[list[float]]
+    violation: list[float]
+    ends: dict[str, dict[str, list[float]]]
+
+
 Ends = Mapping[str, Mapping[str, np.ndarray]]
-"""Phase -> state -> its values (n,) at the end."""
+"""{phase: {state: its final values (n,)}}."""
 
 
-def record(front: Front, tolerance: float) -> dict[str, Any]:
-    """ "F" (n, m), all minimised, and "violation" (n,) of the points as flown, and "ends" of their flights; see `Front.simulate`."""
-    flights = front.simulate(tolerance=tolerance)
-    found = {phase: {name: values.tolist() for name, values in states.items()} for phase, states in ends(flights).items()}
-    return {"F": flights.F.tolist(), "violation": flights.violation.tolist(), "ends": found}
+def record(front: Front, tolerance: float) -> SimulationRecord:
+    """The points of a front as simulated; see `Front.simulate`."""
+    simulated = front.simulate(tolerance=tolerance)
+    final = {phase: {name: values.tolist() for name, values in states.items()} for phase, states in ends(simulated).items()}
+    return {"F": simulated.F.tolist(), "violation": simulated.violation.tolist(), "ends": final}
 
 
 def ends(front: Front) -> Ends:
-    """The states at the end of each phase of a front's n trajectories; nothing where there are none."""
-    flights = [point.trajectory for point in front if point.trajectory is not None]
-    if not flights or len(flights) < len(front):
+    """The final states of each phase of a front's n trajectories; empty where a point has none."""
+    trajectories = [point.trajectory for point in front if point.trajectory is not None]
+    if not trajectories or len(trajectories) < len(front):
         return {}
     return {
-        name: {v.name: np.array([flight[name].edge_states[-1, k] for flight in flights]) for k, v in enumerate(phase.state_variables)}
-        for name, phase in flights[0].items()
+        name: {
+            v.name: np.array([trajectory[name].edge_states[-1, k] for trajectory in trajectories])
+            for k, v in enumerate(phase.state_variables)
+        }
+        for name, phase in trajectories[0].items()
     }

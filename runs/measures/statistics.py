@@ -1,8 +1,8 @@
-"""Statistics of batches: what an indicator was over many runs, and whether solvers differ in it. Pure functions of samples.
+"""Statistics of an indicator over many runs, and tests of whether solvers differ in it. Pure functions of samples.
 
 A value that is NaN or infinite is a *failed* run: an empty front has no distance. Failed runs are never dropped: they rank below all
-others, all alike. Mean and variance, which cannot say that, are those of the runs that did not fail, and how many did stands beside them.
-Every test is of ranks, two-sided. Smaller values are better, unless `larger` says that larger ones are (hypervolume).
+others, all alike. Mean and variance are those of the runs that did not fail, beside the number of failures.
+Every test is of ranks, two-sided. Smaller values are better, unless `larger` is True (hypervolume).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 SMALL, MEDIUM, LARGE = 0.56, 0.64, 0.71
 """From which A12 an effect is called so (Vargha and Delaney 2000)."""
 ALPHA = 0.05
-"""The level below which samples are told to be too few to ever reach it."""
+"""A pair whose samples are too few for any p below this level has a note."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Summary:
     ----------
     count, failures : int
         Runs, and how many of them failed.
-    mean, variance, deviation : float
-        Of the runs that did not fail; variance and standard deviation with divisor n - `ddof`. NaN where there are too few.
+    mean, variance : float
+        Of the runs that did not fail; variance with divisor n - `ddof`. NaN where there are too few.
     median, lower, upper : float
         Median and quartiles (linear between values) of all runs, failed ones last: infinite where a failed one stands there.
     best, worst : float
@@ -41,7 +41,6 @@ class Summary:
     failures: int
     mean: float
     variance: float
-    deviation: float
     median: float
     lower: float
     upper: float
@@ -51,7 +50,7 @@ class Summary:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairTest:
     """Two solvers on one indicator.
 
     Attributes
@@ -64,7 +63,7 @@ class Comparison:
     effect : str
         "negligible", "small", "medium" or "large".
     note : str
-        That there are too few runs for any p below 0.05; mostly nothing.
+        States that there are too few runs for any p below 0.05; usually empty.
     """
 
     first: str
@@ -100,7 +99,6 @@ def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False, ddo
         failures=len(costs) - len(good),
         mean=float(good.mean()) if len(good) else np.nan,
         variance=variance,
-        deviation=float(np.sqrt(variance)),
         median=sign * _quantile(costs, 0.5),
         lower=quartiles[0],
         upper=quartiles[1],
@@ -110,61 +108,53 @@ def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False, ddo
     )
 
 
-def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> list[Comparison]:
-    """Every pair of solvers: Mann-Whitney U, or with `paired` Wilcoxon's signed ranks, with Holm's correction and A12.
+def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool = False) -> list[PairTest]:
+    """Mann-Whitney U tests of every pair of solvers, with Holm's correction and A12.
 
     Parameters
     ----------
-    samples : name -> (n,) values
-        Of independent runs any n; with `paired` run i of all has something in common (the seed of its population, the problem).
-    paired, larger : bool
+    samples : {name: values (n,)}
+        Of independent runs; n may differ.
+    larger : bool
+        Whether larger values are better.
 
     Returns
     -------
-    list of Comparison
-        In the order of the names. Of samples that are all alike, p is 1. A12 takes no heed of pairs.
+    list of PairTest
+        In the order of the names. Of samples that are all alike, p is 1.
 
     Notes
     -----
-    p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties. Of two runs that both failed, the
-    paired difference is 0; where one failed, it is larger than all others.
+    p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties.
     """
-    costs = _all_costs(samples, larger, paired, at_least=2)
+    costs = _all_costs(samples, larger)
     found = []
     for one, other in combinations(costs, 2):
         a, b = costs[one], costs[other]
-        statistic, p, least = _wilcoxon(a, b) if paired else _mann_whitney(a, b)
+        statistic, p, least = _mann_whitney(a, b)
         note = f"too few runs: p cannot be below {least:.2g}" if least > ALPHA else ""
         found.append((one, other, statistic, p, _a12(a, b), note))
     corrected = holm([p for _, _, _, p, _, _ in found])
-    test = "Wilcoxon signed-rank" if paired else "Mann-Whitney U"
     return [
-        Comparison(one, other, test, statistic, p, float(p_holm), a, effect(a), note)
+        PairTest(one, other, "Mann-Whitney U", statistic, p, float(p_holm), a, effect(a), note)
         for (one, other, statistic, p, a, note), p_holm in zip(found, corrected, strict=True)
     ]
 
 
-def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, paired: bool = False, larger: bool = False) -> Overall:
-    """Whether any of several solvers differs: Kruskal-Wallis, or with `paired` Friedman (three solvers at least), with average ranks.
+def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool = False) -> Overall:
+    """The Kruskal-Wallis test of whether any of several solvers differs, with average ranks among all runs together.
 
-    Ranks of Kruskal-Wallis are those among all runs together; of Friedman, from 1 to the number of solvers, those within each run. p is the
-    chi-squared approximation, which of fewer than about five runs a solver is rough. Of samples that are all alike, p is 1.
+    p is the chi-squared approximation, which is rough for fewer than about five runs of a solver. Of samples that are all alike, p is 1.
     """
-    from scipy.stats import friedmanchisquare, kruskal, rankdata
+    from scipy.stats import kruskal, rankdata
 
-    costs = _all_costs(samples, larger, paired, at_least=3 if paired else 2)
+    costs = _all_costs(samples, larger)
     names, columns = list(costs), list(costs.values())
-    if paired:
-        ranks = [*rankdata(np.column_stack(columns), axis=1).T]
-        alike = all(np.ptp(row) == 0 for row in np.column_stack(ranks))
-        result = None if alike else friedmanchisquare(*ranks)
-    else:
-        ends = np.cumsum([len(column) for column in columns])[:-1]
-        ranks = np.split(rankdata(np.concatenate(columns)), ends)
-        alike = np.ptp(np.concatenate(ranks)) == 0
-        result = None if alike else kruskal(*ranks)
+    ends = np.cumsum([len(column) for column in columns])[:-1]
+    ranks = np.split(rankdata(np.concatenate(columns)), ends)
+    result = None if np.ptp(np.concatenate(ranks)) == 0 else kruskal(*ranks)
     return Overall(
-        test="Friedman" if paired else "Kruskal-Wallis",
+        test="Kruskal-Wallis",
         statistic=0.0 if result is None else float(result.statistic),
         p=1.0 if result is None else float(result.pvalue),
         ranks={name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)},
@@ -194,22 +184,18 @@ def holm(p: Sequence[float] | np.ndarray) -> np.ndarray:
     return corrected
 
 
-def _costs(values: Sequence[float] | np.ndarray, larger: bool, what: str) -> np.ndarray:
+def _costs(values: Sequence[float] | np.ndarray, larger: bool, name: str) -> np.ndarray:
     """Values (n,) of which smaller is better; infinite for failed runs."""
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or not len(values):
-        raise ValueError(f"{what} must be a list of at least one number, not an array of shape {values.shape}")
+        raise ValueError(f"{name} must be a list of at least one number, not an array of shape {values.shape}")
     return np.where(np.isfinite(values), -values if larger else values, np.inf)
 
 
-def _all_costs(samples: Mapping[str, Sequence[float] | np.ndarray], larger: bool, paired: bool, at_least: int) -> dict[str, np.ndarray]:
-    if len(samples) < at_least:
-        raise ValueError(f"to compare, it takes the samples of at least {at_least} solvers; there are {', '.join(samples) or 'none'}")
-    costs = {name: _costs(values, larger, f"the sample of '{name}'") for name, values in samples.items()}
-    counts = {name: len(sample) for name, sample in costs.items()}
-    if paired and len(set(counts.values())) > 1:
-        raise ValueError(f"pairs need as many runs of each: {', '.join(f'{name} has {n}' for name, n in counts.items())}")
-    return costs
+def _all_costs(samples: Mapping[str, Sequence[float] | np.ndarray], larger: bool) -> dict[str, np.ndarray]:
+    if len(samples) < 2:
+        raise ValueError(f"to compare, it takes the samples of at least 2 solvers; there are {', '.join(samples) or 'none'}")
+    return {name: _costs(values, larger, f"the sample of '{name}'") for name, values in samples.items()}
 
 
 def _quantile(costs: np.ndarray, share: float) -> float:
@@ -224,24 +210,12 @@ def _quantile(costs: np.ndarray, share: float) -> float:
 
 
 def _mann_whitney(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """U of the first, p, and the least p that so many runs can have. Of ranks, because infinities have no differences."""
+    """U of the first, p, and the least p that this number of runs can have. Of ranks, because infinities have no differences."""
     from scipy.stats import mannwhitneyu, rankdata
 
     ranks = rankdata(np.concatenate([a, b]))
     result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
     return float(result.statistic), float(result.pvalue), min(1.0, 2.0 / comb(len(a) + len(b), len(a)))
-
-
-def _wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    from scipy.stats import rankdata, wilcoxon
-
-    with np.errstate(invalid="ignore"):
-        difference = np.where(a == b, 0.0, a - b)
-    least = min(1.0, 2.0 ** (1 - len(difference)))
-    if not difference.any():
-        return 0.0, 1.0, least
-    result = wilcoxon(np.sign(difference) * rankdata(np.abs(difference)), alternative="two-sided", method="auto")
-    return float(result.statistic), float(result.pvalue), least
 
 
 def _a12(a: np.ndarray, b: np.ndarray) -> float:

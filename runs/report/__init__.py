@@ -1,1 +1,1 @@
-"""What is made of a study: tables, figures, and the report that has them all."""
+"""Reports on studies: tables, figures, and the report that contains them all."""

@@ -1,4 +1,4 @@
-"""Changed data: what becomes of the nominal front when its points are flown under other data, beside the fronts found under those.
+"""Changed data: points of the nominal front simulated under the data of other problems, beside the fronts found under those data.
 
 Section VI B of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an extended evolutionary algorithm",
 IEEE Transactions on Cybernetics 50(4), 2020, does so for another mass and another gravity.
@@ -18,8 +18,8 @@ from macs.fronts.simulated import check_alike
 from macs.fronts.style import COLORS, better
 from problems.checks import unknown
 
-from ..batch.file import told
-from .comparison import Ground
+from ..data.schema import errors_begin_with
+from .comparison import Comparison
 from .flight_plots import representatives
 from .style import COLUMN, PAGE, new_figure, style
 from .tables import Cell, Column, Table, table
@@ -30,29 +30,29 @@ if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
 
 TOLERANCE = 1e-2
-"""What a flight may violate where the study does not say how much counts."""
+"""Allowed violation of a simulated point, in scales, in a study without `verify`."""
 MANY, FEW = 60, 4
-"""How many points of a front are flown and drawn, and how many of them are told one by one."""
+"""Number of points of a front that are simulated and drawn, and of those listed in a table."""
 NOMINAL: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": "black", "zorder": 3}
-FLOWN: Mapping[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.7, "mfc": "none", "color": COLORS[0], "zorder": 4}
+SIMULATED: Mapping[str, Any] = {"marker": "o", "ms": 4.0, "mew": 0.7, "mfc": "none", "color": COLORS[0], "zorder": 4}
 INFEASIBLE: Mapping[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.6, "color": COLORS[0], "zorder": 4}
 FOUND: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": COLORS[1], "zorder": 2}
 
 
 def check(nominal: Any, problems: Mapping[str, CompiledProblem]) -> None:
-    """Raise ValueError unless `nominal` is the label of one of several problems whose points can be flown under all the others."""
+    """Raise ValueError unless `nominal` is the label of one of several problems whose points can be simulated under all the others."""
     if not isinstance(nominal, str) or nominal not in problems:
         raise ValueError(f"nominal: {unknown('problem', nominal, problems)}")
     if len(problems) == 1:
-        raise ValueError(f"nominal: '{nominal}' is the only problem; there are no other data to fly its front under")
+        raise ValueError(f"nominal: '{nominal}' is the only problem; there are no other data to simulate its front under")
     for name, problem in problems.items():
-        with told(f"nominal: problem '{name}'"):
+        with errors_begin_with(f"nominal: problem '{name}'"):
             check_alike(problems[nominal], problem)
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What one solver found on one transcription.
+    """The result of one solver on one transcription.
 
     Attributes
     ----------
@@ -60,46 +60,48 @@ class Change:
         Labels.
     found : problem -> Front
         The union of all runs, of the nominal problem first.
-    flown : problem -> Front
-        Up to `MANY` points that stand for the nominal front, as flown under the data of each problem, in one order; of the nominal problem
-        first. Empty where there is no nominal front or its problem is not to be had, which `note` says.
+    simulated : problem -> Front
+        Up to `MANY` representative points of the nominal front, as simulated under the data of each problem, in one order; of the nominal
+        problem first. Empty if there is no nominal front or its problem cannot be loaded; `note` gives the reason.
     note : str
     """
 
     transcription: str
     solver: str
     found: Mapping[str, Front]
-    flown: Mapping[str, Front] = field(default_factory=dict)
+    simulated: Mapping[str, Front] = field(default_factory=dict)
     note: str = ""
 
     @property
     def nominal(self) -> Front:
-        """The nominal points as flown under their own data."""
-        return next(iter(self.flown.values()))
+        """The nominal points as simulated under their own data."""
+        return next(iter(self.simulated.values()))
 
     def shifts(self, problem: str) -> np.ndarray:
         """By how much each objective (n, m) of the nominal points is more under other data, in the user's units, where both are numbers."""
-        shifts = self.flown[problem].objectives - self.nominal.objectives
+        shifts = self.simulated[problem].objectives - self.nominal.objectives
         return shifts[np.isfinite(shifts).all(axis=1)]
 
 
 @dataclass(frozen=True, eq=False)
-class Changed:
-    """Tables and figures of all solvers and transcriptions; `nominal` is the label of the nominal problem, and flights that violate nothing
-    by more than `tolerance`, in scales, count as feasible."""
+class ChangedData:
+    """Tables and figures of all solvers and transcriptions.
+
+    `nominal` is the label of the nominal problem. A simulated point is feasible if it violates nothing by more than `tolerance`, in scales.
+    """
 
     nominal: str
     changes: Sequence[Change]
     tolerance: float
 
     def tables(self) -> dict[str, Table]:
-        """Name of a file -> table."""
+        """{name of a file: table}."""
         found = {"changed-data": self._shifts(), "changed-data-points": self._points(), "changed-data-best": self._best()}
         return {name: one for name, one in found.items() if one.rows or one.notes}
 
     def figures(self) -> dict[str, Figure]:
-        """Name of a file -> figure, one for each transcription and solver."""
-        drawn = [one for one in self.changes if len(one.flown) > 1 and len(self._goals) > 1]
+        """{name of a file: figure}, one for each transcription and solver."""
+        drawn = [one for one in self.changes if len(one.simulated) > 1 and len(self._goals) > 1]
         return {f"changed-data-{one.transcription}-{one.solver}": changed_figure(one) for one in drawn}
 
     @property
@@ -112,17 +114,17 @@ class Changed:
             heads += [Column(f"{goal.name}: mean shift", goal.unit), Column(f"{goal.name}: largest", goal.unit)]
         rows: list[list[Cell]] = []
         for one in self.changes:
-            for problem, front in one.flown.items():
+            for problem, front in one.simulated.items():
                 shifts = one.shifts(problem)
-                told: list[Cell] = [None] * (2 * shifts.shape[1])
+                values: list[Cell] = [None] * (2 * shifts.shape[1])
                 if problem != self.nominal and len(shifts):
                     largest = shifts[np.abs(shifts).argmax(axis=0), range(shifts.shape[1])]
-                    told = np.column_stack([shifts.mean(axis=0), largest]).ravel().tolist()
-                rows.append([one.transcription, one.solver, problem, len(front), int((front.status == CONVERGED).sum()), *told])
+                    values = np.column_stack([shifts.mean(axis=0), largest]).ravel().tolist()
+                rows.append([one.transcription, one.solver, problem, len(front), int((front.status == CONVERGED).sum()), *values])
         notes = [
-            f"Up to {MANY} points that stand for the union of all runs on {self.nominal}, flown with the same commands by an independent "
-            f"integrator; feasible: no limit is violated by more than {self.tolerance:g} of its scale. A shift is against the same flight "
-            "under the nominal data."
+            f"Up to {MANY} representative points of the union of all runs on {self.nominal}, simulated with the same controls by an "
+            f"independent integrator; feasible: no limit is violated by more than {self.tolerance:g} of its scale. A shift is against "
+            "the same point under the nominal data."
         ]
         return table(heads, rows, f"The front of {self.nominal} under changed data.", [*notes, *self._notes()])
 
@@ -130,11 +132,11 @@ class Changed:
         heads: list[Column | str] = [*_WHOSE, Column("point", grouped=True), "data", "feasible", *_columns(self._goals)]
         rows: list[list[Cell]] = []
         for one in self.changes:
-            for number, k in enumerate(representatives(one.nominal, FEW) if one.flown else [], 1):
-                for problem, front in one.flown.items():
-                    holds = "yes" if front.status[k] == CONVERGED else "no"
-                    rows.append([one.transcription, one.solver, f"point {number}", problem, holds, *front.objectives[k].tolist()])
-        return table(heads, rows, f"Points of the front of {self.nominal}, each under changed data with the same commands.")
+            for number, k in enumerate(representatives(one.nominal, FEW) if one.simulated else [], 1):
+                for problem, front in one.simulated.items():
+                    feasible = "yes" if front.status[k] == CONVERGED else "no"
+                    rows.append([one.transcription, one.solver, f"point {number}", problem, feasible, *front.objectives[k].tolist()])
+        return table(heads, rows, f"Points of the front of {self.nominal}, each under changed data with the same controls.")
 
     def _best(self) -> Table:
         heads: list[Column | str] = [*_WHOSE, "optimised under", "points", *_columns(self._goals)]
@@ -157,53 +159,65 @@ def _columns(goals: Sequence[Any]) -> list[Column]:
     return [Column(goal.name, goal.unit, digits=5) for goal in goals]
 
 
-def changes(grounds: Sequence[Ground], nominal: str | None, verify: float | None = None) -> list[Changed]:
-    """The nominal front of each solver and transcription, flown under the data of all other problems; nothing without a nominal problem."""
+def changed_data(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[ChangedData]:
+    """The nominal front of each solver and transcription, simulated under the data of all other problems of a study. Empty without a
+    nominal problem."""
+    nominal, verify = study.get("nominal"), study.get("verify")
     if nominal is None:
         return []
     tolerance = TOLERANCE if verify is None else verify
-    labels = [nominal, *dict.fromkeys(ground.problem for ground in grounds if ground.problem != nominal)]
+    labels = [nominal, *dict.fromkeys(comparison.problem for comparison in comparisons if comparison.problem != nominal)]
     cells = {
-        (ground.place(solver), solver): None
-        for ground in grounds
-        if ground.problem == nominal
-        for solver, runs in ground.runs.items()
+        (comparison.place(solver), solver): None
+        for comparison in comparisons
+        if comparison.problem == nominal
+        for solver, runs in comparison.runs.items()
         if runs
     }
-    found = [_change(grounds, *cell, labels, tolerance) for cell in cells]
-    return [Changed(nominal, found, tolerance)] if found else []
+    found = [_change(comparisons, *cell, labels, tolerance) for cell in cells]
+    return [ChangedData(nominal, found, tolerance)] if found else []
 
 
-def _change(grounds: Sequence[Ground], transcription: str, solver: str, labels: Sequence[str], tolerance: float) -> Change:
+def _change(comparisons: Sequence[Comparison], transcription: str, solver: str, labels: Sequence[str], tolerance: float) -> Change:
     here = {
-        ground.problem: ground.fronts[solver] for ground in grounds if ground.runs.get(solver) and ground.place(solver) == transcription
+        comparison.problem: comparison.fronts[solver]
+        for comparison in comparisons
+        if comparison.runs.get(solver) and comparison.place(solver) == transcription
     }
     union = {label: Front.merge(here[label]) for label in labels if label in here}
     own = union[labels[0]]
     if not len(own):
-        return Change(transcription, solver, union, note="nothing feasible was found under the nominal data, so there is nothing to fly")
+        return Change(
+            transcription, solver, union, note="nothing feasible was found under the nominal data, so there is nothing to simulate"
+        )
     some = own[representatives(own, MANY)]
     try:
-        problems = {label: _problem(grounds, label) for label in labels}
+        problems = {label: _problem(comparisons, label) for label in labels}
     except ValueError as error:
-        return Change(transcription, solver, union, note=f"nothing was flown: {error}")
+        return Change(transcription, solver, union, note=f"nothing was simulated: {error}")
     return Change(transcription, solver, union, {label: some.simulate(problem, tolerance=tolerance) for label, problem in problems.items()})
 
 
-def _problem(grounds: Sequence[Ground], label: str) -> CompiledProblem:
+def _problem(comparisons: Sequence[Comparison], label: str) -> CompiledProblem:
     """A problem of the study, from the first front of it. Raises ValueError if it was stated in a script."""
-    fronts = (front for ground in grounds if ground.problem == label for solver in ground.runs for front in ground.fronts[solver])
+    fronts = (
+        front
+        for comparison in comparisons
+        if comparison.problem == label
+        for solver in comparison.runs
+        for front in comparison.fronts[solver]
+    )
     return next(fronts).compiled()
 
 
 def changed_figure(change: Change) -> Figure:
-    """For each of the other data: the nominal front, its flights under the data, and the front found under them, all as they fly there.
+    """The nominal front, its points as simulated under other data, and the front found under those data, for each of the other data.
 
     Of two objectives, a panel for each data; of more, a row of panels of the first objective with each of the others.
     """
     goals = change.nominal.goals
     pairs = [(0, k) for k in range(1, len(goals))]
-    places = [(problem, pair) for problem in [*change.flown][1:] for pair in pairs]
+    places = [(problem, pair) for problem in [*change.simulated][1:] for pair in pairs]
     columns = len(pairs) if 1 < len(pairs) <= 4 else min(3, len(places))
     rows = -(-len(places) // columns)
     with style():
@@ -226,14 +240,14 @@ def changed_figure(change: Change) -> Figure:
 
 
 def _draw(ax: Any, change: Change, problem: str, pair: Sequence[int]) -> None:
-    """What there is of one problem, in two objectives."""
-    nominal, front = change.nominal, change.flown[problem]
-    holds = front.status == CONVERGED
+    """The fronts of one problem, in two objectives."""
+    nominal, front = change.nominal, change.simulated[problem]
+    feasible = front.status == CONVERGED
     again = change.found.get(problem, nominal[:0])
     for name, points, look in (
         ("nominal front", nominal[nominal.status == CONVERGED], NOMINAL),
-        ("its flights under these data", front[holds], FLOWN),
-        ("those not feasible", front[~holds], INFEASIBLE),
+        ("simulated under these data", front[feasible], SIMULATED),
+        ("those not feasible", front[~feasible], INFEASIBLE),
         ("found under these data", again[representatives(again, MANY)], FOUND),
     ):
         ax.plot(*points.objectives[:, pair].T, ls="", label=name, **look)

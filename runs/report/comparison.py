@@ -1,52 +1,113 @@
-"""What can be compared: all runs of a study on one problem and one transcription, by solver, and what they are measured against."""
+"""Comparisons: all runs of a study on one problem and one transcription, by solver, and the reference that they are measured against."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from macs.front import Front
+import numpy as np
 
-from ..batch.store import Run, Store
+from macs.evaluation.evaluator import CONVERGED
+from macs.front import Front
+from macs.fronts.simulated import best, judged
+
+from ..batch.store import Store, StoredRun
+from ..data.schema import errors_begin_with
 from ..execution.task import CRASHED, MEMORY, TIMEOUT
 from ..measures.references import Reference, look_up, union
-from .verified import Verified
+from ..measures.simulation_record import Ends, ends, record
 
 EACH = "each on its own"
-"""What is said for the transcription of a ground without a common one."""
+"""Name of the transcription where each solver has its own."""
 FAILED = (CRASHED, TIMEOUT, MEMORY)
-"""What counts as a failure of the solver. A killed, missing or unreadable run says nothing of it, and is left out and told."""
+"""Statuses that count as a failure of the solver. Killed, missing and unreadable runs are no evidence against it: they are left out, and
+the report says how many."""
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
-    """Attributes
+class Verified:
+    """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated, as simulated.
+
+    Attributes
+    ----------
+    front : Front
+        The n points that count.
+    ends : Ends
+        Their states at the end of each phase.
+    claimed, feasible : int
+        Number of points that the solver returned, and of those feasible when simulated, dominated ones included.
+    """
+
+    front: Front
+    ends: Ends
+    claimed: int
+    feasible: int
+
+    @classmethod
+    def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
+        """The points of a finished run of a study that verifies within a tolerance, or with None not at all.
+
+        Points whose simulation is not in the run's record are simulated now. Raises ValueError if they cannot be, as their problem is not
+        found.
+        """
+        front = run.front
+        if tolerance is None or not len(front):
+            return cls(front, ends(front), len(front), len(front))
+        found = run.simulated
+        if np.shape(found.get("F", ())) != front.F.shape or np.shape(found.get("violation", ())) != front.violation.shape:
+            with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
+                found = record(front, tolerance)
+        simulated = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
+        rows = best(simulated)
+        places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
+        return cls(Front.of(simulated[rows]), places, len(front), int((simulated.status == CONVERGED).sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """All runs on one problem and one transcription.
+
+    Attributes
     ----------
     problem, transcription : str
         Labels.
-    runs : solver -> its finished runs
-    fronts : solver -> what counts of each of them, and of foreign solvers the fronts that were given
-    verified : solver -> the same of each of them with what was found out about it
-    failures : solver -> how many of its runs failed
-    left_out : solver -> how many others have no front
+    runs : {solver: sequence of StoredRun}
+        Its finished runs.
+    fronts : {solver: sequence of Front}
+        The points of each finished run that count; also the given fronts of foreign solvers.
+    verified : {solver: sequence of Verified}
+        The same with the result of their verification.
+    failures : {solver: int}
+        How many of its runs failed.
+    left_out : {solver: int}
+        How many other runs have no front.
+    stated : None, str or mapping
+        The reference as the study states it.
     """
 
     problem: str
     transcription: str
-    runs: Mapping[str, Sequence[Run]]
+    runs: Mapping[str, Sequence[StoredRun]]
     fronts: Mapping[str, Sequence[Front]]
     verified: Mapping[str, Sequence[Verified]]
     failures: Mapping[str, int]
     left_out: Mapping[str, int]
+    stated: Any = None
+
+    @cached_property
+    def against(self) -> Reference:
+        """The reference that the study states, see `reference`."""
+        return self.reference(self.stated)
 
     @property
     def name(self) -> str:
-        """For people."""
+        """The labels in one line."""
         return f"{self.problem}, {self.transcription}"
 
     def place(self, solver: str) -> str:
-        """The transcription that a solver works on."""
+        """The transcription that a solver works on, by label."""
         runs = self.runs.get(solver)
         return runs[0].cell.transcription if runs else self.transcription
 
@@ -57,7 +118,7 @@ class Ground:
 
     @property
     def known(self) -> Front:
-        """A front that says names, units and senses of the objectives."""
+        """A front with the names, units and senses of the objectives."""
         return self.every[0]
 
     def union(self) -> Reference:
@@ -68,16 +129,28 @@ class Ground:
         return Reference(together, f"the union of {len(fronts)} run{'' if len(fronts) == 1 else 's'}", False)
 
     def reference(self, given: Any) -> Reference:
-        """What the study says that fronts are measured against; see `look_up`."""
+        """The reference that the study states for this problem; see `look_up`."""
         source = self.known.source
         address, data = (source.address, source.data) if source is not None else ("", {})
         return look_up(given, self.problem, address, data, self.known.goals) or self.union()
 
 
-def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]:
-    """The grounds of a study with at least one front; `others` are fronts of foreign solvers, on the problem whose objectives they have."""
-    cells: dict[tuple[str, str], dict[str, list[Run]]] = {}
-    apart: dict[str, dict[str, list[Run]]] = {}
+def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Comparison]:
+    """The comparisons of a study that have a front.
+
+    Parameters
+    ----------
+    store : Store
+    others : {name: fronts}
+        Fronts of foreign solvers; each joins the comparisons whose objectives it has.
+
+    Raises
+    ------
+    ValueError
+        A run's points cannot be verified, see `Verified.of`.
+    """
+    cells: dict[tuple[str, str], dict[str, list[StoredRun]]] = {}
+    apart: dict[str, dict[str, list[StoredRun]]] = {}
     for run in store.runs():
         problem, transcription, solver = run.cell.labels
         here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
@@ -97,5 +170,5 @@ def grounds(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Ground]
         fronts |= {name: given for name, given in others.items() if all(front.goals == goals for front in given)}
         failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
         left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
-        found.append(Ground(problem, transcription, finished, fronts, verified, failures, left_out))
+        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out, store.definition.get("reference")))
     return found

@@ -1,4 +1,4 @@
-"""Flights side by side: the states and controls of a few points of a front, beside laws that are known."""
+"""Figures of the states and controls of a few points of a front, beside known optimal laws."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Law = Mapping[str, np.ndarray]
-"""A flight that is known: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
+"""A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 
 Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
 
 Laws = Mapping[str, Sequence[Law | None]]
-"""What such flights are called -> one for each point, None where there is none."""
+"""{name of a law: its flight for each point, None where it has none}."""
 
 DASHES: Sequence[Any] = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 """Of the first laws, the second, ..."""
@@ -47,7 +47,6 @@ def flights_figure(
     points: Sequence[Point],
     *,
     laws: Laws = MappingProxyType({}),
-    names: Sequence[str] = (),
     solver: str = "",
 ) -> Figure:
     """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
@@ -57,27 +56,21 @@ def flights_figure(
     points : Points of one problem, of one to six
         With trajectories.
     laws : {name: as many flights, or None}
-        What to draw beside each point, dashed; quantities that a flight does not hold are left out.
-    names : sequence of str, optional
-        Which states, controls and path constraints to draw, in that order; all states and controls by default.
+        Flights to draw beside each point, dashed; quantities that a flight does not have are left out.
     solver : str
         For the legend.
 
     Raises
     ------
     ValueError
-        If there is no point, or one has no trajectory, or has not what is asked for.
+        If there is no point, or one has no trajectory.
     """
     from matplotlib.ticker import MaxNLocator
 
     _check(points, laws)
-    # What `_check` let pass has trajectories.
+    # `_check` has made sure that all have trajectories.
     flights = [point.trajectory for point in points if point.trajectory is not None]
-    known = dict(quantities(flights[0]))
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"there is no '{unknown[0]}' to draw; there are {', '.join(known)}")
-    rows = list(names) or [name for name, kind in known.items() if kind != "path"]
+    rows = [name for name, kind in quantities(flights[0]) if kind != "path"]
     units = _units(points[0])
     with style():
         figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
@@ -121,8 +114,8 @@ def paths_figure(
     points, laws
         As of `flights_figure`.
     across, up : name of a state or control, or a function of all of them
-        The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. Where a law holds not all that it
-        takes, it is not drawn.
+        The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. A law that lacks
+        one of them is not drawn.
     xlabel, ylabel : str
         Needed for functions; of a state or control, its name and unit by default.
     equal : bool
@@ -138,7 +131,7 @@ def paths_figure(
                 values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
                 x, y = _of(values, across), _of(values, up)
                 name = f"point {i + 1}" if k == 0 else None
-                # Where paths coincide the first are on top, and a dot says where each ends.
+                # Where paths coincide the first are on top, and a dot marks the end of each.
                 look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
                 ax.plot(x, y, lw=1.3, label=name, **look)
                 if k == len(phases) - 1:
@@ -150,7 +143,7 @@ def paths_figure(
         if equal:
             ax.set_aspect("equal", adjustable="datalim")
         for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
-            drawn = [law for law in beside if law is not None and _holds(law, across) and _holds(law, up)]
+            drawn = [law for law in beside if law is not None and _has(law, across) and _has(law, up)]
             for i, law in enumerate(drawn):
                 line = _of(law, across), _of(law, up)
                 ax.plot(*line, color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
@@ -166,8 +159,8 @@ def _of(values: Mapping[str, np.ndarray], quantity: Quantity) -> np.ndarray:
     return values[quantity]
 
 
-def _holds(values: Mapping[str, np.ndarray], quantity: Quantity) -> bool:
-    """Whether a law says all that a quantity takes."""
+def _has(values: Mapping[str, np.ndarray], quantity: Quantity) -> bool:
+    """Whether a law has all that a quantity needs."""
     if not callable(quantity):
         return quantity in values
     try:
@@ -197,7 +190,7 @@ def _check(points: Sequence[Point], laws: Laws) -> None:
 
 
 def _title(number: int, point: Point, width: int) -> str:
-    """The point's number and objectives, in lines of at most so many characters."""
+    """The point's number and objectives, in lines of at most `width` characters."""
     goals = point.goals
     values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
     lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]

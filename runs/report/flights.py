@@ -1,4 +1,4 @@
-"""The flights that stand for a front, beside what is known of the best: analytic laws, and each objective optimised alone."""
+"""Representative trajectories of a front, beside known optimal laws and each objective optimised alone."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from problems import load
 from transcription import SingleShooting, from_dict, parse, word
 
 from ..measures.indicators import pieces, truth
-from ..measures.references import Reference, room
-from .comparison import Ground
+from ..measures.references import Reference, module_of
+from .comparison import Comparison
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .plots import front_figure
 from .style import style
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MANY = 100
 LAW, ALONE = "known law", "single objective"
-"""What dashed and dotted lines are; a case may have a `LAW` of its own."""
+"""Names of the dashed and dotted lines; a case may have a `LAW` of its own."""
 OBLONG = 4.0
 """Tracks whose sides have one unit are drawn to one scale, unless one is longer than this many times the other."""
 BETTER = 1e-6
@@ -40,53 +40,56 @@ BETTER = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Flights:
-    """Attributes
+    """Representative trajectories of the front of one solver.
+
+    Attributes
     ----------
-    ground : Ground
+    comparison : Comparison
     reference : Reference
     solver : str
-        Whose front they are of: that of the first solver that found any, all its runs together.
+        The first solver that found points; the front is that of all its runs together.
     points : tuple of Point
     many : sequence of Point
         Up to a hundred of that front, for pictures of a population.
-    room : module or None
-        Where the problem comes from, see `references.room`.
-    laws : name -> as many flights, None where there is none
+    case : module or None
+        The module of the problem, see `references.module_of`.
+    laws : {name: flights}
+        One for each point, None where there is none.
     ends : Front
-        The best of each objective alone, by gradients, on the same transcription where that is made for them; empty where there is none.
+        The optimum of each objective alone, by gradients, on the same transcription unless it is unsuited to them; empty if there is none.
     note : str
-        Why there are no ends; mostly nothing.
+        Why there are no ends; usually empty.
     """
 
-    ground: Ground
+    comparison: Comparison
     reference: Reference
     solver: str
     points: tuple[Point, ...]
     many: Sequence[Point]
-    room: ModuleType | None
+    case: ModuleType | None
     laws: Mapping[str, Sequence[Law | None]]
     ends: Front
     note: str
 
     @classmethod
-    def of(cls, ground: Ground, reference: Reference) -> Flights | None:
-        """Those of a ground; None where nobody found any."""
-        for solver in ground.runs:
-            fronts = [front for front in ground.fronts[solver] if len(front)]
+    def of(cls, comparison: Comparison) -> Flights | None:
+        """The representatives of a comparison; None if no solver found a trajectory."""
+        for solver in comparison.runs:
+            fronts = [front for front in comparison.fronts[solver] if len(front)]
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
                 source = front.source
                 named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
-                place = room(source.address) if source is not None and named else None
+                place = module_of(source.address) if source is not None and named else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
-                return cls(ground, reference, solver, points, many, place, laws, ends, note)
+                return cls(comparison, comparison.against, solver, points, many, place, laws, ends, note)
         return None
 
     def table(self) -> Table:
         """Their objectives; with two of them, the best of the second that is known for the first; and each objective alone."""
-        goals = self.ground.known.goals
+        goals = self.comparison.known.goals
         curve = self._curve()
         heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
         heads += (
@@ -99,33 +102,35 @@ class Flights:
             rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
         for goal, end in zip(goals, self.ends, strict=False):
             rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
-        told = [f"Of {self.solver}, all runs together."]
+        notes = [f"Of {self.solver}, all runs together."]
         if len(self.ends):
-            told[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
+            notes[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
         if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
-            told.append(
-                f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; macs verify flies points."
+            notes.append(
+                f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; see macs verify."
             )
-        return table(heads, rows, f"{self.ground.name}: solutions that stand for the front.", [*told, *([self.note] if self.note else [])])
+        return table(
+            heads, rows, f"{self.comparison.name}: representative solutions of the front.", [*notes, *([self.note] if self.note else [])]
+        )
 
     def figures(self) -> dict[str, Figure]:
         """Name of a file -> figure."""
         found = {
             "representatives": front_figure(
-                {self.solver: self.ground.fronts[self.solver]},
+                {self.solver: self.comparison.fronts[self.solver]},
                 reference=self.reference.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
             ),
             "flights": flights_figure(self.points, laws=self.laws, solver=self.solver),
         }
-        plot = getattr(self.room, "plot", None)
+        plot = getattr(self.case, "plot", None)
         if plot is not None and self.many:
             with style():
                 found |= plot(self.many)
-        track = getattr(self.room, "track", None)
+        track = getattr(self.case, "track", None)
         if track is not None:
-            tracks = [track(flown(point)) for point in self.points]
+            tracks = [track(time_histories(point)) for point in self.points]
             across, up = tracks[0]
             found["paths"] = paths_figure(
                 self.points,
@@ -144,14 +149,14 @@ class Flights:
 
     def _curve(self) -> np.ndarray | None:
         """The reference, minimised, where it is one curve of two objectives."""
-        R = truth(self.reference.front, self.ground.known)
+        R = truth(self.reference.front, self.comparison.known)
         return R if len(pieces(R)) == 1 else None
 
     def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:
         """The second objective of the reference at the first of a point, and how much worse the point is, in ranges."""
         if curve is None:
             return []
-        signs = [goal.sign for goal in self.ground.known.goals]
+        signs = [goal.sign for goal in self.comparison.known.goals]
         first, second = (sign * value for sign, value in zip(signs, point.objectives.values(), strict=True))
         known = float(np.interp(first, *curve.T))
         return [signs[1] * known, (second - known) / float(np.ptp(curve[:, 1]))]
@@ -165,7 +170,7 @@ def _alike(tracks: Sequence[Mapping[str, np.ndarray]]) -> bool:
     return len(units) == 1 and max(lengths) <= OBLONG * min(lengths)
 
 
-def flown(point: Point) -> dict[str, np.ndarray]:
+def time_histories(point: Point) -> dict[str, np.ndarray]:
     """States and controls of a point by name, and "time", from end to end; NaN between elements, and in phases that do not have them."""
     phases = point.trajectory.phases if point.trajectory is not None else ()
     names = list(dict.fromkeys(v.name for phase in phases for v in (*phase.state_variables, *phase.control_variables)))
@@ -187,7 +192,7 @@ def _ends(front: Front) -> tuple[Front, str]:
             # Its derivatives are dense: with hundreds of nodes they take minutes, and lead nowhere where flights are unstable.
             source = front.source
             if source is None or not source.address:
-                return front[:0], "Objectives were not optimised alone: single shooting is not made for gradients."
+                return front[:0], "Objectives were not optimised alone: single shooting is not suited to gradients."
             method = parse(load(source.address, **source.data).default_transcription)
     except ValueError as error:
         return front[:0], f"Objectives were not optimised alone: {error}."
@@ -209,5 +214,5 @@ def _alone(points: Sequence[Point], ends: Front) -> list[Law | None]:
     found: list[Law | None] = [None] * len(points)
     for k, end in enumerate(ends):
         if end.status == CONVERGED:
-            found[int(np.argmin([point.F[k] for point in points]))] = flown(end)
+            found[int(np.argmin([point.F[k] for point in points]))] = time_histories(end)
     return found

@@ -7,18 +7,19 @@ extended evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020; 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from macs.front import Front
 from problems.checks import unknown
 
-from ..batch.file import is_number
-from ..batch.store import Run
+from ..batch.store import StoredRun
+from ..data.schema import Number, Section, checked, errors_begin_with
 from ..measures.convergence import Band, History, band
-from .comparison import Ground
+from .comparison import Comparison
 from .plots import convergence_figure
 from .tables import Cell, Column, Table, table
 
@@ -28,91 +29,77 @@ if TYPE_CHECKING:
     from problems.compiled import CompiledProblem, Objective
 
 NEVER = (np.array([0.0]), np.array([np.nan]))
-"""What a run attained that failed."""
+"""The history of a failed run."""
 
 
-@dataclass(frozen=True)
-class Goal:
-    """What a study's table `[goal]` says.
+Share = Annotated[float, Meta(gt=0, le=1, description="a number above 0 and at most 1")]
+
+
+class Goal(Section):
+    """The table `[goal]` of a study.
 
     Attributes
     ----------
     objective : str
     best, worst : float
-        Values of it, in the user's unit, that attain all and nothing.
+        Values of the objective, in the user's unit, with attainment 1 and 0.
     shares : sequence of float
-        What part of the way tables say the evaluations of.
+        Attainments for which tables state the evaluations.
 
     Raises
     ------
     ValueError
-        If they make no sense.
+        Best and worst are the same.
     """
 
-    objective: str
-    best: float
-    worst: float
-    shares: Sequence[float] = (0.9, 0.95, 0.99)
+    objective: Annotated[str, Meta(description="the name of an objective")]
+    best: Number
+    worst: Number
+    shares: Annotated[tuple[Share, ...], Meta(description="a list of numbers above 0 and at most 1")] = (0.9, 0.95, 0.99)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.objective, str):
-            raise ValueError(f"goal: objective must be the name of an objective, not {self.objective!r}")
-        for name in ("best", "worst"):
-            if not is_number(getattr(self, name)):
-                raise ValueError(f"goal: {name} must be a finite number, not {getattr(self, name)!r}")
         if self.best == self.worst:
-            raise ValueError(f"goal: best and worst of '{self.objective}' are both {self.best:g}: there is nothing between them to attain")
-        shares = self.shares
-        if isinstance(shares, str) or not isinstance(shares, Sequence) or not all(is_number(one) and 0 < one <= 1 for one in shares):
-            raise ValueError(f"goal: shares must be a list of numbers above 0 and at most 1, not {shares!r}")
+            raise ValueError(f"best and worst of '{self.objective}' are both {self.best:g}: they must differ")
 
     @classmethod
     def of(cls, given: Any, problems: Mapping[str, CompiledProblem]) -> Goal:
-        """The goal that a study gives, of problems by label. Raises ValueError that says what is wrong with it."""
-        keys = [field.name for field in fields(cls)]
-        if not isinstance(given, Mapping):
-            raise ValueError(f"goal must be a table with {', '.join(keys)}, not {given!r}")
-        for key in given:
-            if key not in keys:
-                raise ValueError(f"goal: {unknown('key', key, keys)}")
-        for key in keys[:3]:
-            if key not in given:
-                raise ValueError(f"goal: {key} is missing")
-        goal = cls(**given)
-        for name, problem in problems.items():
-            known = {one.name: one for one in problem.goals}
-            if goal.objective not in known:
-                raise ValueError(f"goal: problem '{name}': {unknown('objective', goal.objective, known)}")
-            sense = known[goal.objective].sense
-            if (goal.best < goal.worst) != (sense == "minimize"):
-                better = "less" if sense == "minimize" else "more"
-                raise ValueError(
-                    f"goal: '{goal.objective}' is to {sense}, so best must be {better} than worst, not {goal.best:g} beside {goal.worst:g}"
-                )
+        """The goal that a study states for problems by label. Raises ValueError that names the key that is wrong."""
+        with errors_begin_with("goal"):
+            goal: Goal = checked(given, cls)
+            for name, problem in problems.items():
+                known = {one.name: one for one in problem.goals}
+                if goal.objective not in known:
+                    raise ValueError(f"problem '{name}': {unknown('objective', goal.objective, known)}")
+                sense = known[goal.objective].sense
+                if (goal.best < goal.worst) != (sense == "minimize"):
+                    better = "less" if sense == "minimize" else "more"
+                    raise ValueError(
+                        f"'{goal.objective}' is to {sense}, so best must be {better} than worst, not {goal.best:g} beside {goal.worst:g}"
+                    )
         return goal
 
-    def attained(self, values: np.ndarray) -> np.ndarray:
-        """What part of the way values of the objective have come: 1 at the best, 0 at the worst."""
+    def attainment(self, values: np.ndarray) -> np.ndarray:
+        """The attainment of values of the objective: 1 at the best, 0 at the worst."""
         return 1.0 - (values - self.best) / (self.worst - self.best)
 
-    def history(self, run: Run, goals: Sequence[Objective]) -> History:
-        """What a run had attained at each of its samples; NaN before it had a feasible point."""
+    def history(self, run: StoredRun, goals: Sequence[Objective]) -> History:
+        """The attainment of a run at each of its samples; NaN before its first feasible point."""
         k = self._place(goals)
         best = [goals[k].sign * min((row[k] for row in F), default=np.nan) for F in run.history["F"]]
-        return np.array(run.history["evaluations"], dtype=float), np.fmax.accumulate(self.attained(np.array(best)))
+        return np.array(run.history["evaluations"], dtype=float), np.fmax.accumulate(self.attainment(np.array(best)))
 
     def of_front(self, front: Front) -> float:
-        """What its best point attains; NaN if there is none."""
+        """The attainment of the best point of a front; NaN if it is empty."""
         k = self._place(front.goals)
-        return float(self.attained(front.goals[k].sign * front.F[:, k].min())) if len(front) else np.nan
+        return float(self.attainment(front.goals[k].sign * front.F[:, k].min())) if len(front) else np.nan
 
     def _place(self, goals: Sequence[Objective]) -> int:
         return [one.name for one in goals].index(self.objective)
 
 
 @dataclass(frozen=True, eq=False)
-class Attained:
-    """The goal on one problem.
+class GoalAttainment:
+    """The attainment of the goal on one problem.
 
     Attributes
     ----------
@@ -122,8 +109,8 @@ class Attained:
     objective : Objective
     histories : (transcription, solver) -> one for each run
         Of failed runs, too, which attain nothing.
-    flown : (transcription, solver) -> what each run attained by points that hold when they are flown
-        Of failed runs, too. Empty where points are not flown.
+    simulated : (transcription, solver) -> attainment of each run by points that are feasible as simulated
+        Of failed runs, too. Empty where points are not simulated.
     seconds : (transcription, solver) -> the time of each finished run
     """
 
@@ -131,14 +118,14 @@ class Attained:
     goal: Goal
     objective: Objective
     histories: Mapping[tuple[str, str], Sequence[History]]
-    flown: Mapping[tuple[str, str], Sequence[float]]
+    simulated: Mapping[tuple[str, str], Sequence[float]]
     seconds: Mapping[tuple[str, str], Sequence[float]]
 
     def tables(self) -> dict[str, Table]:
-        """Name of a file -> table: what was attained in the end, and the evaluations to get there."""
+        """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
         heads: list[Column | str] = [Column("transcription", grouped=True), "solver", "runs"]
         heads += [Column(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
-        heads += [Column("median as flown", digits=4)] if self.flown else []
+        heads += [Column("median as simulated", digits=4)] if self.simulated else []
         heads += [Column(f"evaluations to {share:g}") for share in self.goal.shares]
         heads += [Column("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
@@ -147,19 +134,19 @@ class Attained:
             final: list[Cell] = [float(part[-1]) if np.isfinite(part[-1]) else None for part in (b.median, b.lower, b.upper)]
             seconds = self.seconds[cell]
             took = float(np.median(seconds)) if seconds else None
-            final += [_middle(self.flown[cell])] if self.flown else []
+            final += [_middle(self.simulated[cell])] if self.simulated else []
             rows.append([*cell, b.runs, *final, *(_reached(b, share) for share in self.goal.shares), took])
         unit = f" {self.objective.unit}" if self.objective.unit else ""
         notes = [
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
-            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: so many runs have not got there. "
-            "Values are what the transcription says of points"
-            + (", but those as flown, of the points that each run has in the end and that hold." if self.flown else ", not what is flown.")
+            "quartiles are over the runs; one without a feasible point has attained nothing. A dash: that share of runs did not reach it. "
+            "Values are those of the transcription"
+            + (", except those as simulated: of the feasible points of each run in the end." if self.simulated else ", not simulated.")
         ]
         return {f"{self.problem}-goal-attainment": table(heads, rows, f"{self.problem}: goal attainment of {self.objective.name}.", notes)}
 
     def figures(self) -> dict[str, Figure]:
-        """Name of a file -> figure: median and quartiles over evaluations, a line for each transcription and solver."""
+        """{name of a file: figure} of median and quartiles over evaluations, a line for each transcription and solver."""
         methods, solvers = ({cell[side] for cell in self.histories} for side in (0, 1))
         named = {
             ", ".join(word for word, others in zip(cell, (methods, solvers), strict=True) if len(others) > 1) or cell[1]: runs
@@ -171,33 +158,33 @@ class Attained:
         return {f"{self.problem}-goal-attainment": figure}
 
 
-def attained(grounds: Sequence[Ground], given: Mapping[str, Any] | None, verify: float | None) -> list[Attained]:
-    """The goal that a study gives on each of its problems, also as flown if it verifies; nothing if it gives none."""
-    if given is None:
+def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[GoalAttainment]:
+    """The attainment of the goal that a study states, on each of its problems; also as simulated if it verifies. Empty without a goal."""
+    if study.get("goal") is None:
         return []
-    goal = Goal.of(given, {})
+    goal, verify = Goal.of(study["goal"], {}), study.get("verify")
     found = []
-    for problem in dict.fromkeys(ground.problem for ground in grounds):
-        here = [ground for ground in grounds if ground.problem == problem]
+    for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
+        here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
         cells = {
-            (ground.place(solver), solver): (runs, ground.fronts[solver], ground.failures.get(solver, 0))
-            for ground in here
-            for solver, runs in ground.runs.items()
-            if len(runs) + ground.failures.get(solver, 0)
+            (comparison.place(solver), solver): (runs, comparison.fronts[solver], comparison.failures.get(solver, 0))
+            for comparison in here
+            for solver, runs in comparison.runs.items()
+            if len(runs) + comparison.failures.get(solver, 0)
         }
         histories = {
             cell: [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
             for cell, (runs, _, failed) in cells.items()
         }
-        flown = {
+        simulated = {
             cell: [*map(goal.of_front, fronts), *[np.nan] * failed] for cell, (_, fronts, failed) in cells.items() if verify is not None
         }
         seconds = {cell: [run.wall_time for run in runs] for cell, (runs, _, _) in cells.items()}
         objective = next(one for one in goals if one.name == goal.objective)
-        known = {cell: told for cell, told in histories.items() if told}
+        known = {cell: runs for cell, runs in histories.items() if runs}
         if known:
-            found.append(Attained(problem, goal, objective, known, flown, seconds))
+            found.append(GoalAttainment(problem, goal, objective, known, simulated, seconds))
     return found
 
 
@@ -208,6 +195,6 @@ def _middle(values: Sequence[float]) -> float | None:
 
 
 def _reached(b: Band, share: float) -> int | None:
-    """After how many evaluations the median run had come so far; None if it never did."""
+    """Evaluations after which the median run reached a share; None if it never did."""
     there = np.flatnonzero(b.median >= share)
     return int(b.x[there[0]]) if len(there) else None

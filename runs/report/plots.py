@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKERS = "o^sDvPX*"
-"""One more than there are colours, so that of nine solvers no two look alike."""
+"""One more than there are colours, so that no two of many solvers look alike."""
 
 
 def front_figure(
@@ -47,7 +47,7 @@ def front_figure(
     marked : Front or array, optional
         Points to mark by crosses and numbers from 1: those that another figure shows the flights of.
     truth_name : str
-        What the legend calls the reference.
+        Name of the reference in the legend.
     """
     known = _known([*(front for runs in fronts.values() for front in runs), reference], goals)
     m = len(known.goals)
@@ -61,7 +61,7 @@ def front_figure(
             if reference is not None:
                 _draw_truth(ax, truth(reference, known) * _signs(known), _signs(known), (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
-                if not runs:  # none is finished; whoever comes after has the colour that is its own in all figures
+                if not runs:  # none is finished; other solvers keep their colours of all figures
                     continue
                 points = [minimised(front, known) * _signs(known) for front in runs]
                 name = _runs(solver, len(runs), sum(not len(part) for part in points))
@@ -84,7 +84,7 @@ def attainment_figure(
 ) -> Figure:
     """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
 
-    What lies between best and worst is shaded. A surface that is empty, because runs are, is not there, and the legend says so.
+    The area between best and worst is shaded. A surface that is empty, because runs are, is not drawn; the legend names it.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def convergence_figure(
     log: bool = True,
     inside: bool = True,
 ) -> Figure:
-    """An indicator over what a run spends: the median of each solver's runs as a line, their quartiles as a band.
+    """An indicator over the cost of a run: the median of each solver's runs as a line, their quartiles as a band.
 
     Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
 
@@ -143,7 +143,7 @@ def convergence_figure(
     histories : solver -> (moments, values) for each run
         As of `convergence.band`.
     xlabel, ylabel : str
-        "evaluations", "inner iterations", "time [s]"; what the indicator is.
+        "evaluations", "inner iterations", "time [s]"; name of the indicator.
     larger : bool
         Whether larger values are better.
     log : bool
@@ -201,7 +201,7 @@ def _log_ticks(ax: Any, ratio: float) -> None:
 
 
 def _known(points: Sequence[Points | None], goals: Sequence[Objective]) -> Front:
-    """A front, at need of no points, that says which objectives are drawn."""
+    """A front with the objectives that are drawn; it may have no points."""
     found = next((one for one in points if isinstance(one, Front)), None)
     if found is not None:
         return found

@@ -1,22 +1,22 @@
-"""What a published table may be of: which figures it has, and how ours are made from the fronts of a ground."""
+"""Kinds of published tables: the keys that a study file states for each, and how the same figures are computed from our fronts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from msgspec import Meta
 
 from macs.front import Front
 from problems.checks import unknown
 
-from ..batch.file import is_number
+from ..data.schema import Number, Section, Text, errors_begin_with, is_number
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
-from ..measures.simulation_record import Ends
+from ..measures.simulation_record import Ends as FinalStates
 from ..measures.statistics import summarise
-from .comparison import Ground
+from .comparison import Comparison
 from .run_measures import samples, spent
 from .tables import Cell, Column
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
 
 Figures = Mapping[str, Cell]
-"""A row's figures by key."""
+"""The figures of a row by key."""
 STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
     "greatest": np.max,
     "least": np.min,
@@ -32,92 +32,259 @@ STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
     "standard deviation": lambda values: np.std(values, ddof=1) if len(values) > 1 else np.nan,
     "variance": lambda values: np.var(values, ddof=1) if len(values) > 1 else np.nan,
 }
+ROW, STATISTIC = ("problem", "by"), "statistic"
+"""Keys of a row that are no figures."""
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Attributes
+def figures_of(row: Mapping[str, Any]) -> list[str]:
+    """The keys of a row's figures."""
+    return [key for key in row if key not in (*ROW, STATISTIC)]
+
+
+class Published(Section, tag_field="of", kw_only=True):
+    """A published table, and the same figures of our runs. A kind of table is a class of this module.
+
+    Attributes
     ----------
-    columns : callable
-        the published table -> {key of a figure: head of its column}; None where the keys are names of objectives.
-    ours : callable
-        (ground, the published table) -> solver -> rows of figures.
-    note : callable
-        (ground, the published table) -> what there is to say of ours.
+    rows : list of dict
+        `problem` and `by`, figures by key, and `statistic` where the kind has them.
+    source : str
+        The paper.
+    note : str
+        How the paper's figures were obtained.
+    differs : str
+        What differs in ours.
     statistics : bool
-        Whether each row is one of `STATISTICS`, named by its key "statistic".
-    needs : mapping
-        What else the published table has to say -> what raises ValueError if that makes no sense.
-    fits : callable
-        (the published table, one of its problems) raises ValueError if what it needs is not of such a problem.
+        Whether each row is one of `STATISTICS`.
     population : bool
         Whether ours are of solvers with a population alone.
     """
 
-    columns: Callable[[Mapping[str, Any]], Mapping[str, Column] | None]
-    ours: Callable[[Ground, Mapping[str, Any]], Mapping[str, Sequence[Figures]]]
-    note: Callable[[Ground, Mapping[str, Any]], str]
-    statistics: bool = False
-    needs: Mapping[str, Callable[[Any], None]] = field(default_factory=dict)
-    fits: Callable[[Mapping[str, Any], CompiledProblem], None] = lambda paper, problem: None
-    population: bool = False
+    rows: Annotated[list[dict[str, Any]], Meta(min_length=1, description="a list of tables")]
+    source: Text = ""
+    note: Text = ""
+    differs: Text = ""
+
+    statistics: ClassVar[bool] = False
+    population: ClassVar[bool] = False
+
+    @property
+    def columns(self) -> Mapping[str, Column] | None:
+        """{key of a figure: head of its column}; None where the keys are names of objectives."""
+        return None
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        """{solver: rows of figures} of our runs."""
+        raise NotImplementedError
+
+    def remark(self, comparison: Comparison) -> str:
+        """A sentence on how our figures were obtained."""
+        raise NotImplementedError
+
+    def check_problem(self, problem: CompiledProblem) -> None:
+        """Raise ValueError if the table cannot be of this problem."""
+
+    def __post_init__(self) -> None:
+        seen: list[tuple[str, ...]] = []
+        for place, row in enumerate(self.rows, 1):
+            with errors_begin_with(f"row {place}"):
+                self._check_row(row)
+                name = tuple(row[key] for key in (*ROW, STATISTIC) if key in row)
+                if name in seen:
+                    raise ValueError(f"it is of the same as row {seen.index(name) + 1}: {', '.join(name)}")
+                seen.append(name)
+
+    def _check_row(self, row: Mapping[str, Any]) -> None:
+        if not all(isinstance(row.get(key), str) for key in ROW):
+            raise ValueError(f"it must be a table with problem and by, not {row!r}")
+        if self.statistics and (not isinstance(row.get(STATISTIC), str) or row[STATISTIC] not in STATISTICS):
+            raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {row.get(STATISTIC)!r}")
+        if STATISTIC in row and not self.statistics:
+            raise ValueError(f"{STATISTIC}: this kind of table has none")
+        keys = figures_of(row)
+        if self.columns is not None:
+            check_keys(keys, "key", self.columns)
+        for key in keys:
+            if not is_number(row[key]):
+                raise ValueError(f"{key} must be a finite number, not {row[key]!r}")
+        if not keys:
+            raise ValueError(f"it has no figure: {', '.join(self.columns) if self.columns else 'of some objective'}")
 
 
-def _indicators(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+def check_keys(keys: Iterable[str], kind: str, known: Iterable[str]) -> None:
+    """Raise ValueError that names a key which is not known."""
+    for key in keys:
+        if key not in known:
+            raise ValueError(unknown(kind, key, known))
+
+
+class Indicators(Published, tag="indicators"):
     """GD and IGD to the points of the union of all runs, and the time of a run."""
-    union, times = ground.union(), spent(ground)["time [s]"]
-    found = samples(ground, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
-    rows: dict[str, list[Figures]] = {}
-    for solver in ground.runs:
-        if solver in found["GD"]:
-            gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
-            figures = {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
-            seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
-            rows[solver] = [figures | seconds]
-    return rows
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        return {
+            "gd_mean": Column("mean GD", digits=4),
+            "gd_variance": Column("variance", digits=4),
+            "igd_mean": Column("mean IGD", digits=4),
+            "igd_variance": Column("variance", digits=4),
+            "seconds": Column("time", "s", digits=4),
+        }
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        union, times = comparison.union(), spent(comparison)["time [s]"]
+        found = samples(comparison, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
+        rows: dict[str, list[Figures]] = {}
+        for solver in comparison.runs:
+            if solver in found["GD"]:
+                gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
+                figures = {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
+                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
+                rows[solver] = [figures | seconds]
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        union = comparison.union()
+        if not len(union.front):
+            return "no run found a point."
+        scale = Scale.of(union.front, like=comparison.known, what=union.what, curve=False).describe().split(". Hypervolume")[0]
+        return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
 
 
-def _against_union(ground: Ground, paper: Mapping[str, Any]) -> str:
-    union = ground.union()
-    if not len(union.front):
-        return "no run found a point."
-    scale = Scale.of(union.front, like=ground.known, what=union.what).describe().split(". Hypervolume")[0]
-    return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
+class Hypervolume(Published, tag="hypervolume", kw_only=True):
+    """The volume up to a point in the users' units: best, median and worst of all runs; a failed run has none."""
+
+    point: Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        return {key: Column(key, digits=5) for key in ("best", "median", "worst")}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, fronts in comparison.fronts.items():
+            values = [hypervolume_at(front, self.point) for front in fronts] + [0.0] * comparison.failures.get(solver, 0)
+            if values:
+                rows[solver] = [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}]
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        goals = comparison.known.goals
+        words = ", ".join(
+            f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, self.point, strict=True)
+        )
+        best = comparison.reference(None)
+        return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
+
+    def check_problem(self, problem: CompiledProblem) -> None:
+        if len(self.point) != len(problem.goals):
+            names = ", ".join(goal.name for goal in problem.goals)
+            raise ValueError(f"point: {len(self.point)} numbers, but {len(problem.goals)} objectives: {names}")
 
 
-def _hypervolume(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
-    """The volume up to a point in the users' units: best, median and worst of all runs; a failed one has none."""
-    rows: dict[str, list[Figures]] = {}
-    for solver, fronts in ground.fronts.items():
-        values = [hypervolume_at(front, paper["point"]) for front in fronts] + [0.0] * ground.failures.get(solver, 0)
-        if values:
-            rows[solver] = [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}]
-    return rows
-
-
-def _point(ground: Ground, paper: Mapping[str, Any]) -> str:
-    goals = ground.known.goals
-    words = ", ".join(
-        f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, paper["point"], strict=True)
-    )
-    best = ground.reference(None)
-    return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, paper['point']):.5g}."
-
-
-def _over_all(ground: Ground, paper: Mapping[str, Any]) -> str:
-    """What statistics are over, and of which solvers there are none."""
-    without = [solver for solver, fronts in ground.fronts.items() if fronts and not any(map(len, fronts))]
-    none = f" No run of {', '.join(without)} has a point that counts." if without else ""
-    return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
-
-
-def _objectives(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
+class Objectives(Published, tag="objectives"):
     """Statistics of each objective over the points of all runs."""
-    return {
-        solver: _statistics({goal.name: column for goal, column in zip(ground.known.goals, values.T, strict=True)})
-        for solver, fronts in ground.fronts.items()
-        if len(values := _together(fronts))
-    }
+
+    statistics: ClassVar[bool] = True
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        return {
+            solver: _statistics({goal.name: column for goal, column in zip(comparison.known.goals, values.T, strict=True)})
+            for solver, fronts in comparison.fronts.items()
+            if len(values := _together(fronts))
+        }
+
+    def remark(self, comparison: Comparison) -> str:
+        without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
+        none = f" No run of {', '.join(without)} has a point that counts." if without else ""
+        return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
+
+
+class End(Section):
+    """A state at the end of the flight, and its target: the figure is `factor` times the distance between them."""
+
+    name: Text
+    state: Text
+    at: Number
+    unit: Text = ""
+    factor: Number = 1.0
+
+
+class Ends(Objectives, tag="ends", kw_only=True):
+    """Statistics, over the points of all runs, of the distance of final states from their targets."""
+
+    ends: Annotated[list[End], Meta(min_length=1, description="a list of tables")]
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        return {end.name: Column(end.name, end.unit, digits=4) for end in self.ends}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, runs in comparison.verified.items():
+            found = [one for one in runs if len(one.front)]
+            if found:
+                values = {end.name: np.concatenate([_final(one.ends, end) for one in found]) - end.at for end in self.ends}
+                rows[solver] = _statistics({end.name: end.factor * np.abs(values[end.name]) for end in self.ends})
+        return rows
+
+    def check_problem(self, problem: CompiledProblem) -> None:
+        known = [v.name for phase in problem.phases for v in phase.states]
+        for end in self.ends:
+            if end.state not in known:
+                raise ValueError(_no_state(end, known))
+
+    def __post_init__(self) -> None:
+        names = [end.name for end in self.ends]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"ends: '{name}' is there twice")
+        super().__post_init__()
+
+
+class Feasibility(Published, tag="feasibility"):
+    """The generations in which one and in which all of a population were feasible, and the number of points found."""
+
+    population: ClassVar[bool] = True
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        return {
+            "first_feasible": Column("first feasible, mean", digits=4),
+            "first_feasible_median": Column("median", digits=4),
+            "first_feasible_never": Column("never"),
+            "all_feasible": Column("all feasible, mean", digits=4),
+            "all_feasible_median": Column("median", digits=4),
+            "all_feasible_never": Column("never"),
+            "points": Column("not dominated, claimed", digits=4),
+            "counted": Column("points of a front that count", digits=4),
+        }
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, runs in comparison.runs.items():
+            populations = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
+            if not populations:
+                continue
+            figures: dict[str, Cell] = {}
+            count = len(populations) + comparison.failures.get(solver, 0)
+            for key in ("first_feasible", "all_feasible"):
+                reached = [one[key] for one in populations if one[key] is not None]
+                figures[key] = float(np.mean(reached)) if reached else None
+                # A run that failed, or never got there, is later than any other.
+                middle = float(np.median([*reached, *[np.inf] * (count - len(reached))]))
+                figures[f"{key}_median"] = middle if np.isfinite(middle) else None
+                figures[f"{key}_never"] = count - len(reached)
+            figures["points"] = float(np.mean([one["nondominated"] for one in populations]))
+            figures["counted"] = float(np.mean([len(one.front) for one in comparison.verified[solver]]))
+            rows[solver] = [figures]
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        return "generations from 1, the first population; means of the runs that got there; points are means of a run."
+
+
+KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility
 
 
 def _together(fronts: Sequence[Front]) -> np.ndarray:
@@ -126,140 +293,17 @@ def _together(fronts: Sequence[Front]) -> np.ndarray:
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
-    """Rows of what there is to say of samples by name."""
-    return [{"statistic": name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
+    """A row for each of `STATISTICS`, of samples by name."""
+    return [{STATISTIC: name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
 
 
-def _ends(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
-    """Statistics, over the points of all runs, of how far states are at the end from where they were to be."""
-    rows: dict[str, list[Figures]] = {}
-    for solver, runs in ground.verified.items():
-        found = [one for one in runs if len(one.front)]
-        if found:
-            errors = {}
-            for end in paper["ends"]:
-                values = np.concatenate([_end(one.ends, end) for one in found])
-                errors[end["name"]] = end.get("factor", 1.0) * np.abs(values - end["at"])
-            rows[solver] = _statistics(errors)
-    return rows
-
-
-def _end(ends: Ends, end: Mapping[str, Any]) -> np.ndarray:
-    """A state at the end of the last phase that has it."""
-    found = [states[end["state"]] for states in ends.values() if end["state"] in states]
+def _final(ends: FinalStates, end: End) -> np.ndarray:
+    """A state (n,) at the end of the last phase that has it."""
+    found = [states[end.state] for states in ends.values() if end.state in states]
     if not found:
         raise ValueError(f"paper: {_no_state(end, [name for states in ends.values() for name in states])}")
     return found[-1]
 
 
-def _fit_ends(paper: Mapping[str, Any], problem: CompiledProblem) -> None:
-    """Raise ValueError unless a problem has the states whose ends a published table has."""
-    known = [v.name for phase in problem.phases for v in phase.states]
-    for end in paper["ends"]:
-        if end["state"] not in known:
-            raise ValueError(_no_state(end, known))
-
-
-def _no_state(end: Mapping[str, Any], known: Sequence[str]) -> str:
-    return f"ends: '{end['name']}': {unknown('state', end['state'], dict.fromkeys(known))}"
-
-
-def _check_ends(ends: Any) -> None:
-    """Raise ValueError unless a published table says whose ends it has."""
-    keys = ("name", "state", "at", "unit", "factor")
-    if not isinstance(ends, Sequence) or isinstance(ends, str) or not ends:
-        raise ValueError(f"ends must be a list of tables, not {ends!r}")
-    names: list[str] = []
-    for end in ends:
-        if not isinstance(end, Mapping) or not all(key in end for key in ("name", "state", "at")):
-            raise ValueError(f"each of ends must be a table with name, state and at, not {end!r}")
-        for key, value in end.items():
-            if key not in keys:
-                raise ValueError(f"ends: {unknown('key', key, keys)}")
-            number = key in ("at", "factor")
-            if not (is_number(value) if number else isinstance(value, str)):
-                raise ValueError(f"ends: {key} must be a {'finite number' if number else 'text'}, not {value!r}")
-        if end["name"] in names:
-            raise ValueError(f"ends: '{end['name']}' is there twice")
-        names.append(end["name"])
-
-
-def _check_point(point: Any) -> None:
-    """Raise ValueError unless a point is a list of numbers."""
-    if not isinstance(point, Sequence) or not point or not all(map(is_number, point)):
-        raise ValueError(f"point must be a list of numbers, one for each objective, not {point!r}")
-
-
-def _fit_point(paper: Mapping[str, Any], problem: CompiledProblem) -> None:
-    """Raise ValueError unless a point has a number for each objective of a problem."""
-    if len(paper["point"]) != len(problem.goals):
-        names = ", ".join(goal.name for goal in problem.goals)
-        raise ValueError(f"point: {len(paper['point'])} numbers, but {len(problem.goals)} objectives: {names}")
-
-
-def _feasibility(ground: Ground, paper: Mapping[str, Any]) -> dict[str, list[Figures]]:
-    """In which generation one, and all of a population were feasible, and how many points were found; of solvers with a population."""
-    rows: dict[str, list[Figures]] = {}
-    for solver, runs in ground.runs.items():
-        told = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
-        if not told:
-            continue
-        figures: dict[str, Cell] = {}
-        runs_in_all = len(told) + ground.failures.get(solver, 0)
-        for key in ("first_feasible", "all_feasible"):
-            reached = [one[key] for one in told if one[key] is not None]
-            figures[key] = float(np.mean(reached)) if reached else None
-            # A run that failed, or never got there, is later than any other.
-            middle = float(np.median([*reached, *[np.inf] * (runs_in_all - len(reached))]))
-            figures[f"{key}_median"] = middle if np.isfinite(middle) else None
-            figures[f"{key}_never"] = runs_in_all - len(reached)
-        figures["points"] = float(np.mean([one["nondominated"] for one in told]))
-        figures["held"] = float(np.mean([len(one.front) for one in ground.verified[solver]]))
-        rows[solver] = [figures]
-    return rows
-
-
-KINDS: Mapping[str, Kind] = {
-    "indicators": Kind(
-        lambda paper: {
-            "gd_mean": Column("mean GD", digits=4),
-            "gd_variance": Column("variance", digits=4),
-            "igd_mean": Column("mean IGD", digits=4),
-            "igd_variance": Column("variance", digits=4),
-            "seconds": Column("time", "s", digits=4),
-        },
-        _indicators,
-        _against_union,
-    ),
-    "hypervolume": Kind(
-        lambda paper: {key: Column(key, digits=5) for key in ("best", "median", "worst")},
-        _hypervolume,
-        _point,
-        needs={"point": _check_point},
-        fits=_fit_point,
-    ),
-    "objectives": Kind(lambda paper: None, _objectives, _over_all, statistics=True),
-    "ends": Kind(
-        lambda paper: {end["name"]: Column(end["name"], end.get("unit", ""), digits=4) for end in paper["ends"]},
-        _ends,
-        _over_all,
-        statistics=True,
-        needs={"ends": _check_ends},
-        fits=_fit_ends,
-    ),
-    "feasibility": Kind(
-        lambda paper: {
-            "first_feasible": Column("first feasible, mean", digits=4),
-            "first_feasible_median": Column("median", digits=4),
-            "first_feasible_never": Column("never"),
-            "all_feasible": Column("all feasible, mean", digits=4),
-            "all_feasible_median": Column("median", digits=4),
-            "all_feasible_never": Column("never"),
-            "points": Column("not dominated, claimed", digits=4),
-            "held": Column("points of a front that count", digits=4),
-        },
-        _feasibility,
-        lambda ground, paper: "generations from 1, the first population; means of the runs that got there; points are means of a run.",
-        population=True,
-    ),
-}
+def _no_state(end: End, known: Sequence[str]) -> str:
+    return f"ends: '{end.name}': {unknown('state', end.state, dict.fromkeys(known))}"

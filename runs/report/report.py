@@ -1,46 +1,57 @@
-"""The report on a study's folder: tables as text, CSV and LaTeX, figures as PNG and PDF, all from what is in the folder."""
+"""The report on a study's folder: tables as text, CSV and LaTeX, figures as PNG and PDF, computed from the files in the folder."""
 
 from __future__ import annotations
 
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
 
-from ..batch import file as studyfile
 from ..batch.store import Store, summary_text
+from ..data.addresses import check_trusted
+from ..data.schema import Flag, Text, checked, errors_begin_with
 from ..measures.attainment import attainment
-from ..measures.references import Reference, read
-from ..measures.scale import Scale
-from ..measures.statistics import summarise
-from .changed_data import Changed, changes
-from .comparison import Ground, grounds
+from ..measures.references import ReferenceKey, read, reference_addresses
+from .changed_data import ChangedData, changed_data
+from .comparison import Comparison, comparisons
+from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Flights
-from .goal import Attained, attained
+from .goal import Goal, GoalAttainment, goal_attainments
 from .plots import attainment_figure, convergence_figure, front_figure
-from .published import check, published_tables
-from .run_measures import AXES, histories, samples, spent
-from .statistics_tables import comparison_table, overall_table, summary_table
-from .tables import Cell, Column, Table, table
-from .verified import claims_table
+from .published import papers, published_tables
+from .run_measures import AXES, histories
+from .tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLDER = "report"
+TABLES: Sequence[Callable[[Comparison, Mapping[str, Any]], dict[str, Table]]] = (claims_tables, indicator_tables, cost_tables)
+"""The tables of each comparison: (comparison, definition of the study) -> {name of a file: table}. A new table is one more here."""
+
+
+class ReportKeys(msgspec.Struct):
+    """The keys of a study that only its report reads; those with rules of their own are checked where they are used."""
+
+    reference: ReferenceKey = None
+    nominal: Text | None = None
+    flights: Flag = True
+    note: Text = ""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What was found, and where it was written.
+    """The text of a report, and the files that were written.
 
     Attributes
     ----------
@@ -62,160 +73,136 @@ def report(
     foreign: Mapping[str, Sequence[str | PathLike[str]]] | None = None,
     figures: bool = True,
     progress: bool = False,
+    trust: bool = False,
 ) -> Report:
-    """Measure all finished runs of a study, and write tables and figures into the folder `report` in it.
+    """The report on all finished runs of a study: its tables and figures are written into the folder `report` in the study's folder.
 
     Parameters
     ----------
     out : path
-        The study's folder. Runs that are missing, failed or unreadable are told of, and do not keep the others from being reported.
+        The study's folder. Missing, failed and unreadable runs are counted in the report, and left out of its measures or counted as
+        failures.
     foreign : {name: files}, optional
-        Fronts of other programs that join in, a file for each run: CSV tables of objectives, or saved fronts; on the problem whose
+        Fronts of other programs to compare with, a file for each run: CSV tables of objectives, or saved fronts; on the problem whose
         objectives they have.
     figures : bool
-        Draw, too, which takes most of the time.
+        Whether figures are drawn, which takes most of the time.
     progress : bool
-        Tell on the terminal how far it is.
+        Whether the terminal shows the progress.
+    trust : bool
+        Whether addresses in the folder's files may be loaded that are not in the catalogue: that runs the code they name.
 
     Raises
     ------
     ValueError
-        The folder holds no study, or no finished run; a reference or foreign front cannot be read.
+        The folder contains no study, or no finished run; a reference or foreign front cannot be read; an address is not trusted.
     OSError
         A file cannot be written.
     """
-    store = Store.open(out)
-    summary = store.summary()
+    store = Store.open(out, trust)
+    summary, study = store.summary(), store.definition
     if not summary.finished:
         raise ValueError(f"there is nothing to report on yet\n{summary_text(summary)}")
-    papers = store.definition.get("paper") or []
-    with studyfile.told(f"'{out}' holds a study of an earlier MACS, or a damaged one; run the study again, which keeps what is finished"):
-        check(papers)
-    found = grounds(store, {})
+    with errors_begin_with(f"'{store.path / 'study.json'}'"):
+        keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
+        published = papers(study.get("paper") or [])
+        if study.get("goal") is not None:
+            Goal.of(study["goal"], {})
+        for address in reference_addresses(keys.reference):
+            check_trusted(address, trust, "it")
+    found = comparisons(store, {})
     others = {name: [_foreign(path, found) for path in paths] for name, paths in (foreign or {}).items()}
     if others:
-        found = grounds(store, others)
+        found = comparisons(store, others)
     writer = _Writer(Path(out) / FOLDER)
-    sections = [summary_text(summary), *([note] if (note := store.definition.get("note")) else [])]
-    for ground in _told(found) if progress else found:
-        sections += _section(ground, store.definition, writer, figures)
-    across: list[Attained | Changed] = [
-        *attained(found, store.definition.get("goal"), store.definition.get("verify")),
-        *changes(found, store.definition.get("nominal"), store.definition.get("verify")),
-    ]
+    sections = [summary_text(summary), *([keys.note] if keys.note else [])]
+    for comparison in _shown(found) if progress else found:
+        sections += _section(comparison, study, writer, figures)
+    across: list[GoalAttainment | ChangedData] = [*goal_attainments(found, study), *changed_data(found, study)]
     for part in across:
         sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(_plain(name), figure)
-    sections += [writer.table(name, one) for name, one in published_tables(found, papers).items()]
+    sections += [writer.table(name, one) for name, one in published_tables(found, published).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
     return Report(text, tuple(writer.files))
 
 
-def _told(found: Sequence[Ground]) -> Iterator[Ground]:
-    """One after the other, telling on the terminal which."""
+def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
+    """The comparisons one by one; the terminal shows which one is in progress."""
     with Steps("report", len(found)) as steps:
-        for ground in found:
-            steps.begin(ground.name)
-            yield ground
+        for comparison in found:
+            steps.begin(comparison.name)
+            yield comparison
 
 
-def _section(ground: Ground, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
-    """Write what there is of a ground of a study with this definition; returns its tables as text."""
-    reference, verify = ground.reference(study.get("reference")), study.get("verify")
-    told = [f"{ground.name}\n{'=' * len(ground.name)}", *_left_out(ground)]
-    tables, figures = _tables(ground, reference, verify), _figures(ground, reference) if drawn else {}
-    flights = Flights.of(ground, reference) if study.get("flights", True) else None
+def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
+    """The tables of a comparison as text, written to files with its figures."""
+    tables = {name: one for tables_of in TABLES for name, one in tables_of(comparison, study).items()}
+    figures = _figures(comparison) if drawn else {}
+    flights = Flights.of(comparison) if study.get("flights", True) else None
     if flights is not None:
         tables["representatives"] = flights.table()
         figures |= flights.figures() if drawn else {}
-    told += [writer.table(f"{_stem(ground)}-{name}", one) for name, one in tables.items()]
+    texts = [writer.table(f"{_stem(comparison)}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():
-        writer.figure(f"{_stem(ground)}-{name}", figure)
-    return told
+        writer.figure(f"{_stem(comparison)}-{name}", figure)
+    return [f"{comparison.name}\n{'=' * len(comparison.name)}", *_left_out(comparison), *texts]
 
 
-def _foreign(path: str | PathLike[str], found: Sequence[Ground]) -> Front:
-    """A front of another program, of the first problem whose objectives it has."""
+def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:
+    """A front of another program, with the objectives of the first problem that they fit. Its problem is never loaded."""
     reasons = []
-    for ground in found:
+    for comparison in found:
         try:
-            return read(path, ground.known.goals)
+            return read(path, comparison.known.goals)
         except ValueError as error:
             reasons.append(str(error))
     raise ValueError("; ".join(dict.fromkeys(reasons)))
 
 
-def _stem(ground: Ground) -> str:
-    return _plain(f"{ground.problem}-{ground.transcription}")
+def _stem(comparison: Comparison) -> str:
+    return _plain(f"{comparison.problem}-{comparison.transcription}")
 
 
 def _plain(name: str) -> str:
-    """For a file."""
+    """A name as part of the name of a file."""
     return re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
 
 
-def _left_out(ground: Ground) -> list[str]:
-    told = [f"{solver}: {count} failed, which count as worse than any" for solver, count in ground.failures.items() if count]
-    told += [f"{solver}: {count} missing, killed or unreadable, which are left out" for solver, count in ground.left_out.items() if count]
-    told += [] if any(map(len, ground.every)) else ["no run found a point that counts"]
-    return ["\n".join(told)] if told else []
-
-
-def _tables(ground: Ground, reference: Reference, verify: float | None) -> dict[str, Table]:
-    """Name of a file -> table."""
-    found: dict[str, Table] = {}
-    if verify is not None:
-        found["claims"] = claims_table(ground.verified, verify, f"{ground.name}: what was claimed, and what holds.")
-    for name, against in {"indicators": reference, "indicators-union": ground.union()}.items():
-        if not len(against.front) or (name != "indicators" and not reference.true):
-            continue
-        measured = samples(ground, against)
-        scale = Scale.of(against.front, like=ground.known, what=against.what).describe()
-        title = f"{ground.name}: against {against.what}"
-        found[name] = summary_table(measured, caption=f"{title}.", notes=[scale])
-        if against is reference and len(measured["GD"]) > 1:
-            found["comparisons"] = comparison_table(measured, caption=f"{title}: solvers in pairs.")
-            if len(measured["GD"]) > 2:
-                found["overall"] = overall_table(measured, caption=f"{title}: all solvers.")
-    costs: list[list[Cell]] = [
-        [cost, solver, summary.count, summary.mean, summary.median, summary.best, summary.worst]
-        for cost, solvers in spent(ground).items()
-        for solver, values in solvers.items()
-        for summary in [summarise(values)]
+def _left_out(comparison: Comparison) -> list[str]:
+    lines = [f"{solver}: {count} failed, which count as worse than any" for solver, count in comparison.failures.items() if count]
+    lines += [
+        f"{solver}: {count} missing, killed or unreadable, which are left out" for solver, count in comparison.left_out.items() if count
     ]
-    heads: list[Column | str] = [
-        Column("spent", grouped=True),
-        "solver",
-        "runs",
-        *(Column(name, digits=4) for name in ("mean", "median", "least", "most")),
-    ]
-    found["spent"] = table(heads, costs, f"{ground.name}: what a run spent.")
-    return found
+    lines += [] if any(map(len, comparison.every)) else ["no run found a point that counts"]
+    return ["\n".join(lines)] if lines else []
 
 
-def _figures(ground: Ground, reference: Reference) -> dict[str, Figure]:
-    """Name of a file -> figure."""
+def _figures(comparison: Comparison) -> dict[str, Figure]:
+    """{name of a file: figure} of a comparison."""
+    reference = comparison.against
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = {}
     if not len(reference.front):
         return found
-    if len(ground.known.goals) > 1:
-        found["fronts"] = front_figure(ground.fronts, reference=reference.front, truth_name=name)
+    if len(comparison.known.goals) > 1:
+        found["fronts"] = front_figure(comparison.fronts, reference=reference.front, truth_name=name)
     # A failed run attains nothing, as an empty front does.
-    nothing = ground.known[:0]
-    runs = {solver: [*fronts, *[nothing] * ground.failures.get(solver, 0)] for solver, fronts in ground.fronts.items()}
-    if len(ground.known.goals) == 2:
+    nothing = comparison.known[:0]
+    runs = {solver: [*fronts, *[nothing] * comparison.failures.get(solver, 0)] for solver, fronts in comparison.fronts.items()}
+    if len(comparison.known.goals) == 2:
         surfaces = {solver: attainment(fronts) for solver, fronts in runs.items() if any(map(len, fronts))}
         if surfaces:
-            found["attainment"] = attainment_figure(surfaces, goals=ground.known.goals, reference=reference.front, truth_name=name)
+            found["attainment"] = attainment_figure(surfaces, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     for indicator, larger in (("IGD", False), ("hypervolume", True)):
         for axis, (_, label) in AXES.items():
-            told = histories(ground, reference, indicator, axis)
-            if told:
+            runs_so_far = histories(comparison, reference, indicator, axis)
+            if runs_so_far:
                 stem = f"{indicator.lower()}-over-{axis.replace(' ', '-')}"
-                found[stem] = convergence_figure(told, xlabel=label, ylabel=f"{indicator} (normalised)", larger=larger, log=not larger)
+                ylabel = f"{indicator} (normalised)"
+                found[stem] = convergence_figure(runs_so_far, xlabel=label, ylabel=ylabel, larger=larger, log=not larger)
     return found
 
 
@@ -242,7 +229,7 @@ class _Writer:
             self.write(f"{stem}.{suffix}", content.getvalue())
 
     def _free(self, kind: str, stem: str) -> str:
-        """A name that no other table, or figure, has: labels may differ in what file names do not show."""
+        """A name that no other table, or figure, has: labels may differ only in characters that file names do not have."""
         self._used[kind, stem] += 1
         return stem if self._used[kind, stem] == 1 else f"{stem}-{self._used[kind, stem]}"
 

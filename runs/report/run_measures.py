@@ -1,4 +1,4 @@
-"""Every run of a ground in numbers: its indicators in the end and along the way, and what it spent."""
+"""Measures of every run of a comparison: its indicators in the end and over its samples, and its costs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 from macs.front import Front
 
-from ..batch.store import Run
+from ..batch.store import StoredRun
 from ..measures.convergence import History
 from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
 from ..measures.references import Reference
-from .comparison import Ground
+from .comparison import Comparison
 
 INDICATORS: Mapping[str, Callable[..., float]] = {
     "GD": gd,
@@ -22,13 +22,13 @@ INDICATORS: Mapping[str, Callable[..., float]] = {
     "additive epsilon": additive_epsilon,
 }
 CURVED = ("GD", "IGD", "IGD+")
-"""Those that take a dense reference for a curve, unless told not to."""
+"""Indicators that take a dense reference for a curve, unless `curve` is False."""
 AXES: Mapping[str, tuple[str, str]] = {
     "evaluations": ("evaluations", "evaluations"),
     "inner iterations": ("inner_iterations", "inner iterations"),
     "time": ("elapsed", "time [s]"),
 }
-"""What a run spends: where its history has it, and the label of an axis."""
+"""{cost: its column in a history, and the label of its axis}."""
 
 
 def indicator(name: str, points: Front | np.ndarray, reference: Reference, *, curve: bool = True) -> float:
@@ -37,20 +37,20 @@ def indicator(name: str, points: Front | np.ndarray, reference: Reference, *, cu
     return INDICATORS[name](points, reference.front, **options)
 
 
-def samples(ground: Ground, reference: Reference, *, curve: bool = True) -> dict[str, dict[str, list[float]]]:
-    """Indicator -> solver -> a value for each run, NaN for one that failed."""
+def samples(comparison: Comparison, reference: Reference, *, curve: bool = True) -> dict[str, dict[str, list[float]]]:
+    """{indicator: {solver: a value for each run}}, NaN for a run that failed."""
     return {
         name: {
-            solver: [indicator(name, front, reference, curve=curve) for front in fronts] + [np.nan] * ground.failures.get(solver, 0)
-            for solver, fronts in ground.fronts.items()
-            if len(fronts) + ground.failures.get(solver, 0)
+            solver: [indicator(name, front, reference, curve=curve) for front in fronts] + [np.nan] * comparison.failures.get(solver, 0)
+            for solver, fronts in comparison.fronts.items()
+            if len(fronts) + comparison.failures.get(solver, 0)
         }
         for name in INDICATORS
     }
 
 
-def spent(ground: Ground) -> dict[str, dict[str, list[float]]]:
-    """Cost -> solver -> a value for each finished run."""
+def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
+    """{cost: {solver: a value for each finished run}}."""
     keys = {
         "evaluations": "evaluations",
         "inner iterations": "inner_iterations",
@@ -58,22 +58,22 @@ def spent(ground: Ground) -> dict[str, dict[str, list[float]]]:
         "time [s]": "wall_time",
     }
     return {
-        name: {solver: [float(run.front.stats[key]) for run in runs] for solver, runs in ground.runs.items() if runs}
+        name: {solver: [float(run.front.stats[key]) for run in runs] for solver, runs in comparison.runs.items() if runs}
         for name, key in keys.items()
     }
 
 
-def histories(ground: Ground, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:
-    """Solver -> of each run whose history is known, what it had spent and the indicator then."""
+def histories(comparison: Comparison, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:
+    """{solver: histories} of an indicator over a cost, of the runs whose history is known."""
     key, _ = AXES[axis]
     return {
-        solver: told
-        for solver, runs in ground.runs.items()
-        if (told := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
+        solver: known
+        for solver, runs in comparison.runs.items()
+        if (known := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
     }
 
 
-def _history(run: Run, reference: Reference, name: str, key: str) -> History:
+def _history(run: StoredRun, reference: Reference, name: str, key: str) -> History:
     signs = np.array([goal.sign for goal in reference.front.goals])
     values = [indicator(name, np.reshape(F, (-1, len(signs))) * signs, reference) for F in run.history["F"]]
     return np.array(run.history[key], dtype=float), np.array(values)

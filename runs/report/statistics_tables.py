@@ -1,4 +1,4 @@
-"""The tables of a report's statistics: for one problem, each indicator of each solver over its runs, and who differs from whom."""
+"""Tables of statistics: each indicator of each solver over its runs, and tests of their differences."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from ..measures.statistics import Comparison, overall, pairwise, summarise
+from ..measures.statistics import PairTest, overall, pairwise, summarise
 from .tables import Cell, Column, Table, table
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]
@@ -28,45 +28,40 @@ def summary_table(
                 [indicator, solver, s.count, s.failures, s.mean, s.variance, s.median, s.lower, s.upper, s.best, s.worst],
             )
     failed = any(row[3] for row in rows)
-    told = [f"Variance with divisor n - {ddof}." if ddof else "Variance with divisor n."]
-    told += ["Mean and variance are of the runs that did not fail; in all other columns failed runs are worse than any."] if failed else []
+    lines = [f"Variance with divisor n - {ddof}." if ddof else "Variance with divisor n."]
+    lines += ["Mean and variance are of the runs that did not fail; in all other columns failed runs are worse than any."] if failed else []
     heads = [Column(name, digits=4) for name in ("median", "lower quartile", "upper quartile", "best", "worst")]
     first: list[Column | str] = [Column("indicator", grouped=True), "solver", "runs", "failed", Column("mean", digits=4), "variance"]
-    return table([*first, *heads], rows, caption, [*told, *notes])
+    return table([*first, *heads], rows, caption, [*lines, *notes])
 
 
-def comparison_table(
-    samples: Samples, *, paired: bool = False, larger: Collection[str] = LARGER, caption: str = "", notes: Sequence[str] = ()
-) -> Table:
+def pairs_table(samples: Samples, *, larger: Collection[str] = LARGER, caption: str = "", notes: Sequence[str] = ()) -> Table:
     """A row for each indicator and pair of solvers: p, p after Holm's correction, effect, and which of the two is better if any."""
     rows: list[list[Cell]] = []
-    found: list[Comparison] = []
+    found: list[PairTest] = []
     for indicator, solvers in samples.items():
-        for c in pairwise(solvers, paired=paired, larger=indicator in larger):
+        for c in pairwise(solvers, larger=indicator in larger):
             found.append(c)
             rows.append([indicator, c.first, c.second, c.p, c.p_holm, c.a12, c.effect, _better(c)])
     heads: list[Column | str] = [Column("indicator", grouped=True), Column("first", grouped=True), "second"]
     heads += ["p", "p (Holm)", "A12", "effect", "better"]
-    told = [
+    lines = [
         f"{found[0].test if found else 'No test'}, two-sided; Holm's correction over the pairs of an indicator. "
         "A12: probability that a run of the first is better than one of the second, ties half."
     ]
-    told += list(dict.fromkeys(c.note[0].upper() + c.note[1:] + "." for c in found if c.note))
-    return table(heads, rows, caption, [*told, *notes])
+    lines += list(dict.fromkeys(c.note[0].upper() + c.note[1:] + "." for c in found if c.note))
+    return table(heads, rows, caption, [*lines, *notes])
 
 
-def overall_table(
-    samples: Samples, *, paired: bool = False, larger: Collection[str] = LARGER, caption: str = "", notes: Sequence[str] = ()
-) -> Table:
+def overall_table(samples: Samples, *, larger: Collection[str] = LARGER, caption: str = "", notes: Sequence[str] = ()) -> Table:
     """A row for each indicator: whether any solver differs, and the average rank of each of them."""
-    found = {indicator: overall(solvers, paired=paired, larger=indicator in larger) for indicator, solvers in samples.items()}
+    found = {indicator: overall(solvers, larger=indicator in larger) for indicator, solvers in samples.items()}
     names = list(dict.fromkeys(name for one in found.values() for name in one.ranks))
     rows = [[indicator, one.statistic, one.p, *(one.ranks.get(name) for name in names)] for indicator, one in found.items()]
     test = next((one.test for one in found.values()), "No test")
-    within = "within a run" if paired else "among all runs"
-    told = f"{test}, with average ranks {within}; 1 is the best."
-    return table(["indicator", "statistic", "p", *(f"rank of {name}" for name in names)], rows, caption, [told, *notes])
+    note = f"{test}, with average ranks among all runs; 1 is the best."
+    return table(["indicator", "statistic", "p", *(f"rank of {name}" for name in names)], rows, caption, [note, *notes])
 
 
-def _better(c: Comparison, alpha: float = 0.05) -> str:
+def _better(c: PairTest, alpha: float = 0.05) -> str:
     return "neither" if c.p_holm > alpha else c.first if c.a12 > 0.5 else c.second

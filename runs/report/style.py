@@ -1,4 +1,4 @@
-"""How figures for papers look: widths, letters and legends."""
+"""Style of figures for papers: widths, fonts and legends."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
-    """What is drawn in the axes: within them where there is a place for it and there are few, else above them."""
+    """The legend of the axes: inside them at `place` if it has few entries, else above them."""
     handles, names = ax.get_legend_handles_labels()
     look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
     if place and len(names) <= 4:

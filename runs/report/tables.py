@@ -1,4 +1,4 @@
-"""One table, three ways to write it: as text for terminals, as CSV for programs, as LaTeX (booktabs) for papers."""
+"""Tables, written as text for terminals, as CSV for programs and as LaTeX (booktabs) for papers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from macs.io.text import text_table
 COUNTED = 1e9
 """Whole numbers below are written in full."""
 Cell = str | float | int | None
-"""What stands in a table: words, a number, or None where there is nothing to say."""
+"""An entry of a table: text, a number, or None if there is none."""
 
 ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -94,7 +94,7 @@ class Table:
         return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *self._below()])
 
     def csv(self) -> str:
-        """One header line and the numbers in full; nothing is left blank but what is not there. Caption and notes are not in it."""
+        """CSV: one header line, numbers in full, empty cells only where there is no value; without caption and notes."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow([label(column.title, column.unit) for column in self.columns])
@@ -125,7 +125,7 @@ class Table:
         return paths
 
     def _left(self) -> list[bool]:
-        """Columns that hold words are flush left."""
+        """Whether each column is flush left: columns with text are."""
         return [any(isinstance(row[i], str) for row in self.rows) for i in range(len(self.columns))]
 
     def _shown(self) -> list[list[Cell]]:
@@ -145,7 +145,7 @@ class Table:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Significant digits, as a person would write them: large whole numbers, mostly counts, in full; NaN is a dash."""
+    """A number with significant digits; large whole numbers, usually counts, in full; NaN is a dash."""
     if np.isnan(value):
         return "-"
     if np.isinf(value):

@@ -1,4 +1,4 @@
-"""`python -m runs.truths CASE`: the reference front of a case, made anew."""
+"""`python -m runs.truths CASE`: compute the reference front of a case again."""
 
 from .reentry import main
 

@@ -1,14 +1,15 @@
-"""The true fronts of the re-entry cases, as far as gradients find them: how the tables beside the cases were made.
+"""Reference fronts of the re-entry cases by gradients: the program that made the tables beside the cases.
 
     python -m runs.truths reentry_case1 [--points 120] [--out FILE.csv]
 
 Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
-commands that are linear on each element, with limits a little narrower than the case's own. Its commands, rounded as the table has them,
-are flown again by DOP853; the objectives of the table are those that were flown, and what then exceeds a limit of the case by more than
-1 % is left out. Half of the places lie within the corner in which the paper measures hypervolume. The first solves begin at the guess; in
-a harder case, at those flights of the first one that are feasible there too. These are optimal there as well, and are taken over, and they
-pass all zones on a side that is open: a start with a zone in its way seldom leads anywhere. The first case takes over in turn what its own
-flights do not dominate of the other tables, all of which is feasible in it.
+controls that are linear on each element, with limits a little narrower than the case's own. Its controls, rounded as in the table, are
+simulated by DOP853. The objectives of the table are those simulated; points that then exceed a limit of the case by more than 1 % are left
+out. Half of the places lie within the corner in which the paper measures hypervolume.
+
+The first solves begin at the guess. In a harder case they begin at those points of the first case that are feasible there too: these are
+optimal there as well and are taken over, and they pass all zones on a side that is open, while a start with a zone in its way is seldom
+solved. The first case in turn takes over those points of the other tables that its own do not dominate; all of them are feasible in it.
 """
 
 from __future__ import annotations
@@ -42,12 +43,12 @@ METHOD = DFET(60, 2, control_order=1, basis="bernstein")
 CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
 """Where the paper measures hypervolume from, minimised."""
 NARROWER, NEARER = 0.98, 0.7
-"""Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, times the case's own: what the mesh leaves open
-between its nodes."""
+"""Limits (that of the load, which is the sharpest, twice) and tolerances of the solves, as factors of the case's own: a margin for
+the errors of the mesh between its nodes."""
 ALIKE = 1e-2
 """Flights whose objectives differ by less than this part of their ranges are one."""
 ALLOWED = 0.01
-"""What a flight may exceed of a limit, or of a tolerance at the end."""
+"""Share by which a flight may exceed a limit, or a tolerance at the end."""
 DIGITS = 2
 """Of the commands, in degrees."""
 DIVISIONS, BEYOND = 12, 1.3
@@ -55,8 +56,8 @@ DIVISIONS, BEYOND = 12, 1.3
 RTOL = 1e-8
 
 
-class Unsolved(RuntimeError):  # noqa: N818 - nobody's error
-    """Gradients did not find an end of the front, without which nobody knows where it lies."""
+class Unsolved(RuntimeError):  # noqa: N818 - a result of the search, not a mistake in the program
+    """Gradients did not find an end of the front, which is needed to locate it."""
 
 
 class Truth:
@@ -97,9 +98,9 @@ class Truth:
         for row in rows:
             steps.begin(f"cross-range {row[0]:.2f}")
             if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
-                flown = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
-                if self.feasible(flown):
-                    z = self.nlp.interpolate(flown.trajectory)
+                simulated = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
+                if self.feasible(simulated):
+                    z = self.nlp.interpolate(simulated.trajectory)
                     self.found.append(Solved(z, row[:4] * SIGNS, float(self.nlp.evaluate(z[None])[1][0]), CONVERGED, 0))
         print(f"{len(self.found)} of {len(rows)} flights of {EASIEST} are feasible")
 
@@ -154,25 +155,25 @@ class Truth:
         return self.found[int(np.argmin(merit))].z
 
     def rows(self, steps: Steps) -> list[np.ndarray]:
-        """Flown: objectives as the user sees them, and commands in degrees; without what is dominated or exceeds a limit, (k, 4 + n)."""
+        """Simulated points (k, 4 + n): objectives as the user sees them and controls in degrees; none dominated or beyond a limit."""
         F = np.array([solved.F for solved in self.found])
         kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
         kept = kept[apart(F[kept])]
-        told, broken = [], 0
+        rows, infeasible = [], 0
         for k in kept:
             steps.begin(f"flight {k}")
             trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
-            flown = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
-            if self.feasible(flown):
-                told.append(np.array([*flown.objectives.values(), *commands]))
+            simulated = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
+            if self.feasible(simulated):
+                rows.append(np.array([*simulated.objectives.values(), *commands]))
             else:
-                broken += 1
-        print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {broken} of these not feasible as flown")
-        return told
+                infeasible += 1
+        print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {infeasible} of these not feasible as simulated")
+        return rows
 
-    def feasible(self, flown: Simulation) -> bool:
+    def feasible(self, simulated: Simulation) -> bool:
         """Whether a flight exceeds no limit by more than is allowed."""
-        return flown.violation <= ALLOWED
+        return simulated.violation <= ALLOWED
 
 
 SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
@@ -220,7 +221,7 @@ def made(case: str, points: int) -> np.ndarray:
     with Steps(case, 4 * len(windows) + points) as steps:
         for window in windows:
             truth.fill(steps, points // len(windows), window)
-    with Steps(f"{case}, flown", len(truth.found)) as steps:
+    with Steps(f"{case}, simulated", len(truth.found)) as steps:
         rows = truth.rows(steps)
     if case == EASIEST:
         for harder in CASES:
@@ -229,7 +230,7 @@ def made(case: str, points: int) -> np.ndarray:
 
 
 def table(case: str) -> np.ndarray:
-    """What is known of a case (k, 4 + n)."""
+    """The table of a case (k, 4 + n)."""
     with files("problems.cases.reentry").joinpath(f"{case.removeprefix('reentry_')}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
@@ -242,7 +243,7 @@ def united(rows: list[np.ndarray]) -> np.ndarray:
 
 
 def text(case: str, rows: np.ndarray) -> str:
-    """The table with a header that says what it is."""
+    """The table as text, with a header."""
     head = [
         f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
         f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.pareto.directions import draw, normalised, pool, simplex_lattice, tchebycheff
+from macs.pareto.directions import draw, pool, simplex_lattice, tchebycheff
+from macs.pareto.ranges import normalised
 
 
 @given(st.integers(1, 6), st.integers(1, 300))

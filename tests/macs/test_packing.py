@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections import Counter
 from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Optional
 
 import hypothesis.extra.numpy as hnp
@@ -13,6 +16,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from macs.solvers import checkpoint_file
 from macs.solvers.packing import BIT_GENERATORS, pack, unpack
 
 
@@ -102,12 +106,15 @@ def assert_same(one: Any, two: Any) -> None:
 
 
 def through_file(value: Any, kind: Any) -> Any:
-    from macs.solvers.checkpoint import _from_bytes, _to_bytes
-
-    arrays: list[np.ndarray] = []
-    header = {"format": "MACS checkpoint", "version": 1, "state": pack(value, kind, arrays)}
-    header, arrays = _from_bytes(_to_bytes(header, arrays))
-    return unpack(header["state"], kind, arrays)
+    arrays: dict[str, np.ndarray] = {}
+    tree = pack(value, kind, arrays, "state")
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "run.ckpt"
+        file.write_bytes(checkpoint_file.to_bytes({"state": tree}, arrays))
+        document, arrays = checkpoint_file.read(file)
+    value = unpack(document["state"], kind, arrays, "state")
+    assert not arrays
+    return value
 
 
 @settings(max_examples=60, deadline=None)
@@ -128,10 +135,17 @@ def test_what_is_packed_comes_back_to_the_bit(tree: Tree) -> None:
 
 
 def test_a_packed_array_is_a_copy() -> None:
-    array, arrays = np.zeros(3), []
-    pack(array, np.ndarray, arrays)
+    array, arrays = np.zeros(3), {}
+    pack(array, np.ndarray, arrays, "it")
     array[:] = 1
-    assert not arrays[0].any()
+    assert not arrays["it"].any()
+
+
+def test_one_array_in_two_fields_comes_back_as_two() -> None:
+    array = np.zeros(2)
+    leaf = through_file(Leaf(array, 1.0, 1, True, "a", array), Leaf)
+    leaf.array[:] = 1
+    assert leaf.maybe is not None and not leaf.maybe.any()
 
 
 def test_scalars_of_numpy_come_back_as_pythons() -> None:
@@ -174,7 +188,7 @@ LEAF = {"array": np.zeros(2), "number": 1.0, "whole": 1, "flag": True, "word": "
 )
 def test_what_is_no_state_is_refused(value: Any, message: str) -> None:
     with pytest.raises(TypeError, match=message):
-        pack(value, type(value), [], "state")
+        pack(value, type(value), {}, "state")
 
 
 def test_a_generator_of_unknown_kind_is_refused() -> None:
@@ -182,7 +196,7 @@ def test_a_generator_of_unknown_kind_is_refused() -> None:
         pass
 
     with pytest.raises(TypeError, match="rng draws from Own"):
-        pack(np.random.Generator(Own(1)), np.random.Generator, [], "rng")
+        pack(np.random.Generator(Own(1)), np.random.Generator, {}, "rng")
 
 
 @pytest.mark.parametrize(
@@ -197,8 +211,8 @@ def test_a_generator_of_unknown_kind_is_refused() -> None:
     ],
 )
 def test_a_tree_that_does_not_fit_is_refused(change: dict, message: str) -> None:
-    arrays: list[np.ndarray] = []
-    tree = pack(Leaf(**LEAF), Leaf, arrays) | change
+    arrays: dict[str, np.ndarray] = {}
+    tree = pack(Leaf(**LEAF), Leaf, arrays, "state") | change
     with pytest.raises(TypeError, match=message):
         unpack({key: value for key, value in tree.items() if value is not ...}, Leaf, arrays, "state")
 
@@ -208,4 +222,24 @@ def test_a_tree_that_does_not_fit_is_refused(change: dict, message: str) -> None
 )
 def test_what_is_no_generator_is_refused(tree: Any) -> None:
     with pytest.raises(TypeError, match="rng is no generator"):
-        unpack(tree, np.random.Generator, [], "rng")
+        unpack(tree, np.random.Generator, {}, "rng")
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("PCG64", lambda tree: tree["seeds"].update(pool_size=10**12)),  # would fill the memory
+        ("PCG64", lambda tree: tree["seeds"].update(entropy=None)),  # would be drawn anew
+        ("PCG64", lambda tree: tree["seeds"].update(n_children_spawned=-1)),
+        ("PCG64", lambda tree: tree["state"]["state"].update(inc="one")),
+        ("MT19937", lambda tree: tree["state"]["state"].update(pos=625)),  # would be read past its end
+        ("MT19937", lambda tree: tree["state"]["state"].update(key=[1, 2])),
+        ("Philox", lambda tree: tree["state"].update(buffer_pos=-1)),
+    ],
+)
+def test_a_forged_generator_is_refused(name: str, change: Any) -> None:
+    tree = json.loads(json.dumps(pack(generator(name, 1, 3), np.random.Generator, {}, "rng")))
+    unpack(tree, np.random.Generator, {}, "rng")
+    change(tree)
+    with pytest.raises(TypeError, match="rng is no generator"):
+        unpack(tree, np.random.Generator, {}, "rng")

@@ -27,11 +27,11 @@ def test_the_longest_ascent_has_the_speed_of_the_literature():
 
 
 @pytest.mark.parametrize("tf", [110.0, 120.0, 150.0, 190.0, 250.0])
-def test_the_closed_form_is_the_linear_tangent_law_flown(tf):
-    """tan u = c0 - c1 t, its two constants by shooting, flown by scipy."""
+def test_the_closed_form_is_the_linear_tangent_law_simulated(tf):
+    """tan u = c0 - c1 t, its two constants by shooting, simulated by scipy."""
     a, g, h = goddard.THRUST, goddard.GRAVITY, goddard.HEIGHT
 
-    def fly(c):
+    def simulated(c):
         def rates(t, state):
             u = math.atan(c[0] - c[1] * t)
             return [a * math.cos(u), state[2], a * math.sin(u) - g]
@@ -39,10 +39,10 @@ def test_the_closed_form_is_the_linear_tangent_law_flown(tf):
         return solve_ivp(rates, (0, tf), [0, 0, 0], rtol=1e-11, atol=1e-13, max_step=tf / 50).y[:, -1]
 
     guess = {110.0: (13, 0.17), 120.0: (4.3, 0.058)}.get(tf, (2.0, 2.6 / tf))
-    c, _, found, _ = fsolve(lambda c: np.array([fly(c)[1] / h - 1, fly(c)[2]]), guess, xtol=1e-12, full_output=True)
+    c, _, found, _ = fsolve(lambda c: np.array([simulated(c)[1] / h - 1, simulated(c)[2]]), guess, xtol=1e-12, full_output=True)
     assert found == 1
     front = goddard.reference(points=4001, longest=tf)
-    assert front[-1] == pytest.approx([tf, fly(c)[0]], rel=1e-8)
+    assert front[-1] == pytest.approx([tf, simulated(c)[0]], rel=1e-8)
 
 
 def test_the_reference_is_a_front():

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from problems import Problem, describe, load, names
+from problems import Problem, describe, is_catalogued, load, names
 from transcription import parse
 
 CASE = """
@@ -131,6 +131,41 @@ def test_what_is_no_case_is_refused(case):
     case.write_text("def problem(:\n")
     refused(lambda: load(f"{case}:problem"), "my case.py", "Python")
     assert not [name for name in sys.modules if "my case" in name and sys.modules[name].__file__ == str(case)]
+
+
+@pytest.mark.parametrize(
+    ("address", "data", "word"),
+    [
+        ("os:system", {"command": "touch {}"}, "'os' is of Python's own library"),
+        ("subprocess:run", {"args": ["touch", "{}"]}, "Python's own library"),
+        ("shutil:rmtree", {"path": "{}"}, "Python's own library"),
+        ("numpy:savetxt", {"fname": "{}", "X": [1]}, "has no function 'savetxt' of its own"),
+        ("numpy.ma.core:array", {"data": [1]}, "'array' is not known to return a Problem; annotate it with '-> Problem'"),
+        ("problems.problem:Problem", {}, "has no function 'Problem' of its own"),
+        ("problems.cases.goddard:Problem", {}, "has no function 'Problem' of its own"),
+        ("problems.cases.goddard:reference", {}, "'reference' is not known to return a Problem"),
+    ],
+)
+def test_nothing_is_called_that_makes_no_problem(address, data, word, tmp_path):
+    there, trace = tmp_path / "there", tmp_path / "trace"
+    there.mkdir()
+    target = str(there if address == "shutil:rmtree" else trace)
+    data = {key: value.format(target) if isinstance(value, str) else value for key, value in data.items()}
+    refused(lambda: load(address, **data), word)
+    assert there.is_dir() and not trace.exists()
+
+
+def test_a_function_of_a_file_is_called_only_if_it_is_defined_there_and_says_nothing_else(case):
+    case.write_text(CASE + "from os import system\ndef count() -> int:\n    return 1\ndef mine() -> 'Problem':\n    return problem()\n")
+    refused(lambda: load(f"{case}:system", command="true"), "has no function 'system' of its own")
+    refused(lambda: load(f"{case}:count"), "'count' is not known to return a Problem")
+    refused(lambda: load(f"{case}:Data"), "has no function 'Data'")
+    assert load(f"{case}:mine").name == "mine"
+
+
+def test_addresses_whose_code_is_our_own():
+    assert all(is_catalogued(name) for name in names()) and is_catalogued("problems.cases.goddard:problem")
+    assert not any(is_catalogued(word) for word in ("", "problems.cases.goddard:reference", "case.py:problem", "os:system"))
 
 
 def test_naming_the_cases_is_quick_and_quiet():

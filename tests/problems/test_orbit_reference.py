@@ -49,8 +49,8 @@ def test_the_optimal_flight_is_a_flight_of_its_control_and_ends_where_the_front_
             (r, vr, _, vt), u = x, np.interp(time, t, flight["u"])
             return [vr, vt**2 / r - 1 / r**2 + A * np.cos(u), vt / r, -vt * vr / r + A * np.sin(u)]
 
-        flown = solve_ivp(rates, (0.0, tf), [orbit_rise.START_RADIUS, 0.0, 0.0, orbit_rise.START_RADIUS**-0.5], rtol=1e-9, atol=1e-10)
-        r, vr, theta, vt = flown.y[:, -1]
+        found = solve_ivp(rates, (0.0, tf), [orbit_rise.START_RADIUS, 0.0, 0.0, orbit_rise.START_RADIUS**-0.5], rtol=1e-9, atol=1e-10)
+        r, vr, theta, vt = found.y[:, -1]
         np.testing.assert_allclose([r, vr, theta, vt], [flight[name][-1] for name in ("r", "vr", "theta", "vt")], atol=1e-6)
         reference = orbit_rise.reference()
         near = np.argsort(np.abs(reference[:, 0] - tf))[:4]

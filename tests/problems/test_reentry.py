@@ -115,7 +115,7 @@ def test_the_objectives_have_the_units_of_the_paper():
     assert np.array(compiled.constraints(quantities, [])).ravel() == pytest.approx(errors)
 
 
-def fly(rates, state: list[float], seconds: float) -> np.ndarray:
+def integrated(rates, state: list[float], seconds: float) -> np.ndarray:
     names = STATES[:6]
 
     def right_hand_side(_: float, y: np.ndarray) -> list[float]:
@@ -138,17 +138,17 @@ def test_far_above_the_air_the_flight_is_kepler_s():
         velocity = v * (math.sin(path) * up + math.cos(path) * (math.sin(heading) * east + math.cos(heading) * north))
         return [v**2 / 2 - vehicle.EARTH_MU / r, *np.cross(r * up, velocity)]
 
-    end = fly(lambda state: vehicle.rates(state, 0.3, -1.0), start, 1500.0)
+    end = integrated(lambda state: vehicle.rates(state, 0.3, -1.0), start, 1500.0)
     assert abs(end[0] - start[0]) > 1e5 and abs(end[1] - start[1]) > 0.5
     np.testing.assert_allclose(invariants(end), invariants(np.array(start)), rtol=1e-9)
 
 
 def test_without_bank_the_flight_stays_in_its_vertical_plane():
     """Along the equator; and anywhere on a great circle, by Clairaut's relation."""
-    along = fly(lambda state: vehicle.rates(state, 0.3, 0.0), [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2], 800.0)
+    along = integrated(lambda state: vehicle.rates(state, 0.3, 0.0), [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2], 800.0)
     assert abs(along[2]) < 1e-12 and along[5] == pytest.approx(math.pi / 2, abs=1e-12) and along[1] > 0.8
     start = [79e3, 0.0, 0.2, 7800.0, -0.017, 1.0]
-    end = fly(lambda state: vehicle.rates(state, 0.3, 0.0), start, 800.0)
+    end = integrated(lambda state: vehicle.rates(state, 0.3, 0.0), start, 800.0)
     assert end[2] > 0.4
     assert math.cos(end[2]) * math.sin(end[5]) == pytest.approx(math.cos(0.2) * math.sin(1.0), rel=1e-9)
 
@@ -261,7 +261,7 @@ def test_any_data_make_a_problem(data):
 
 
 def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():
-    """What stands for the absolute values is what they are, once a candidate is flown."""
+    """What stands for the absolute values is what they are, once a candidate is propagated."""
     nlp = DFET(8, 2).transcribe(load("reentry_case1"))
     Z = nlp.propagate(nlp.first_guess(nlp.guess[None]))
     phase, flight = nlp.problem.phases[0], nlp.unpack(Z[0])["entry"]

@@ -1,4 +1,4 @@
-"""The tables of the re-entry's fronts: rows flown again, by equations of motion that are written anew here."""
+"""The tables of the re-entry's fronts: rows simulated again, by equations of motion that are written anew here."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def table(case: str) -> np.ndarray:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
-def flown(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def simulated(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All flights at once, by the classical Runge-Kutta method in steps of less than two seconds.
 
     Parameters
@@ -66,7 +66,7 @@ def flown(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.fixture(scope="module", params=LIMITS)
 def flights(request) -> tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     rows = table(request.param)
-    return request.param, rows, flown(np.radians(rows[:, 4:]).reshape(len(rows), -1, 2, 2))
+    return request.param, rows, simulated(np.radians(rows[:, 4:]).reshape(len(rows), -1, 2, 2))
 
 
 @pytest.mark.parametrize("case", LIMITS)

@@ -130,7 +130,6 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     assert len(figure.axes[0].get_lines()) == 3 and len(figure.axes[1].get_lines()) == 2, "two phases, and the law where there is one"
     assert figure.axes[0].get_title(loc="left").startswith("point 1\ntime ")
     figure.savefig(tmp_path / "flights.png")
-    assert len(flights_figure([front[0]], names=["load"]).axes) == 1
 
 
 def test_paths_in_one_picture():
@@ -149,8 +148,6 @@ def test_paths_in_one_picture():
 
 def test_flights_that_cannot_be_drawn():
     front = flights(2)
-    with pytest.raises(ValueError, match="no 'w' to draw; there are h, v, u, load"):
-        flights_figure([front[0]], names=["w"])
     with pytest.raises(ValueError, match="1 laws do not stand beside 2 points"):
         flights_figure([front[0], front[1]], laws={"analytic law": [None]})
     with pytest.raises(ValueError, match="of one to six points, not of 0"):

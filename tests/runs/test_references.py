@@ -85,7 +85,7 @@ def test_tables_that_are_none(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(ValueError, match=words):
         read(path, GOALS)
-    with pytest.raises(ValueError, match="say which objectives"):
+    with pytest.raises(ValueError, match="state the objectives"):
         read(path)
 
 

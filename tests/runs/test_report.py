@@ -17,8 +17,8 @@ from runs.batch.store import Store
 from runs.cli import main
 from runs.execution.task import Outcome
 from runs.measures.references import look_up
-from runs.report.comparison import grounds
-from runs.report.published import check, published_tables
+from runs.report.comparison import comparisons
+from runs.report.published import papers, published_tables
 from runs.report.report import _plain, _Writer, report
 from runs.report.tables import table
 
@@ -109,10 +109,10 @@ def test_volumes_and_objectives_beside_published_ones(folder, told):
 
 
 def test_solvers_without_a_point_are_named_where_they_have_no_statistics(folder):
-    (ground,) = grounds(Store.open(folder), {})
-    fronts = {"one": ground.fronts["one"], "lost": [ground.known[:0]] * 2, "worse": [ground.known[:0]], "crashed": []}
+    (comparison,) = comparisons(Store.open(folder), {})
+    fronts = {"one": comparison.fronts["one"], "lost": [comparison.known[:0]] * 2, "worse": [comparison.known[:0]], "crashed": []}
     paper = {"of": "objectives", "rows": [{**ROW, "statistic": "mean", "distance": 7.0}]}
-    text = published_tables([replace(ground, fronts=fronts, failures={})], [paper])["published"].text()
+    text = published_tables([replace(comparison, fronts=fronts, failures={})], papers([paper]))["published"].text()
     assert "divisor n - 1. No run of lost, worse has a point that counts." in text
 
 
@@ -123,18 +123,18 @@ def staircase(points: np.ndarray) -> float:
 
 
 def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
-    ground = grounds(Store.open(folder), {})[0]
-    assert ground.reference(None).what == ground.reference("union").what == "the union of 4 runs"
+    comparison = comparisons(Store.open(folder), {})[0]
+    assert comparison.reference(None).what == comparison.reference("union").what == "the union of 4 runs"
     file = tmp_path / "truth.csv"
     file.write_text("time [s],distance [km]\n1,3\n5,15\n")
-    assert ground.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
-    assert ground.reference({"glide": str(file)}).what == str(file)
+    assert comparison.reference(str(file)).front.objectives.tolist() == [[1, 3], [5, 15]]
+    assert comparison.reference({"glide": str(file)}).what == str(file)
     assert look_up("goddard", "glide", "", {}, load("goddard").compile().goals).true
     assert not look_up("reentry_case1", "glide", "", {}, load("reentry_case1").compile().goals).true, "gradients found it, locally"
     with pytest.raises(ValueError, match="a problem that a script states"):
-        ground.reference("truth")
+        comparison.reference("truth")
     with pytest.raises(FileNotFoundError):
-        ground.reference("nowhere.csv")
+        comparison.reference("nowhere.csv")
 
 
 def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
@@ -150,7 +150,7 @@ def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
 
 def test_nothing_to_report_on(tmp_path, capsys):
     assert main(["study", "report", str(tmp_path)]) == 2
-    assert "holds no study" in capsys.readouterr().err
+    assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
         store.keep(store.cells[0], 1, Outcome("crashed", "it broke"))
@@ -170,12 +170,12 @@ def test_nothing_to_report_on(tmp_path, capsys):
         ([*PAPER, {"of": "indicator"}], r"\[\[paper\]\] 4, of indicator: of must be one of indicators"),
         ([{"of": "indicators", "source": 3}], "source must be a text"),
         ([{"of": "indicators", "sauce": "3"}], "sauce"),
-        ([{"of": "hypervolume", "rows": [ROW]}], "it needs point"),
+        ([{"of": "hypervolume", "rows": [ROW]}], "point is missing"),
         ([{"of": "hypervolume", "point": "R", "rows": [ROW]}], "point must be a list of numbers"),
-        ([{"of": "hypervolume", "point": [np.inf, 0.0], "rows": [ROW]}], "point must be a list of numbers"),
+        ([{"of": "hypervolume", "point": [np.inf, 0.0], "rows": [ROW]}], "point 1 must be a finite number, not inf"),
         ([{"of": "indicators", "rows": []}], "rows must be a list of tables"),
         ([{"of": "indicators", "rows": [{"by": "glide"}]}], "row 1: it must be a table with problem and by"),
-        ([{"of": "indicators", "rows": [ROW]}], "row 1: it holds no figure: gd_mean, gd_variance"),
+        ([{"of": "indicators", "rows": [ROW]}], "row 1: it has no figure: gd_mean, gd_variance"),
         ([{"of": "indicators", "rows": [{**ROW, "seconds": 1}] * 2}], "row 2: it is of the same as row 1: glide, the paper"),
         ([{"of": "indicators", "rows": [{**ROW, "gd": 3.0}]}], "unknown key 'gd'"),
         ([{"of": "indicators", "rows": [{**ROW, "gd_mean": "3"}]}], "gd_mean must be a finite number"),
@@ -187,7 +187,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
 )
 def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
     with pytest.raises(ValueError, match=message):
-        check(paper)
+        papers(paper)
     with pytest.raises(ValueError, match=message):
         study(paper=paper)
 
@@ -218,7 +218,7 @@ MEAN = {**ROW, "statistic": "mean"}
     ],
 )
 def test_a_paper_section_of_what_the_study_does_not_have_is_refused_at_once(paper, message):
-    check([paper])
+    papers([paper])
     with pytest.raises(ValueError) as refused:
         study(paper=[PAPER[0], paper])
     assert f"study 'gliders': [[paper]] 2, of {paper['of']}: " in str(refused.value) and message in str(refused.value)
@@ -239,7 +239,7 @@ def test_every_problem_of_a_published_table_is_looked_at():
 
 def test_problems_without_finished_runs_are_left_out_of_published_tables(folder):
     rows = [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]
-    found = published_tables(grounds(Store.open(folder), {}), [{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}])
+    found = published_tables(comparisons(Store.open(folder), {}), papers([{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}]))
     assert "dive" not in found["published"].text() and "glide" in found["published"].text()
 
 

@@ -209,11 +209,17 @@ def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
     paths = [run.path for run in first.runs]
     paths[0].write_bytes(paths[0].read_bytes()[:5000])
     paths[1].unlink()
-    first.runs[2].path.with_suffix(".json").write_text("{ not", encoding="utf-8")
+    record = first.runs[2].path.with_suffix(".json")
+    content = record.read_bytes()
+    record.unlink()
     status = study().status(tmp_path / "out")
     assert [run.status for run in status.runs] == ["unreadable", "missing", "finished"]
     assert status.runs[2].history == {} and status.runs[2].wall_time == 0.0
-    assert "1 of 3 runs finished" in str(status) and "unreadable" in str(status)
+    assert "1 of 3 runs finished" in str(status) and "0001.nc' is damaged" in str(status)
+    for damaged in (b"{ not", content[:-20], content.replace(b'"message": ""', b'"message": "!"'), content.replace(b"content", b"contant")):
+        record.write_bytes(damaged)
+        status = study().status(tmp_path / "out")
+        assert status.runs[2].status == "unreadable" and "0003.json' is damaged" in str(status) and status.runs[2].history == {}
     again = study().run(tmp_path / "out", executor=Inline())
     assert again.finished == 3 and paths[0].with_name("0001.nc.unreadable").stat().st_size == 5000
     assert {key: value[0] for key, value in numbers(again).items()} == {key: value[0] for key, value in expected.items()}
@@ -388,7 +394,7 @@ def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, w
 )
 def test_another_study_in_the_same_folder_is_refused(made, changes, words):
     before = stamps(made[0])
-    with pytest.raises(ValueError, match="holds another study") as refused:
+    with pytest.raises(ValueError, match="contains another study") as refused:
         study(**changes).run(made[0])
     assert words in str(refused.value) and stamps(made[0]) == before
 
@@ -416,7 +422,7 @@ def test_wrong_calls_of_run(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
 
 
-@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"format": "macs study"}', '{"format": "else"}'])
+@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"crc32": 1, "content": {}}', '{"format": "macs study"}'])
 def test_a_folder_that_cannot_be_read_is_one_clear_line(tmp_path, content):
     if content is not None:
         (tmp_path / "study.json").write_text(content, encoding="utf-8")
@@ -432,5 +438,5 @@ def test_what_other_processes_cannot_have_is_refused_before_any_work(monkeypatch
 
 
 def test_records_are_plain_text(made):
-    record = json.loads((made[0] / "study.json").read_text(encoding="utf-8"))
+    record = json.loads((made[0] / "study.json").read_text(encoding="utf-8"))["content"]
     assert record["study"]["cells"][0]["problem"] == "glide" and record["study"]["seed"] == 1

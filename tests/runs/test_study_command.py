@@ -13,8 +13,8 @@ from problems.cases.reentry import case1
 from problems.cases.reentry.vehicle import MASS
 from runs import Study
 from runs.batch import file as studyfile
+from runs.batch.display import StudyDisplay
 from runs.batch.store import Store
-from runs.batch.watching import Watch
 from runs.cli import main
 from runs.execution.task import Outcome
 from transcription import SingleShooting, parse
@@ -48,24 +48,24 @@ def here(tmp_path, monkeypatch):
 
 
 def test_run_resume_and_status(capsys):
-    assert main(["study", "run", "gliders.toml", "--runs", "1"]) == 0
+    assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1"]) == 0
     said = capsys.readouterr()
     assert "1 of 1 runs finished" in said.out and "in out/gliders" in said.out and "gliders: 0 of 1 finished, 1 left" in said.err
     path = next(Path("out/gliders").rglob("*.nc"))
     stamp = path.stat().st_mtime_ns
     assert main(["study", "status", "out/gliders"]) == 0
-    assert main(["study", "run", "gliders.toml", "--runs", "1"]) == 0
+    assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1"]) == 0
     assert path.stat().st_mtime_ns == stamp
-    study = Study.load("gliders.toml")
+    study = Study.load("gliders.toml", trust=True)
     assert (
         study.name == "gliders" and study.runs == 2 and [run.status for run in study.status("out/gliders").runs] == ["finished", "missing"]
     )
-    assert main(["study", "run", "gliders.toml", "--runs", "1", "--out", "."]) == 2
-    assert "holds no study but other things" in capsys.readouterr().err
+    assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1", "--out", "."]) == 2
+    assert "contains no study but other things" in capsys.readouterr().err
 
 
 def test_status_says_what_is_wrong(capsys):
-    study = Study.load("gliders.toml")
+    study = Study.load("gliders.toml", trust=True)
     with Store.claim("out", study.definition()) as store:
         store.keep(study.cells[0], 1, Outcome("killed", "its process was killed by SIGKILL"))
     assert main(["study", "status", "out"]) == 1
@@ -82,6 +82,8 @@ def test_status_says_what_is_wrong(capsys):
         (TOML.replace("runs = 2", "runs = 0"), "runs must be a whole number of at least 1, not 0"),
         (TOML.replace("runs = 2", 'runs = "two"'), "runs must be a whole number"),
         (TOML.replace("runs = 2", ""), "runs is missing"),
+        (TOML.replace("problems", "# problems"), "problems is missing"),
+        (f"problems = {'[' * 5000}", "it is not TOML"),
         (TOML.replace('"macs"', '"mcas"'), "unknown solver 'mcas', did you mean macs?"),
         (TOML.replace("refine", "refined"), "'refined', did you mean refine?"),
         (TOML.replace("glide.py:glide", "glide.py:glider"), "has no function 'glider'"),
@@ -94,7 +96,7 @@ def test_status_says_what_is_wrong(capsys):
 @pytest.mark.parametrize("how", [[], ["--quick"]])
 def test_a_wrong_file_is_one_line_before_any_work(here, capsys, toml, words, how):
     (here / "gliders.toml").write_text(toml, encoding="utf-8")
-    assert main(["study", "run", "gliders.toml", *how]) == 2
+    assert main(["study", "run", "gliders.toml", "--trust", *how]) == 2
     said = capsys.readouterr()
     assert words in said.err and "gliders.toml: " in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
 
@@ -106,7 +108,7 @@ def test_a_wrong_file_is_one_line_before_any_work(here, capsys, toml, words, how
         (["goddard-table-3"], "did you mean goddard-table3?"),
         (["nothing.toml"], "there is no file 'nothing.toml'"),
         (["gliders.toml", "--jobs", "2", "--dask", "tcp://localhost:1"], "give one of them"),
-        (["gliders.toml", "--runs", "0"], "not a whole number above 0"),
+        (["gliders.toml", "--trust", "--runs", "0"], "not a whole number above 0"),
         (["gliders.toml", "--job", "2"], "did you mean --jobs?"),
     ],
 )
@@ -121,7 +123,7 @@ def test_a_wrong_call_is_one_line(here, capsys, call, words):
 
 def test_ctrl_c_says_how_to_go_on(here):
     (here / "gliders.toml").write_text(TOML.replace("60", "2_000_000"), encoding="utf-8")
-    call = [sys.executable, "-m", "runs.cli", "study", "run", "gliders.toml"]
+    call = [sys.executable, "-m", "runs.cli", "study", "run", "gliders.toml", "--trust"]
     # A background job may have been told to ignore it, and its children with it.
     heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     process = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=heeding)
@@ -193,7 +195,7 @@ def test_problems_transcriptions_and_budgets_may_be_given_each_by_name(here):
     seed = 0
     """
     (here / "two.toml").write_text(toml, encoding="utf-8")
-    cells = Study.load("two.toml").cells
+    cells = Study.load("two.toml", trust=True).cells
     assert [(*cell.labels, cell.evaluations) for cell in cells] == [
         ("fast", "dfet:2x2", "macs", 50),
         ("fast", "dfet:3x2", "macs", 50),
@@ -208,13 +210,13 @@ class Terminal(io.StringIO):
 
 
 def test_a_terminal_sees_the_runs_that_are_going_on(here):
-    study = Study.load("gliders.toml")
+    study = Study.load("gliders.toml", trust=True)
     with Store.claim("out", study.definition()) as store:
         runs = list(store.runs())
     stream = Terminal()
-    with Watch("gliders", runs, runs, shown=True, stream=stream) as watch:
-        watch.reporter(runs[1])(40, 1.0)
-        watch.ended(runs[0], Outcome("crashed", "ValueError: no [such] thing"))
+    with StudyDisplay("gliders", runs, runs, shown=True, stream=stream) as display:
+        display.reporter(runs[1])(40, 1.0)
+        display.ended(runs[0], Outcome("crashed", "ValueError: no [such] thing"))
     said = stream.getvalue()
     assert "run 2" in said and "40 / 60 evaluations" in said and "1 failed, 1 left" in said
     assert "run 1 of glide.py:glide, dfet:2x2, plain crashed: ValueError: no [such] thing" in " ".join(said.split())

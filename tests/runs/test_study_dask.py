@@ -15,9 +15,9 @@ pytest.importorskip("distributed")
 
 from test_study import Inline, numbers, slow, stamps, wait_for
 
-from runs.batch.running import Deserted
+from runs.batch.running import WorkersLost
 from runs.cli import main
-from runs.execution.crew import cluster
+from runs.execution.workers import cluster
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_a_scheduler_that_is_killed_loses_nothing_that_is_finished(scheduler, tm
     killer = threading.Thread(target=kill)
     killer.start()
     began = time.monotonic()
-    with pytest.raises(Deserted, match="the same again goes on"), cluster(address) as executor:
+    with pytest.raises(WorkersLost, match="the same command continues with them"), cluster(address) as executor:
         slow().run(tmp_path / "out", executor=executor)
     killer.join()
     assert time.monotonic() - began < 90

@@ -10,7 +10,7 @@ from macs import NSGA2
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.comparison import EACH, grounds
+from runs.report.comparison import EACH, comparisons
 from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
@@ -42,13 +42,13 @@ def test_a_budget_of_its_own_for_each_problem():
 
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
     assert study().run(tmp_path / "out", executor=Inline()).finished == 6
-    found = grounds(Store.open(tmp_path / "out"), {})
-    assert [ground.transcription for ground in found] == ["shooting:5", "shooting:9"]
-    for ground in found:
-        assert list(ground.fronts) == ["nsga2", "macs"]
-        assert ground.place("macs") == "dfet:3x2" and ground.place("nsga2") == ground.transcription
+    found = comparisons(Store.open(tmp_path / "out"), {})
+    assert [comparison.transcription for comparison in found] == ["shooting:5", "shooting:9"]
+    for comparison in found:
+        assert list(comparison.fronts) == ["nsga2", "macs"]
+        assert comparison.place("macs") == "dfet:3x2" and comparison.place("nsga2") == comparison.transcription
         for solver, budget in (("macs", 40), ("nsga2", 60)):
-            assert all(front.stats["evaluations"] == budget for front in ground.fronts[solver])
+            assert all(front.stats["evaluations"] == budget for front in comparison.fronts[solver])
     assert found[0].fronts["macs"][0].F.tolist() == found[1].fronts["macs"][0].F.tolist()
     text = str(study().report(tmp_path / "out", figures=False))
     assert "Mann-Whitney" in text
@@ -62,8 +62,8 @@ def test_all_may_work_apart(tmp_path):
     terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "propagate"}}
     each = study(terms=terms, transcriptions=None, inner="auto", runs=1)
     each.run(tmp_path / "out", executor=Inline())
-    (ground,) = grounds(Store.open(tmp_path / "out"), {})
-    assert ground.transcription == EACH and set(ground.fronts) == {"macs", "nsga2"}
+    (comparison,) = comparisons(Store.open(tmp_path / "out"), {})
+    assert comparison.transcription == EACH and set(comparison.fronts) == {"macs", "nsga2"}
 
 
 def test_quick_studies_keep_the_terms():
@@ -79,7 +79,7 @@ def test_quick_studies_keep_the_terms():
     [
         ([], "terms must be a table of tables"),
         ({"mac": {"inner": "ipopt"}}, "terms: there is no solver 'mac'; there are macs, nsga2"),
-        ({"macs": {}}, "terms of 'macs': there must be a table of transcription, evaluations, inner, start"),
+        ({"macs": {}}, "terms of 'macs': it must be a table with transcription, evaluations, inner, start"),
         ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'"),
         ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be"),
         ({"macs": {"evaluations": {"glyde": 40}}}, "terms of 'macs': evaluations: there is no problem 'glyde'"),

@@ -16,7 +16,7 @@ def candidates(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
     return nlp.lower[nlp.free] + rng.random((k, len(nlp.free))) * nlp.span[nlp.free]
 
 
-def flown(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
+def propagated(nlp: NLP, k: int = 3, seed: int = 0) -> np.ndarray:
     """Propagated vectors (k, n)."""
     return inner_solver("propagate").solve(nlp, candidates(nlp, k, seed)).z
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, flown, integrator, oscillator, oscillator_rates, slot
+from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
 from gauss import integrate
 
 from problems import Problem, load
@@ -39,7 +39,7 @@ def test_the_sizes_are_those_of_the_paper():
 @pytest.mark.parametrize(("elements", "order"), [(1, 0), (3, 0), (2, 1), (3, 2), (1, 4), (2, 6), (1, 9)])
 def test_it_is_the_gauss_legendre_implicit_runge_kutta_method(basis, elements, order):
     nlp = DFET(elements, order, basis=basis).transcribe(oscillator())
-    Z = flown(nlp, k=2)
+    Z = propagated(nlp, k=2)
     _, violation = nlp.evaluate(Z)
     for z, worst in zip(Z, violation, strict=True):
         flight = nlp.unpack(z)
@@ -78,7 +78,7 @@ def test_bases_agree_where_both_are_exact():
     """The same control polynomial in both bases gives the same flight, objectives and integrals."""
     problem, order = oscillator(), 3
     first, second = (DFET(2, order, basis=basis).transcribe(problem) for basis in ("lobatto", "bernstein"))
-    z = flown(first, k=1)[0]
+    z = propagated(first, k=1)[0]
     phase = first.unpack(z)["swing"]
     points = np.array([-0.9, -0.2, 0.4, 1.0])
     from transcription.numerics import polynomials
@@ -145,7 +145,7 @@ def test_settings_travel():
 @pytest.mark.parametrize("method", [DFET(2, 2), DFET(2, 1, control_order=2, basis="bernstein")])
 def test_derivatives_are_exact_and_sparse(method):
     nlp = method.transcribe(oscillator())
-    z = flown(nlp, k=1)[0] + 0.01
+    z = propagated(nlp, k=1)[0] + 0.01
     jacobian = nlp.functions.factory("J", ["z"], ["jac:g:z", "jac:F:z"])
     exact = [np.array(J.full()) for J in jacobian(z)]
     step = 1e-6
@@ -162,7 +162,7 @@ def test_derivatives_are_exact_and_sparse(method):
 
 def test_batches_are_rows():
     nlp = DFET(2, 3).transcribe(oscillator())
-    Z = flown(nlp, k=4)
+    Z = propagated(nlp, k=4)
     F, violation = nlp.evaluate(Z)
     assert F.shape == (4, 2) and violation.shape == (4,)
     for i in range(4):
@@ -239,11 +239,11 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
 )
 def test_controls_may_have_another_order_than_states(method):
     nlp = method.transcribe(oscillator())
-    assert len(nlp.free) == 4 + 2 * method.elements * (method.degree_of_controls + 1) - 0
-    Z = flown(nlp)
+    assert len(nlp.free) == 4 + 2 * method.elements * (method.degree_of_controls(method.order) + 1) - 0
+    Z = propagated(nlp)
     assert nlp.evaluate(Z)[1].max() < 1e-12
     phase = nlp.unpack(Z[0])["swing"]
-    assert phase.control.coefficients.shape == (method.elements, method.degree_of_controls + 1, 2)
+    assert phase.control.coefficients.shape == (method.elements, method.degree_of_controls(method.order) + 1, 2)
     assert (np.diff(phase.time) > 0).all()
 
 
@@ -268,7 +268,7 @@ def test_free_times_and_ranged_ends_are_variables_within_their_ranges():
     assert found["run.x(t0)"] == (-1, 1) and found["run.x(tf)"] == (0.5, 2)
     free = {nlp.variables[i].name for i in nlp.free}
     assert {"run.t0", "run.tf", "run.x(t0)"} <= free and "run.x(tf)" not in free
-    phase = nlp.unpack(flown(nlp, k=1)[0])["run"]
+    phase = nlp.unpack(propagated(nlp, k=1)[0])["run"]
     assert phase.edge_states[-1, 0] - phase.edge_states[0, 0] == pytest.approx(
         np.sum([np.mean(phase.control.coefficients[j]) for j in range(2)]) * (phase.tf - phase.t0) / 2
     )

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from cases import candidates, decay, flown, integrator, oscillator, solved
+from cases import candidates, decay, integrator, oscillator, propagated, solved
 from gauss import integrate
 from test_dfet import rates_of
 
@@ -37,7 +37,7 @@ def test_equal_elements_given_by_their_edges_are_equal_elements(basis):
         given = DFET(2, 5, control_order=2, basis=basis, mesh={"swing": (edges, 3)})
         one, two = plain.transcribe(oscillator()), given.transcribe(oscillator())
         assert [v.name for v in one.variables] == [v.name for v in two.variables]
-        Z = flown(one)
+        Z = propagated(one)
         assert np.array_equal(two.propagate(Z), Z)
         assert all(np.array_equal(a, b) for a, b in zip(one.evaluate(Z), two.evaluate(Z), strict=True))
         assert np.array_equal(one.unpack(Z[0])["swing"].time, two.unpack(Z[0])["swing"].time)
@@ -47,7 +47,7 @@ def test_equal_elements_given_by_their_edges_are_equal_elements(basis):
 @pytest.mark.parametrize("order", [0, 1, 4])
 def test_uneven_elements_are_the_gauss_method_too(basis, order):
     nlp = DFET(1, 1, basis=basis, mesh={"swing": (UNEVEN, order)}).transcribe(oscillator())
-    for z, worst in zip(flown(nlp, k=2), nlp.evaluate(flown(nlp, k=2))[1], strict=True):
+    for z, worst in zip(propagated(nlp, k=2), nlp.evaluate(propagated(nlp, k=2))[1], strict=True):
         flight = nlp.unpack(z)
         phase = flight["swing"]
         assert np.allclose((phase.state.edges - phase.t0) / (phase.tf - phase.t0), UNEVEN, atol=1e-15)
@@ -61,13 +61,13 @@ def test_halving_uneven_elements_gains_the_order_of_the_method(order):
     errors = []
     for edges in (np.array(UNEVEN), np.sort([*UNEVEN, *(0.5 * (np.array(UNEVEN)[1:] + np.array(UNEVEN)[:-1]))])):
         nlp = DFET(1, 0, mesh={"fall": (edges, order)}).transcribe(decay(tf=2.0)[0])
-        errors.append(abs(nlp.unpack(flown(nlp, k=1)[0])["fall"].edge_states[-1, 0] - np.exp(-2.0)))
+        errors.append(abs(nlp.unpack(propagated(nlp, k=1)[0])["fall"].edge_states[-1, 0] - np.exp(-2.0)))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * order + 2, abs=0.4)
 
 
 def test_phases_have_their_own_elements_and_orders():
     nlp = DFET(3, 2, mesh={"two": (UNEVEN, 5)}).transcribe(two_phases())
-    flight = nlp.unpack(flown(nlp, k=1)[0]) if len(nlp.free) else nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0]) if len(nlp.free) else nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
     assert len(flight["one"].state.edges) == 4 and flight["one"].state.coefficients.shape[1] == 5
     assert len(flight["two"].state.edges) == 5 and flight["two"].state.coefficients.shape[1] == 8
     assert flight["two"].edge_states[-1, 0] == pytest.approx(np.exp(-5.0), abs=1e-7)
@@ -93,7 +93,7 @@ def test_guesses_follow_the_elements(basis):
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_a_trajectory_comes_back_from_its_own_mesh(basis):
     nlp = DFET(3, 4, control_order=3, basis=basis).transcribe(oscillator())
-    for z in flown(nlp):
+    for z in propagated(nlp):
         assert np.abs((nlp.interpolate(nlp.unpack(z)) - z) / nlp.span).max() < 1e-10
 
 

@@ -5,7 +5,7 @@ import itertools
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, flown, integrator, slot
+from cases import candidates, integrator, propagated, slot
 
 from problems import Problem
 from transcription import DFET
@@ -27,7 +27,7 @@ def test_a_period_more_changes_nothing(basis):
     nlp = DFET(2, 3, basis=basis).transcribe(spinner())
     assert nlp.period[nlp.free] == pytest.approx(np.full(8, 2 * np.pi))
     rng = np.random.default_rng(3)
-    Z = flown(nlp, k=5)
+    Z = propagated(nlp, k=5)
     moved = Z.copy()
     moved[:, nlp.free] += 2 * np.pi * rng.integers(-1, 2, (5, 8))
     F, g = (np.array(v).T for v in nlp.functions(Z.T))
@@ -86,7 +86,7 @@ def relay(legs: int, jump: float = 0.0) -> Problem:
 def test_linked_phases_share_time_and_states(legs):
     nlp = DFET(2, 2).transcribe(relay(legs))
     assert not any(label.startswith("link") for label in nlp.g_labels)
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     assert list(flight) == [f"leg {i}" for i in range(legs)] and len(flight) == legs
     for i in range(1, legs):
         before, after = flight[f"leg {i - 1}"], flight[f"leg {i}"]
@@ -160,7 +160,7 @@ def test_one_phase_may_lead_into_several():
     problem.link(ends["stack"], ends["booster"])
     problem.minimize("time", ends["orbiter"].tf + ends["booster"].tf)
     nlp = DFET(2, 2).transcribe(problem)
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     for name in ("orbiter", "booster"):
         assert flight[name].t0 == pytest.approx(flight["stack"].tf) and flight[name]["x"][0] == flight["stack"]["x"][-1]
 

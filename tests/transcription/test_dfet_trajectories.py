@@ -3,7 +3,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, flown, integrator, oscillator, slot
+from cases import candidates, integrator, oscillator, propagated, slot
 
 from problems import Problem, load
 from transcription import DFET
@@ -83,7 +83,7 @@ def test_tighten_sets_peaks_and_nothing_else():
     problem, phase = integrator()
     problem.minimize("top", phase.peak(phase["u"]))
     nlp = DFET(2, 2).transcribe(problem)
-    Z = flown(nlp)
+    Z = propagated(nlp)
     k = slot(nlp, "run.peak[0]")
     loose = Z.copy()
     loose[:, k] += 7
@@ -112,7 +112,7 @@ def test_a_peak_may_be_bounded_above():
 
 def test_time_increases_and_at_interpolates():
     nlp = DFET(3, 4).transcribe(oscillator())
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     phase = flight["swing"]
     assert (np.diff(phase.time) > 0).all() and phase.time[0] == phase.t0 and phase.time[-1] == phase.tf
     assert set(phase.state.edges) <= set(phase.time)
@@ -131,7 +131,7 @@ def test_time_increases_and_at_interpolates():
 
 def test_what_is_not_there_is_told():
     nlp = DFET(2, 2).transcribe(oscillator())
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     phase = flight["swing"]
     with pytest.raises(KeyError, match=r"descent.*swing"):
         flight["descent"]

@@ -176,10 +176,10 @@ def test_objectives_that_are_no_numbers_fail():
 def test_march_equals_projection_where_every_candidate_is_feasible():
     nlp = DFET(30, 1).transcribe(load("orbit_rise"))
     C = candidates(nlp, 3)
-    flown, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("propagate", "ipopt", "auto"))
-    assert set(flown.status) == set(projected.status) == {"converged"}
-    assert projected.z == pytest.approx(flown.z, abs=1e-5) and pytest.approx(flown.F, abs=1e-6) == projected.F
-    assert np.array_equal(auto.z, flown.z) and flown.violation.max() < 1e-12
+    propagated, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("propagate", "ipopt", "auto"))
+    assert set(propagated.status) == set(projected.status) == {"converged"}
+    assert projected.z == pytest.approx(propagated.z, abs=1e-5) and pytest.approx(propagated.F, abs=1e-6) == projected.F
+    assert np.array_equal(auto.z, propagated.z) and propagated.violation.max() < 1e-12
 
 
 def test_auto_repairs_what_leaves_the_bounds_of_states():

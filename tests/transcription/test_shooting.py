@@ -5,7 +5,7 @@ import pickle
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, flown, integrator, oscillator, oscillator_rates, slot
+from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -72,7 +72,7 @@ METHODS = [
 @pytest.mark.parametrize(("kind", "nodes"), [("constant", 4), ("linear", None), ("spline", 4), ("spline", None)])
 def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
     nlp = SingleShooting(12, scheme="rk8", steps=3, control=kind, control_nodes=nodes).transcribe(oscillator())
-    for z in flown(nlp, 2):
+    for z in propagated(nlp, 2):
         t0, tf, m = (z[slot(nlp, name)] for name in ("swing.t0", "swing.tf", "m"))
         u, v = (law(kind, t0, tf, values_of(nlp, z, name)) for name in ("swing.u", "swing.v"))
         x, cost, kinks = np.array([z[slot(nlp, "swing.x(t0)")], 0.5]), 0.0, np.linspace(t0, tf, nodes or 12)
@@ -96,7 +96,7 @@ def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
     exact = np.array([np.exp(-2), 0.5 + 0.5 * np.exp(-2) * (np.sin(2) - np.cos(2))])
     n = 3 if scheme == "rk8" else 20
     nlps = [method(k, scheme=scheme).transcribe(problem) for k in (n, 2 * n)]
-    coarse, fine = (np.abs(nlp.fly(np.zeros((1, len(nlp.variables))))[1][0] - exact) for nlp in nlps)
+    coarse, fine = (np.abs(nlp.propagate_and_score(np.zeros((1, len(nlp.variables))))[1][0] - exact) for nlp in nlps)
     assert np.log2(coarse / fine) == pytest.approx([TABLEAUX[scheme].order] * 2, abs=0.45)
 
 
@@ -104,7 +104,7 @@ def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
 def test_flying_and_scoring_in_one_go_is_flying_and_then_scoring(method):
     nlp = method.transcribe(rich())
     Z = nlp.first_guess(candidates(nlp, 5))
-    flight, F, residuals = nlp.fly(Z)
+    flight, F, residuals = nlp.propagate_and_score(Z)
     violation = largest(residuals)
     assert np.array_equal(flight, nlp.propagate(Z)) and np.array_equal(flight[:, nlp.free], Z[:, nlp.free])
     again, worst = nlp.evaluate(flight)
@@ -119,7 +119,7 @@ def test_flying_and_scoring_in_one_go_is_flying_and_then_scoring(method):
 def test_many_candidates_at_once_are_the_same_bits_as_one_by_one(method):
     nlp = method.transcribe(rich(period=2 * np.pi))
     Z = nlp.first_guess(candidates(nlp, 101))
-    together, alone = nlp.fly(Z), [nlp.fly(z[None]) for z in Z[[0, 1, 63, 64, 100]]]
+    together, alone = nlp.propagate_and_score(Z), [nlp.propagate_and_score(z[None]) for z in Z[[0, 1, 63, 64, 100]]]
     for found, singles in zip(together, zip(*alone, strict=True), strict=True):
         assert np.array_equal(found[[0, 1, 63, 64, 100]], np.concatenate(singles))
 
@@ -130,14 +130,14 @@ def test_derivatives_of_the_reduced_problem(method, period):
     nlp = method.transcribe(rich(period))
     reduced, Z = nlp.reduced, nlp.first_guess(candidates(nlp, 2, seed=4))
     rows = np.arange(len(reduced.lower))
-    A = reduced.derivatives(reduced.fly(Z), rows)
+    A = reduced.derivatives(reduced.propagate(Z), rows)
     ends = np.flatnonzero(~reduced.inside)
-    assert np.allclose(reduced.derivatives(reduced.fly(Z), ends), A[:, ends], rtol=1e-12, atol=1e-13)
+    assert np.allclose(reduced.derivatives(reduced.propagate(Z), ends), A[:, ends], rtol=1e-12, atol=1e-13)
     for k, column in enumerate(nlp.free):
         moved = [Z.copy(), Z.copy()]
         moved[0][:, column] += 1e-6
         moved[1][:, column] -= 1e-6
-        slope = (reduced.fly(moved[0]).values - reduced.fly(moved[1]).values) / 2e-6
+        slope = (reduced.propagate(moved[0]).values - reduced.propagate(moved[1]).values) / 2e-6
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
 
 
@@ -183,7 +183,7 @@ def test_the_integral_of_a_control_is_exact(nodes, control_nodes, kind, seed):
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
     nlp = SingleShooting(nodes, control=kind, control_nodes=control_nodes).transcribe(problem)
-    z = flown(nlp, 1, seed)[0]
+    z = propagated(nlp, 1, seed)[0]
     values = values_of(nlp, z, "run.u")
     if kind == "spline":
         exact = CubicSpline(np.linspace(0, 2, control_nodes), values).integrate(0, 2)
@@ -198,7 +198,7 @@ def test_controls_are_what_scipy_makes_of_their_values(kind, nodes):
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
     nlp = MultipleShooting(6, control=kind, control_nodes=nodes, steps=2).transcribe(problem)
-    z = flown(nlp, 1)[0]
+    z = propagated(nlp, 1)[0]
     flight, times = nlp.unpack(z)["run"], np.linspace(0, 2, 301)[:-1] + 1e-4
     assert flight.at(times)["u"] == pytest.approx(law(kind, 0, 2, values_of(nlp, z, "run.u"))(times), abs=1e-12)
 
@@ -345,7 +345,7 @@ def test_linked_phases_a_free_time_between_them_and_a_parameter():
     assert flight["first"].tf == flight["second"].t0 and np.array_equal(flight["first"].edge_states[-1], flight["second"].edge_states[0])
     assert found[0].simulate().max_defect < 1e-5
     nlp = SingleShooting(9).transcribe(two_legs())
-    Z = flown(nlp, 2)
+    Z = propagated(nlp, 2)
     for z in Z:
         check = simulate(nlp.problem, nlp.unpack(z))
         # Flown one after the other: what is imposed at the end is missed by what the flight says.
@@ -444,13 +444,13 @@ def test_what_cannot_be_said_in_a_word():
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("shooting", "write it as dfet:4x6"),
+        ("shooting", "write it as shooting:200"),
         ("shooting:4x", "write it as"),
         ("shooting:a", "write it as"),
-        ("shooting:20:cubic", "'cubic' is said twice or unknown; there are constant, linear, spline; euler"),
-        ("shooting:20:linear:spline", "'spline' is said twice"),
-        ("shooting:1", "nodes must be an integer of at least 2, not 1"),
-        ("multiple-shooting:0", "intervals must be an integer of at least 1"),
+        ("shooting:20:cubic", "'cubic' is given twice or unknown; there are constant, linear, spline; euler"),
+        ("shooting:20:linear:spline", "'spline' is given twice"),
+        ("shooting:1", "nodes must be a whole number of at least 2, not 1"),
+        ("multiple-shooting:0", "intervals must be a whole number of at least 1"),
         ("dfet:4x6:lobatto:3:3", "write it as"),
     ],
 )
@@ -462,13 +462,16 @@ def test_words_that_mean_nothing(word, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: SingleShooting(1), "SingleShooting: nodes must be an integer of at least 2, not 1"),
-        (lambda: SingleShooting(2.5), "SingleShooting: nodes must be an integer"),
-        (lambda: MultipleShooting(True), "MultipleShooting: intervals must be an integer of at least 1, not True"),
-        (lambda: MultipleShooting(3, steps=0), "MultipleShooting: steps must be an integer of at least 1, not 0"),
-        (lambda: SingleShooting(9, control_nodes=1), "SingleShooting: control_nodes must be an integer of at least 2, not 1"),
-        (lambda: SingleShooting(9, path_points=-1), "SingleShooting: path_points must be an integer of at least 0, not -1"),
-        (lambda: SingleShooting(9, scheme="rk5"), "SingleShooting: unknown Runge-Kutta scheme 'rk5'; there are euler, .*, rk8"),
+        (lambda: SingleShooting(1), "SingleShooting: nodes must be a whole number of at least 2, not 1"),
+        (lambda: SingleShooting(2.5), "SingleShooting: nodes must be a whole number"),
+        (lambda: MultipleShooting(True), "MultipleShooting: intervals must be a whole number of at least 1, not True"),
+        (lambda: MultipleShooting(3, steps=0), "MultipleShooting: steps must be a whole number of at least 1, not 0"),
+        (lambda: SingleShooting(9, control_nodes=1), "SingleShooting: control_nodes must be a whole number of at least 2, not 1"),
+        (lambda: SingleShooting(9, path_points=-1), "SingleShooting: path_points must be a whole number of at least 0, not -1"),
+        (
+            lambda: SingleShooting(9, scheme="rk5"),
+            f"SingleShooting: scheme must be one of {', '.join(map(repr, TABLEAUX))}, not 'rk5'",
+        ),
         (lambda: SingleShooting(9, control="cubic"), "SingleShooting: control must be one of 'constant', 'linear', 'spline', not 'cubic'"),
     ],
 )

@@ -30,8 +30,8 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
     weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
-    paths = over(phase.path, tables.points, closed @ ca.DM(tables.flown(tables.points)).T)
-    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.flown(tables.dense)).T)
+    paths = over(phase.path, tables.points, closed @ ca.DM(tables.collocation(tables.points)).T)
+    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.collocation(tables.dense)).T)
     sizes = over(phase.sizes, tables.tau, inside)
     ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
     names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends", "sizes"]
@@ -85,8 +85,8 @@ class Tables:
         """State functions at `tau` (k,), shape (k, l + 1)."""
         return polynomials.basis_matrix(self.state_basis, self.order, tau)
 
-    def flown(self, tau: np.ndarray) -> np.ndarray:
-        """What the collocation polynomial at `tau` (k,) takes of the states at both ends and, in between, at the stages, (k, l + 3)."""
+    def collocation(self, tau: np.ndarray) -> np.ndarray:
+        """Functions of the collocation polynomial at `tau` (k,), for states at the left end, the stages and the right end, (k, l + 3)."""
         return polynomials.basis_matrix("closed-legendre", self.order + 2, tau)
 
     def control(self, tau: np.ndarray) -> np.ndarray:

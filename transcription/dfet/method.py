@@ -16,22 +16,23 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-import numpy as np
-
+from problems.checks import check_choice, check_count
 from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
 from ..assembly import Assembly
-from ..base import NLP, Transcription
+from ..base import NLP, Meshed
 from ..phases.layout import Layout
-from ..phases.mesh import PhaseMesh, as_meshes
+from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends
 from .element import Tables
 from .phase import DFETPhase
 
+BASES = ("lobatto", "bernstein")
+
 
 @dataclass(frozen=True)
-class DFET(Transcription):
+class DFET(Meshed):
     """Direct Finite Elements in Time.
 
     Parameters
@@ -61,57 +62,48 @@ class DFET(Transcription):
     basis: str = "lobatto"
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
+    word = "dfet"
+    examples = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1)"
+
     def __post_init__(self) -> None:
-        least = {"elements": 1, "order": 0, "control_order": 0}
-        for name, value in (("elements", self.elements), ("order", self.order), ("control_order", self.degree_of_controls)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least[name]:
-                raise ValueError(f"DFET: {name} must be an integer of at least {least[name]}, not {value!r}")
-        if self.basis not in ("lobatto", "bernstein"):
-            raise ValueError(f"DFET: basis must be 'lobatto' or 'bernstein', not {self.basis!r}")
-        if self.mesh is not None:
-            try:
-                object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
-            except ValueError as error:
-                raise ValueError(f"DFET: {error}") from None
+        super().__post_init__()
+        if self.control_order is not None:
+            check_count("DFET: control_order", self.control_order, 0)
+        check_choice("DFET: basis", self.basis, BASES)
 
-    @property
-    def degree_of_controls(self) -> int:
-        """q, in the phases that have no mesh of their own."""
-        return self.order if self.control_order is None else self.control_order
+    def degree_of_controls(self, order: int) -> int:
+        """q, where states have degree `order`."""
+        return order if self.control_order is None else self.control_order
 
-    @property
-    def meshes(self) -> dict[str, PhaseMesh]:
-        """The phases that have elements of their own."""
-        return dict(self.mesh or ())
+    def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> DFET:
+        """See `Meshed.remeshed`: the coefficients of Bernstein polynomials bound them."""
+        other = super().remeshed(meshes)
+        return replace(other, basis="bernstein") if bounded else other
 
-    def mesh_of(self, phase: str) -> PhaseMesh:
-        """The mesh of a phase, by its name."""
-        return self.meshes.get(phase) or PhaseMesh.uniform(self.elements, self.order)
+    @classmethod
+    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> DFET:
+        """See `Transcription.from_word`."""
+        orders = [int(one) for one in options if one.isdecimal()]
+        bases = [one for one in options if not one.isdecimal()]
+        if len(numbers) != 2 or len(orders) > 1 or len(bases) > 1:
+            raise ValueError(f"write it as {cls.examples}")
+        return cls(*numbers, control_order=orders[0] if orders else None, basis=bases[0] if bases else "lobatto")
 
-    def remeshed(self, meshes: Mapping[str, PhaseMesh], *, basis: str | None = None) -> DFET:
-        """The same method on other meshes, and in another basis where one is given."""
-        return replace(self, mesh={**self.meshes, **meshes}, basis=basis or self.basis)
-
-    def to_dict(self) -> dict[str, Any]:
-        """See `Transcription.to_dict`."""
-        meshes = {name: mesh.to_dict() for name, mesh in self.meshes.items()} or None
-        settings = {"elements": self.elements, "order": self.order, "control_order": self.control_order, "basis": self.basis}
-        return {"method": "DFET", "settings": settings | {"mesh": meshes}}
+    def to_word(self) -> str:
+        """See `Transcription.to_word`."""
+        options = [*([] if self.basis == "lobatto" else [self.basis]), *([] if self.control_order is None else [str(self.control_order)])]
+        return ":".join([super().to_word(), *options])
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`."""
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
-        names = [phase.name for phase in compiled.phases]
-        for name in self.meshes:
-            if name not in names:
-                raise ValueError(f"DFET: a mesh is given for phase '{name}'; the phases of '{compiled.name}' are {', '.join(names)}")
-
+        compiled = problem.compile()
+        self.check_phases(compiled)
         for phase in compiled.phases:
             _need_derivatives(phase)
 
         @cache
         def tables(order: int) -> Tables:
-            return Tables(order, order if self.control_order is None else self.control_order, self.basis)
+            return Tables(order, self.degree_of_controls(order), self.basis)
 
         def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> DFETPhase:
             mesh = self.mesh_of(phase.name)

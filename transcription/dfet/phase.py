@@ -13,11 +13,9 @@ from problems.compiled import CompiledPhase, Variable
 from ..numerics.batched import expanded
 from ..numerics.periodic import unwrapped, wrapped
 from ..numerics.polynomials import gauss_legendre
-from ..phases.guess import along, line
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
-from ..trajectories.limits import looked_at
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .element import Tables, element_function
 from .propagation import Propagation
@@ -31,10 +29,10 @@ class DFETPhase(PhaseWriter):
     """
 
     def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
-        self.mesh, self.tables, self.phase, self.ends = mesh, tables, phase, ends
+        super().__init__(phase, layout, ends)
+        self.mesh, self.tables = mesh, tables
         self.n = elements = mesh.elements
         self.places, self.widths = mesh.places, np.diff(mesh.places)
-        self._layout = layout
         prefix = f"{phase.name}."
         self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
@@ -59,14 +57,13 @@ class DFETPhase(PhaseWriter):
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
-        n, tables, phase, pick = self.n, self.tables, self.phase, self._layout.pick
+        n, tables, phase, pick = self.n, self.tables, self.phase, self.layout.pick
         left, right, (U, *times) = pick(extended, self.B[:-1]), pick(extended, self.B[1:]), self._inputs(extended)
         weak, integrals, paths, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
-        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], tests * n), self._labels(tests), propagated=True)
-        for k, limit in enumerate(phase.paths):
-            rows.add(paths[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
+        self.add_dynamics(rows, residual)
+        self.add_paths(rows, paths)
         nu, totals = len(phase.controls), ca.sum2(integrals)
         if self._sizes:
             totals = self._with_sizes(totals, pick(extended, self.S), sizes, times[1], rows)
@@ -83,18 +80,11 @@ class DFETPhase(PhaseWriter):
             entries[row] = ca.sum2(0.5 * lengths * on_elements)
         return ca.vertcat(*entries)
 
-    def guess(self, extended: np.ndarray) -> None:
-        """See `PhaseWriter.guess`."""
-        t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
-        edges, inside = np.array(self.mesh.edges[1:]), self.mesh.inside(self.tables.state_nodes)
-        for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
-            start = extended[:, self.ends.initial[i]]
-            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
-            for slots, share in ((self.B[1:, i], edges), (self.X[:, :, i], inside)):
-                given = self.phase.guesses.get(state.name)
-                values = line(start, end, share) if given is None else along(given, t0, tf, share)
-                self._layout.write(extended, slots, np.clip(values, state.lower, state.upper))
-            self._layout.write(extended, self.B[-1:, i], np.clip(extended[:, self.B[-1:, i]], *final))
+    def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `PhaseWriter.state_nodes`."""
+        inside = self.mesh.inside(self.tables.state_nodes).ravel()
+        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), -1)])
+        return slots, np.concatenate([self.mesh.edges[1:], inside])
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.control_nodes`."""
@@ -103,14 +93,14 @@ class DFETPhase(PhaseWriter):
 
     def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
         """See `PhaseWriter.propagate`."""
-        initial = self._layout.pick(extended, self.ends.initial)
-        right, X, residual = self._propagation.fly(robust)(initial, *self._inputs(extended))
-        extended = self._layout.replaced(extended, np.concatenate([self.X.ravel(), self.B[1:].ravel()]), ca.veccat(X, right))
+        initial = self.layout.pick(extended, self.ends.initial)
+        right, X, residual = self._propagation.elements(robust)(initial, *self._inputs(extended))
+        extended = self.layout.replaced(extended, np.concatenate([self.X.ravel(), self.B[1:].ravel()]), ca.veccat(X, right))
         return extended, right[:, -1], residual.T
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
-        n, nx, pick = self.n, len(self.phase.states), self._layout.pick
+        n, nx, pick = self.n, len(self.phase.states), self.layout.pick
         left, X = pick(extended, self.B[:-1]), pick(extended, self.X)
         blocks = ca.horzsplit(self._propagation.derivatives(interior)(X, left, *self._inputs(extended)), self._propagation.inputs)
         edges, inside = [S[(self.ends.initial % S.shape[0]).tolist(), :]], []
@@ -121,34 +111,34 @@ class DFETPhase(PhaseWriter):
         slots, values = [self.B[1:].ravel()], edges[1:]
         if interior:
             slots, values = [*slots, self.X.ravel()], [*values, *inside]
-        return self._layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
+        return self.layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
 
     def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
-        """What else goes into the elements, side by side: controls, starts, lengths, and s."""
-        s = self._layout.pick(extended, self.ends.statics)
+        """The other inputs of the elements, side by side: controls, starts, lengths, and s."""
+        s = self.layout.pick(extended, self.ends.statics)
         mean = (s[1] - s[0]) / self.n
         starts, lengths = s[0] + mean * ca.DM(self.places[:-1]).T, mean * ca.DM(self.widths).T
-        return self._layout.pick(extended, self.U), starts, lengths, ca.repmat(s, 1, self.n)
+        return self.layout.pick(extended, self.U), starts, lengths, ca.repmat(s, 1, self.n)
 
     def _outer(self, j: int) -> ca.DM:
         """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of element j, which never change: these
         are free variables or constants."""
-        seeds = self._layout.seeds()
+        seeds = self.layout.seeds()
         controls, statics = (seeds[(slots.ravel() % seeds.shape[0]).tolist(), :] for slots in (self.U[j], self.ends.statics))
         mean = (statics[1, :] - statics[0, :]) / self.n
         return ca.vertcat(controls, statics[0, :] + mean * self.places[j], mean * self.widths[j], statics)
 
-    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
+    def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
         """See `PhaseWriter.interpolate`."""
-        phase, tables, length = self.phase, self.tables, flown.tf - flown.t0
+        phase, tables, t0, length = self.phase, self.tables, trajectory.t0, trajectory.tf - trajectory.t0
         # Between the ends of this mesh's elements, where a control may jump: Gauss-Legendre nodes never meet them.
         nodes_of_states, nodes_of_controls = gauss_legendre(tables.order + 1)[0], gauss_legendre(tables.control_order + 1)[0]
-        states = flown.state(flown.t0 + length * self.mesh.inside(nodes_of_states))
-        controls = unwrapped(flown.control(flown.t0 + length * self.mesh.inside(nodes_of_controls)), phase.controls)
-        at_edges = flown.state(flown.t0 + length * np.array(self.mesh.edges[1:-1]))
-        self._layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
-        self._layout.write(extended, self.U, wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)[None])
-        self._layout.write(extended, self.B[1:-1], at_edges[None])
+        states = trajectory.state(t0 + length * self.mesh.inside(nodes_of_states))
+        controls = unwrapped(trajectory.control(t0 + length * self.mesh.inside(nodes_of_controls)), phase.controls)
+        at_edges = trajectory.state(t0 + length * np.array(self.mesh.edges[1:-1]))
+        self.layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
+        self.layout.write(extended, self.U, wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)[None])
+        self.layout.write(extended, self.B[1:-1], at_edges[None])
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
@@ -160,29 +150,7 @@ class DFETPhase(PhaseWriter):
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)
         points = tables.points[:-1]
         time = np.append((edges[:-1, None] + 0.5 * (1.0 + points) * np.diff(edges)[:, None]).ravel(), edges[-1])
-        states = np.vstack([(tables.flown(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
+        states = np.vstack([(tables.collocation(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
         inner = (tables.control(points) @ control.coefficients).reshape(len(time) - 1, len(phase.controls))
-        controls = wrapped(np.vstack([inner, control.ends()[1][-1:]]), phase.controls)
-        paths, _ = looked_at(phase, states, controls, time, s)
-        return PhaseTrajectory(
-            name=phase.name,
-            time_unit=phase.time_unit,
-            time=time,
-            states=states,
-            controls=controls,
-            paths=paths,
-            state=PiecewisePolynomial(edges, closed, "closed-legendre"),
-            control=control,
-            state_variables=phase.states,
-            control_variables=phase.controls,
-            path_limits=phase.paths,
-        )
-
-    def _labels(self, tests: int) -> list[str]:
-        """What a miss is called: an imposed final value enters the last row of the last element, which therefore bears its name."""
-        names = [f"dynamics of {self.phase.name}.{v.name}" for v in self.phase.states]
-        last = [
-            f"final value of {self.phase.name}.{v.name}" if low == high else name
-            for v, (low, high), name in zip(self.phase.states, self.phase.final, names, strict=True)
-        ]
-        return names * (tests * self.n - 1) + last
+        controls = np.vstack([inner, control.ends()[1][-1:]])
+        return self.trajectory(extended, time, states, controls, PiecewisePolynomial(edges, closed, "closed-legendre"), control)

@@ -2,7 +2,7 @@
 
 On each element the first l + 1 tests give the states at the quadrature nodes, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that
 system is small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element;
-elsewhere, and for whatever these five leave unsolved, a rootfinder iterates.
+elsewhere, and where these five do not converge, a rootfinder iterates.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Propagation:
     quick : bool
         Whether Newton steps are written out.
     inputs : int
-        nx + (q + 1) nu + 2 + len(s): how many numbers an element is a function of.
+        nx + (q + 1) nu + 2 + len(s): the number of scalar inputs of an element.
     """
 
     def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:
@@ -57,13 +57,13 @@ class Propagation:
         self.quick = self._step is not None
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
-    def fly(self, robust: bool) -> ca.Function:
+    def elements(self, robust: bool) -> ca.Function:
         """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N (l + 1)), residuals (1, N));
         inputs of elements stand side by side."""
         step = self._step
         if robust or step is None:
             step = _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
-        return step.mapaccum("flight", self.n)
+        return step.mapaccum("elements", self.n)
 
     def derivatives(self, interior: bool) -> ca.Function:
         """(X, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls' coefficients

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT, largest
+from problems.checks import short_repr
 
-__all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "InnerResult", "InnerSolver", "result", "scored", "started"]
+from ..base import CONVERGED, FAILED, NLP, TIMEOUT, largest
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class InnerResult:
-    """What became of k candidates.
+    """Feasible points near k candidates, as far as they were found.
 
     Attributes
     ----------
@@ -25,17 +25,17 @@ class InnerResult:
     violation : array (k,)
         Largest scaled residual there; infinite where it is no number.
     status : array (k,) of str
-        "converged" (violation within the tolerance, whatever the solver said), "infeasible", "failed" or "timeout".
+        "converged" (violation within the tolerance, also where the solver reports a failure), "infeasible", "failed" or "timeout".
     moved : array (k,)
         Euclidean distance of the free variables from the candidate, in spans of their bounds.
     iterations : array (k,) of int
         Of the solver; a propagation counts as one.
     clocked : bool
-        Whether a clock ended any of the work, whatever came of it: then the same candidates need not give the same result again.
+        Whether a clock ended any of the work: then the same candidates need not give the same result again.
     fallbacks : int
         How many candidates a faster method left to a slower one.
     residuals : array (k, n + r), optional
-        What `NLP.residuals` returns there, for those who want to know each constraint's own. Without it, they have it computed from z.
+        What `NLP.residuals` returns there, from which the violation of each constraint follows; None: to be computed from z.
     """
 
     z: np.ndarray
@@ -48,6 +48,11 @@ class InnerResult:
     fallbacks: int = 0
     residuals: np.ndarray | None = None
 
+    def __repr__(self) -> str:
+        found, counts = np.unique(self.status, return_counts=True)
+        shown = ", ".join(f"{count} {status}" for status, count in zip(found, counts, strict=True))
+        return f"InnerResult({len(self.z)} candidates{': ' * bool(shown)}{shown})"
+
 
 class InnerSolver(ABC):
     """Makes candidates feasible. An implementation is a frozen dataclass of its settings; nothing that it keeps between two calls
@@ -55,6 +60,10 @@ class InnerSolver(ABC):
 
     The result for one candidate depends on that candidate, its warm start and the composition of the batch, and on nothing else.
     """
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.__repr__ = short_repr  # type: ignore[method-assign]
 
     @abstractmethod
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
@@ -81,16 +90,16 @@ def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.nda
     return Z
 
 
-def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, said: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
-    """Score vectors (k, n) that a solver returned for `start` (k, n); `said` (k,) is the status of those that turn out infeasible."""
-    return scored(nlp, (Z, *nlp.residuals(Z)), start, said, iterations, tolerance)
+def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, otherwise: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
+    """Score vectors (k, n) that a solver returned for `start` (k, n); `otherwise` (k,) is the status of those that are infeasible."""
+    return scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
 
 
 def scored(
     nlp: NLP,
     found: tuple[np.ndarray, np.ndarray, np.ndarray],
     start: np.ndarray,
-    said: np.ndarray,
+    otherwise: np.ndarray,
     iterations: np.ndarray,
     tolerance: float,
 ) -> InnerResult:
@@ -98,13 +107,13 @@ def scored(
     Z, F, residuals = found
     violation = largest(residuals)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
-    status = np.where(violation <= tolerance, CONVERGED, said)
+    status = np.where(violation <= tolerance, CONVERGED, otherwise)
     moved = nlp.distance(Z, start)
     if not finite.all():
         broken = ~finite
         Z = np.where(finite[:, None], Z, start)
         F[broken], violation[broken], moved[broken], status[broken] = np.nan, np.inf, 0.0, FAILED
-    clocked = TIMEOUT in said
+    clocked = TIMEOUT in otherwise
     return InnerResult(
         z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=clocked, residuals=residuals
     )

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ..base import NLP
-from ..nlp.scaling import SAID, back_in_bounds, origin, quiet, scaled_bounds
+from problems.checks import check_choice, check_count, check_positive
+from problems.derived import remembered
+
+from ..base import FAILED, NLP, TIMEOUT
+from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..numerics.batched import expanded
 from ..stopping import stopping
-from .base import FAILED, TIMEOUT, InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, result, started
 
 
 @dataclass(frozen=True)
@@ -41,40 +43,37 @@ class Ipopt(InnerSolver):
     seconds: float = 60.0
 
     def __post_init__(self) -> None:
-        if self.objective not in ("projection", "constant"):
-            raise ValueError(f"Ipopt: objective must be 'projection' or 'constant', not {self.objective!r}")
-        if isinstance(self.max_iterations, bool) or not isinstance(self.max_iterations, int) or self.max_iterations < 1:
-            raise ValueError(f"Ipopt: max_iterations must be a whole number of at least 1, not {self.max_iterations!r}")
-        if not 0 < self.seconds < float("inf"):
-            raise ValueError(f"Ipopt: seconds must be a positive number, not {self.seconds!r}")
+        check_choice("Ipopt: objective", self.objective, ("projection", "constant"))
+        check_count("Ipopt: max_iterations", self.max_iterations, 1)
+        check_positive("Ipopt: seconds", self.seconds)
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`.
 
         A projection that does not converge is tried once more from propagated states. What stays infeasible comes back as it would be
-        flown, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
+        propagated, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
         (`stopping`), what is left of the batch is not solved, and has the status "timeout".
         """
         start = nlp.tighten(started(nlp, candidates, warm))
-        Z, said, iterations = self._solve_all(nlp, start, start, tolerance)
+        Z, status, iterations = self._solve_all(nlp, start, start, tolerance)
         _, violation = nlp.evaluate(Z)
-        again = np.flatnonzero(~(violation <= tolerance) & (said != TIMEOUT))
+        again = np.flatnonzero(~(violation <= tolerance) & (status != TIMEOUT))
         if len(again) and self.objective == "projection":
-            Z[again], said[again], more = self._solve_all(nlp, start[again], nlp.propagate(start[again]), tolerance)
+            Z[again], status[again], more = self._solve_all(nlp, start[again], nlp.propagate(start[again]), tolerance)
             iterations[again] += more
             _, violation = nlp.evaluate(Z)
         left = np.flatnonzero(~(violation <= tolerance))
         if len(left):
-            flown = nlp.propagate(Z[left])
-            usable = np.isfinite(nlp.evaluate(flown)[1])
-            Z[left[usable]] = flown[usable]
-        return result(nlp, Z, start, said, iterations, tolerance)
+            propagated = nlp.propagate(Z[left])
+            usable = np.isfinite(nlp.evaluate(propagated)[1])
+            Z[left[usable]] = propagated[usable]
+        return result(nlp, Z, start, status, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
         solver, lower, upper = _program(nlp, self, tolerance)
         scale, zero = nlp.scale, origin(nlp)
-        Z, said, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
+        Z, status, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
             if not np.isfinite(guess[row]).all():
@@ -83,7 +82,7 @@ class Ipopt(InnerSolver):
                 Z[row] = guess[row]
                 continue
             if stopping():
-                said[row] = TIMEOUT
+                status[row] = TIMEOUT
                 continue
             y0 = np.clip((guess[row] - zero) / scale, lower, upper)
             answer = solver(
@@ -91,12 +90,12 @@ class Ipopt(InnerSolver):
             )
             stats = solver.stats()
             Z[row] = back_in_bounds(nlp, zero + np.array(answer["x"]).ravel() * scale)
-            said[row] = SAID.get(stats["return_status"], FAILED)
+            status[row] = STATUS_OF_IPOPT.get(stats["return_status"], FAILED)
             iterations[row] = stats["iter_count"]
-        return nlp.tighten(Z), said, iterations
+        return nlp.tighten(Z), status, iterations
 
 
-@lru_cache(maxsize=8)
+@remembered
 def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
     """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
@@ -110,7 +109,7 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
 
 
 def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
-    options = quiet(settings.seconds, settings.max_iterations)
+    options = ipopt_options(settings.seconds, settings.max_iterations)
     options |= {"ipopt.tol": 0.1 * tolerance, "ipopt.constr_viol_tol": 0.1 * tolerance}
     if settings.objective == "projection":
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
@@ -121,7 +120,7 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
             "ipopt.bound_frac": 1e-8,
             "ipopt.bound_relax_factor": 0.0,
             "ipopt.nlp_scaling_method": "none",
-            # The objective tells how near the candidate a point is: without this, objectives of the problem would be off by 1e-4 of their
+            # The objective is the distance from the candidate: without this, objectives of the problem would be off by 1e-4 of their
             # ranges where the constraints are met already.
             "ipopt.tol": min(1e-10, 0.1 * tolerance),
             "ipopt.acceptable_tol": 0.1 * tolerance,

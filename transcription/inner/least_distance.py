@@ -7,7 +7,7 @@ from scipy.optimize import nnls
 
 ITERATIONS = 7
 REGULAR = 1e-12
-"""Part of the diagonal entries that is added to them: rows may say the same thing twice."""
+"""Part of the diagonal entries that is added to them: rows may be linearly dependent."""
 STUCK = 1e-6
 """A row of whose size no more than this is left, where variables are clipped, could not be moved."""
 MET, EXACT = 1e-6, 1e-10

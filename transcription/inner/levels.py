@@ -1,4 +1,4 @@
-"""The default inner level: fast where it converges, and a nonlinear program for the rest."""
+"""The inner levels by name, and those two that need no file of their own: the default, and propagation alone."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base import NLP
-from .base import CONVERGED, INFEASIBLE, InnerResult, InnerSolver, scored, started
+from ..base import CONVERGED, INFEASIBLE, NLP
+from .base import InnerResult, InnerSolver, scored, started
 from .ipopt import Ipopt
 from .newton import Newton
 
@@ -41,7 +41,7 @@ class Propagate(InnerSolver):
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
         k = len(start)
-        return scored(nlp, nlp.fly(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        return scored(nlp, nlp.propagate_and_score(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
 
 
 NAMED: dict[str, InnerSolver] = {

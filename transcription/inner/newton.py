@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import NLP
-from ..phases.reduced import Flown, Reduced
-from .base import INFEASIBLE, InnerResult, InnerSolver, result, started
+from ..base import INFEASIBLE, NLP
+from ..phases.reduced import Propagated, Reduced
+from .base import InnerResult, InnerSolver, result, started
 from .least_distance import least_distance
 
 NEAR = 0.1
-"""Largest scaled residual of the equations at which inequalities are looked at, and steps remembered: from afar both only stand in the
-way."""
+"""Largest scaled residual of the equations at which inequalities are considered, and steps remembered: from afar both only do
+harm."""
+
+
+CAP = 0.3
+"""Longest step, in spans."""
 
 
 STILL = 1e-6
@@ -39,55 +43,54 @@ class Newton(InnerSolver):
     Parameters
     ----------
     max_iterations : int
-    cap : float
-        Longest step, in spans.
     """
 
     max_iterations: int = 40
-    cap: float = 0.3
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
         Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
         going = _Going(nlp, start)
-        # Numbers that overflowed are told by what comes back, not by warnings.
+        # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore", over="ignore"):
             for iteration in range(self.max_iterations):
-                flown = nlp.reduced.fly(going.vectors())
-                outside = _outside(nlp.reduced, flown)
+                propagated = nlp.reduced.propagate(going.vectors())
+                outside = _outside(nlp.reduced, propagated)
                 worst, pull = outside.max(axis=1, initial=0.0), going.center - going.x
                 distance = _norm(pull)
                 found = (worst <= 0.1 * tolerance) & (going.settled | (distance == 0.0))
                 # Keep what was found; else what is nearest to the candidate of what is feasible, else what is least infeasible.
                 merit = np.where(found, -1.0, np.where(worst <= 0.5 * tolerance, distance, 2.0 * len(nlp.free) + worst))
                 better = np.flatnonzero(merit < best[going.index])
-                Z[going.index[better]], best[going.index[better]] = flown.Z[better], merit[better]
+                Z[going.index[better]], best[going.index[better]] = propagated.Z[better], merit[better]
                 iterations[going.index] = iteration + 1
                 on = np.flatnonzero((worst < np.inf) & ~found)
                 if len(on) < len(found):
                     if not len(on):
                         break
                     going.keep(on)
-                    flown, outside, pull = Flown(flown.Z[on], flown.values[on]), outside[on], pull[on]
-                self._advance(going, iteration, flown, outside, pull, tolerance)
+                    propagated, outside, pull = Propagated(propagated.Z[on], propagated.values[on]), outside[on], pull[on]
+                self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
 
-    def _advance(self, going: _Going, iteration: int, flown: Flown, outside: np.ndarray, pull: np.ndarray, tolerance: float) -> None:
-        """One step of those that go on, from where they were flown."""
+    def _advance(
+        self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
+    ) -> None:
+        """One step of those that go on, from their propagated vectors."""
         near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
         going.watch((outside > 0.1 * tolerance) & near[:, None])
         if going.settled.any():
             pull = np.where(going.settled[:, None], 0.0, pull)
-        step = going.towards(flown, pull)
+        step = going.towards(propagated, pull)
         length = _norm(step)
-        if length.max() > self.cap:
-            far = np.flatnonzero(length > self.cap)
-            step[far] *= self.cap / length[far, None]
+        if length.max() > CAP:
+            far = np.flatnonzero(length > CAP)
+            step[far] *= CAP / length[far, None]
             going.multipliers[far] = 0.0  # the next step is of another kind: these would lead it astray
-            length = np.minimum(length, self.cap)
+            length = np.minimum(length, CAP)
         # The next step, if it shrinks as this one did.
         left = length * np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
@@ -98,7 +101,7 @@ class Newton(InnerSolver):
         accelerated = near & ~going.settled
         if iteration >= PLAIN and accelerated.any():
             improved = going.memory.improve(going.x, step, accelerated)
-            improved *= np.minimum(1.0, self.cap / np.maximum(_norm(improved), 1e-300))[:, None]
+            improved *= np.minimum(1.0, CAP / np.maximum(_norm(improved), 1e-300))[:, None]
             step = np.where(accelerated[:, None], improved, step)
         going.x = np.minimum(np.maximum(going.x + step, -going.walls), 1.0 + going.walls)
 
@@ -113,7 +116,7 @@ class _Going:
     x, center : arrays (k, d)
         Where they are, and the candidates themselves.
     watched : array (k, rows) of bool
-        The rows of the reduced problem that steps look at: equations, and what was violated on the way.
+        The rows of the reduced problem that steps consider: equations, and what was violated on the way.
     multipliers : array (k, rows)
         Those of the last step.
     inside : array (k,) of bool
@@ -145,7 +148,7 @@ class _Going:
         self.memory.keep(on)
 
     def watch(self, rows: np.ndarray) -> None:
-        """From now on look at these rows (k, rows) too."""
+        """From now on consider these rows (k, rows) too."""
         self.watched |= rows
         self.inside = (self.watched & self.reduced.inside).any(axis=1)
 
@@ -155,17 +158,17 @@ class _Going:
         self._vectors[:, self.free] = np.minimum(np.maximum(self.origin + x * self.span, self.origin), self.top)
         return self._vectors
 
-    def towards(self, flown: Flown, pull: np.ndarray) -> np.ndarray:
+    def towards(self, propagated: Propagated, pull: np.ndarray) -> np.ndarray:
         """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched."""
         count = int(np.count_nonzero(self.inside))
         if count in (0, len(pull)):
-            return self._towards(slice(None), flown, pull)
+            return self._towards(slice(None), propagated, pull)
         step = np.empty_like(pull)
         for some in np.flatnonzero(self.inside), np.flatnonzero(~self.inside):  # apart: the derivatives of the first are costly
-            step[some] = self._towards(some, Flown(flown.Z[some], flown.values[some]), pull[some])
+            step[some] = self._towards(some, Propagated(propagated.Z[some], propagated.values[some]), pull[some])
         return step
 
-    def _towards(self, some: slice | np.ndarray, flown: Flown, pull: np.ndarray) -> np.ndarray:
+    def _towards(self, some: slice | np.ndarray, propagated: Propagated, pull: np.ndarray) -> np.ndarray:
         """The same for some of them, whose vectors and pull are given."""
         reduced, watched = self.reduced, self.watched[some]
         rows = np.flatnonzero(watched.any(axis=0))
@@ -173,8 +176,8 @@ class _Going:
         if not len(rows):
             return np.clip(pull, *box)
         scale, equation = reduced.scale[rows], reduced.equation[rows]
-        A = reduced.derivatives(flown, rows) * (self.span / scale[:, None])
-        values = flown.values[:, rows]
+        A = reduced.derivatives(propagated, rows) * (self.span / scale[:, None])
+        values = propagated.values[:, rows]
         lower, upper = (reduced.lower[rows] - values) / scale, (reduced.upper[rows] - values) / scale
         multipliers = self.multipliers[some][:, rows]
         if not equation.all():
@@ -195,9 +198,9 @@ def _norm(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("kd,kd->k", vectors, vectors))
 
 
-def _outside(reduced: Reduced, flown: Flown) -> np.ndarray:
+def _outside(reduced: Reduced, propagated: Propagated) -> np.ndarray:
     """Scaled distance (k, rows) from the limits of what is left to satisfy, negative inside; NaN where it is no number."""
-    return np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale
+    return np.maximum(reduced.lower - propagated.values, propagated.values - reduced.upper) / reduced.scale
 
 
 REGULAR = 1e-10

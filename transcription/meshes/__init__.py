@@ -1,1 +1,1 @@
-"""How wrong a mesh is, and what to do about it."""
+"""Mesh refinement: errors of a mesh, and the next finer one."""

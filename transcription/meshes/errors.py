@@ -1,4 +1,4 @@
-"""How wrong a trajectory is, and where: element by element, by means that do not trust the transcription."""
+"""Errors of a trajectory element by element, independent of the transcription."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEEP = 3.0
 ON_BOUND = 1e-3
 """A control is on a bound if it is nearer than this, in spans."""
 FLAT = 1e-4
-"""What varies by less than this, in spans of its bounds, on an element is as good as constant: how it decays says nothing."""
+"""A quantity that varies by less than this on an element, in spans of its bounds, counts as constant: its rate of decay means nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class PhaseErrors:
     Attributes
     ----------
     defect : array (N,)
-        Largest difference between the state at the end of an element and what an integrator makes of the state at its beginning and of its
+        Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with its
         controls, in spans of the states' bounds; infinite where the integration breaks down.
     integral : array (N,)
         The same for integrals, of which the transcription has a quadrature at its nodes, in sizes of their sums over all elements.
@@ -69,13 +69,15 @@ def phase_errors(
     return [_errors(phase, trajectory[phase.name], parameters, rtol, atol, method) for phase in problem.phases]
 
 
-def _errors(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str) -> PhaseErrors:
-    elements = range(len(flown.state.edges) - 1)
-    excess = excess_by_element(phase, flown, parameters)
+def _errors(
+    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
+) -> PhaseErrors:
+    elements = range(len(trajectory.state.edges) - 1)
+    excess = excess_by_element(phase, trajectory, parameters)
     names = {v.name for v in phase.controls}
     nothing = np.zeros(len(elements))
-    controls, states = _coefficients(flown)
-    defect, integral = local_defects(phase, flown, parameters, rtol, atol, method)
+    controls, states = _coefficients(trajectory)
+    defect, integral = local_defects(phase, trajectory, parameters, rtol, atol, method)
     return PhaseErrors(
         defect=defect,
         integral=integral,
@@ -83,38 +85,38 @@ def _errors(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
         tail=np.abs(controls[:, 1:][:, -2:]).max(axis=(1, 2), initial=0.0),
         rate=np.minimum(decay_rates(states), decay_rates(controls)),
-        steep=np.array([_steepest(flown, j) for j in elements]),
+        steep=np.array([_steepest(trajectory, j) for j in elements]),
     )
 
 
 def local_defects(
-    phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
+    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """See `PhaseErrors.defect` and `PhaseErrors.integral`."""
-    elements, span = len(flown.state.edges) - 1, np.array([v.span for v in phase.states])
-    s = np.concatenate([[flown.t0, flown.tf], parameters])
+    elements, span = len(trajectory.state.edges) - 1, np.array([v.span for v in phase.states])
+    s = np.concatenate([[trajectory.t0, trajectory.tf], parameters])
     nothing = np.zeros(phase.integrands.size1_out(0))
     tolerances = atol * np.concatenate([span, np.ones(len(nothing))])
-    starts = np.array([np.concatenate([start, nothing]) for start in flown.edge_states[:-1]])
-    arcs = Arcs.of(phase, [(flown, j, parameters) for j in range(elements)])
-    reached = arcs.fly(starts, rtol, tolerances, method)[:, -1]
-    defect = (np.abs(reached[:, : len(span)] - flown.edge_states[1:]) / span).max(axis=1)
+    starts = np.array([np.concatenate([start, nothing]) for start in trajectory.edge_states[:-1]])
+    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements)])
+    reached = arcs.integrate(starts, rtol, tolerances, method)[:, -1]
+    defect = (np.abs(reached[:, : len(span)] - trajectory.edge_states[1:]) / span).max(axis=1)
     if not len(nothing):
         return _or_infinite(defect), np.zeros(elements)
-    integrals = _quadrature(phase, flown, s)
+    integrals = _quadrature(phase, trajectory, s)
     sizes = np.abs(integrals).sum(axis=0)
     difference = np.abs(reached[:, len(span) :] - integrals) / np.where(sizes > 0, sizes, 1.0)
     return _or_infinite(defect), _or_infinite(difference.max(axis=1))
 
 
-def _quadrature(phase: CompiledPhase, flown: PhaseTrajectory, s: np.ndarray) -> np.ndarray:
+def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray) -> np.ndarray:
     """Integrals (N, k) over each element by Gauss-Legendre's rule on as many nodes as the trajectory has inside it."""
-    edges = flown.state.edges
-    tau, weights = gauss_legendre(max(1, (len(flown.time) - 1) // (len(edges) - 1) - 1))
+    edges = trajectory.state.edges
+    tau, weights = gauss_legendre(max(1, (len(trajectory.time) - 1) // (len(edges) - 1) - 1))
     found = []
     for j, length in enumerate(np.diff(edges)):
         times = edges[j] + 0.5 * (1.0 + tau) * length
-        values = np.array(phase.integrands(flown.state.on_element(j, tau).T, flown.controls_on(j, tau).T, times[None], s))
+        values = np.array(phase.integrands(trajectory.state.on_element(j, tau).T, trajectory.controls_on(j, tau).T, times[None], s))
         found.append(0.5 * length * values @ weights)
     return np.array(found)
 
@@ -146,21 +148,21 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     return np.minimum(rates, found.min(axis=1, initial=np.inf))
 
 
-def _coefficients(flown: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
+def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
     """Legendre coefficients (N, k, columns) of the controls and of the states on each element, in spans of their bounds."""
     found = []
-    for piece, variables in ((flown.control, flown.control_variables), (flown.state, flown.state_variables)):
+    for piece, variables in ((trajectory.control, trajectory.control_variables), (trajectory.state, trajectory.state_variables)):
         k = piece.coefficients.shape[1]
         tau = gauss_legendre(k)[0]
         found.append(legendre_coefficients(piece.on_elements(tau)) / np.array([v.span for v in variables]))
-    # States pass through the stages and both ends of an element, but by collocation their degree is one less: the last is always 0.
-    return found[0], found[1][:, :-1]
+    # Through stages and both ends of an element pass polynomials whose degree, by collocation, is one less: the last is always 0.
+    return found[0], found[1][:, :-1] if trajectory.state.basis == "closed-legendre" else found[1]
 
 
-def _steepest(flown: PhaseTrajectory, j: int) -> float:
+def _steepest(trajectory: PhaseTrajectory, j: int) -> float:
     """See `PhaseErrors.steep`, on element j."""
-    variables = flown.control_variables
-    values = flown.control.on_element(j, DENSE) / np.array([v.span for v in variables])
+    variables = trajectory.control_variables
+    values = trajectory.control.on_element(j, DENSE) / np.array([v.span for v in variables])
     for i, v in enumerate(variables):
         if v.period is None and not np.isnan(place := _switch(values[:, i], v.lower / v.span)):
             return place
@@ -168,7 +170,7 @@ def _steepest(flown: PhaseTrajectory, j: int) -> float:
         return np.nan
     middle = 0.5 * (DENSE[1:] + DENSE[:-1])
     change = np.abs(np.diff(values, axis=0))
-    # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), whatever they are to describe.
+    # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), in any case.
     slopes = change / np.diff(DENSE)[:, None] * np.sqrt(1.0 - middle[:, None] ** 2)
     mean = change.sum(axis=0) / 2.0
     ratio = np.where(mean > FLAT, slopes.max(axis=0) / np.where(mean > 0, mean, 1.0), 0.0)
@@ -177,7 +179,7 @@ def _steepest(flown: PhaseTrajectory, j: int) -> float:
 
 
 def _switch(values: np.ndarray, lower: float) -> float:
-    """Where a control, given at `DENSE` in spans, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
+    """The place where a control, given at `DENSE` in spans, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
     on = np.minimum(np.abs(values - lower), np.abs(values - lower - 1.0)) < ON_BOUND
     changes = 0.5 * (DENSE[1:] + DENSE[:-1])[on[1:] != on[:-1]]
     if not len(changes) or np.ptp(values) < 10.0 * ON_BOUND:

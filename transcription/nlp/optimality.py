@@ -1,4 +1,4 @@
-"""How far a feasible vector is from satisfying the first-order conditions of Pareto optimality, whoever found it."""
+"""Residual of the first-order conditions of Pareto optimality at a feasible vector."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
-from .scaling import gradients, objective_scales
+from .scaling import gradients, nlp_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
 DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
-"""Regularisation of equality rows that say the same twice; refinement takes it away again."""
+"""Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
 REFINEMENTS, EXACT = 3, 1e-12
 """As many at most, until what is left of the right-hand sides is this part of them."""
 
@@ -32,8 +32,8 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     where mu >= 0 sums to 1, lambda belongs to equalities, nu >= 0 to inequalities and bounds with slacks c >= 0, and where the derivatives
     with respect to the other variables, the states, vanish: lambda is the adjoint that the dynamics give, and what is left is the gradient
     in the controls, times and parameters (Fritz John's conditions in the objectives; Karush, Kuhn and Tucker's in the constraints). At a
-    local Pareto optimum that is regular it is 0. Elsewhere it says how fast all objectives can fall together, in their scales per span of
-    the free variables. It says nothing of violations; and a point that is optimal in the weak sense only, one objective being at its
+    local Pareto optimum that is regular it is 0. Elsewhere it is how fast all objectives can fall together, in their scales per span of
+    the free variables. It does not include violations; and a point that is optimal in the weak sense only, one objective being at its
     least value while another could still fall, has 0 as well.
 
     Parameters
@@ -43,7 +43,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         Feasible.
     F_scales : array (m,), optional
         What counts as one in each objective, the front's range for instance; by default, and for entries
-        that are not positive, `objective_scales`.
+        that are not positive, `nlp_scales`.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
     if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
         return float("inf")
-    natural = objective_scales(nlp)
+    natural = nlp_scales(nlp)
     scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
     unit = _units(nlp)
     dF = dF * unit / scales[:, None]
@@ -69,7 +69,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
 
 
 def _units(nlp: NLP) -> np.ndarray:
-    """What counts as one in each variable: the span of its bounds; the scale of a peak, which has none."""
+    """The unit of each variable: the span of its bounds; the scale of a peak, which has none."""
     return np.where(np.isfinite(nlp.span), nlp.span, nlp.scale)
 
 

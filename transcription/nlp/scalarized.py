@@ -5,43 +5,43 @@
 With positive weights this is Pascoletti and Serafini, "Scalarizing vector optimization problems", JOTA 42(4), 1984: from the reference
 along the weights to the front. A weight of 0 makes the reference a hard limit, so that one positive weight is the epsilon-constraint
 method; an infinite reference leaves an objective out, so that one positive weight and nothing else is plain minimisation. With the
-objectives of a feasible point as the reference, alpha <= 0 says that none got worse than there.
+objectives of a feasible point as the reference, alpha <= 0 means that none got worse than there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from problems.derived import remembered
 from problems.peaks import refuse_peaks
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import stopping
-from .scaling import SAID, back_in_bounds, objective_scales, origin, quiet, scaled_bounds, symbol
+from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, nlp_scales, origin, scaled_bounds, symbol
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
 PEAK_LIMIT = 3.0
-"""How many times their scale, or their value at the start, peaks may rise: nothing else bounds those that are not minimised."""
+"""Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those that are not minimised."""
 AT_END, RESTARTS = 1e-2, 3
-"""How near, in widths of its box, a variable is to an end that stops it; how often a solve may begin anew for that."""
+"""Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
-class _Manner:
-    """How IPOPT goes about it: its options, how far free variables may move in spans, whether alpha may not exceed the start's."""
+class _Strategy:
+    """A strategy of IPOPT: its options, how far free variables may move in spans, whether alpha may not exceed the start's."""
 
     options: tuple[tuple[str, object], ...]
     radius: float = np.inf
     held: bool = False
 
 
-ADAPTIVE = _Manner((
+ADAPTIVE = _Strategy((
     ("mu_strategy", "adaptive"),
     ("fast_step_computation", "yes"),
     ("mumps_scaling", 0),
@@ -49,19 +49,19 @@ ADAPTIVE = _Manner((
     ("mumps_pivot_order", 0),
 ))  # fmt: skip
 """Few iterations from good points and poor ones, and cheap ones: what is scaled already needs neither scaling nor refinement."""
-NEAR = _Manner(
+NEAR = _Strategy(
     (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4)),
     radius=0.1,
     held=True,
 )
 """Stays in the basin of a feasible start."""
-SLOW = _Manner((("mu_init", 0.1),))
+SLOW = _Strategy((("mu_init", 0.1),))
 """IPOPT as it comes."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solved:
-    """What came of one solve.
+    """The result of one solve.
 
     Attributes
     ----------
@@ -89,10 +89,13 @@ class Solved:
     clocked: bool = False
     begun: bool = True
 
+    def __repr__(self) -> str:
+        return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
+
 
 @dataclass(frozen=True)
 class _Settings:
-    """What a program is built for."""
+    """The settings of a program."""
 
     tolerance: float
     max_iterations: int
@@ -121,7 +124,7 @@ class _Task:
         return float(np.max((F - self.shift)[moving] / (self.scale * self.slope)[moving]))
 
     def excess(self, F: np.ndarray) -> float:
-        """How far F (m,) exceeds hard limits, in scales."""
+        """The amount by which F (m,) exceeds hard limits, in scales."""
         over = (F - self.shift) / self.scale
         hard = self.used & (self.slope == 0)
         return float(np.fmax(over - self.top, np.where(hard, over, -np.inf)).max(initial=0.0))
@@ -148,7 +151,7 @@ def scalarize(
     start : array (n,)
         A full vector; its states need not obey the dynamics. From a point near the answer the solve takes a few iterations.
     reference, weights : arrays (m,)
-        For minimised objectives. Weights are not negative, and say what counts as much in each objective; weight 0: a hard limit at the
+        For minimised objectives. Weights are not negative, and are what counts as much in each objective; weight 0: a hard limit at the
         reference. Reference +inf: the objective does not matter.
     ceiling : array (m,), optional
         Hard limits of the objectives beside; +inf for none.
@@ -180,7 +183,7 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     if stopping():
         return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
-    # With a margin, a start that misses it is none to be held on to.
+    # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
     worse = feasible and task.value(first.F) > tolerance
@@ -216,18 +219,18 @@ def _task(
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
-    scale = objective_scales(nlp)
+    scale = nlp_scales(nlp)
     slope = np.where(moving, weights, 0.0) / scale
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))
     return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale, lower + inside, upper - inside)
 
 
-def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> Solved:
+def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> Solved:
     """A run of IPOPT, and more from where it stopped, as long as that is an end of a box that the problem does not have."""
     iterations = 0
     for _ in range(RESTARTS + 1):
-        solved, stuck = _attempt(nlp, task, start, settings, manner)
+        solved, stuck = _attempt(nlp, task, start, settings, strategy)
         iterations += solved.iterations
         if not stuck or solved.clocked:
             break
@@ -237,35 +240,35 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, mann
     return replace(solved, iterations=iterations)
 
 
-def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, manner: _Manner) -> tuple[Solved, bool]:
+def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    solver = _program(nlp, settings, manner.options)
+    solver = _program(nlp, settings, strategy.options)
     y = np.clip((start - origin(nlp)) / nlp.scale, *scaled_bounds(nlp))
-    lower, upper, made_up = _box(nlp, y, manner.radius)
+    lower, upper, made_up = _box(nlp, y, strategy.radius)
     none = np.full(2 * len(task.used), -np.inf)
     answer = solver(
         x0=np.append(y, 0.0),
         p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
         lbx=np.append(lower, -np.inf),
-        ubx=np.append(upper, 0.0 if manner.held else np.inf),
+        ubx=np.append(upper, 0.0 if strategy.held else np.inf),
         lbg=np.concatenate([task.lower, none]),
         ubg=np.concatenate([task.upper, np.where(task.used, 0.0, np.inf), task.top]),
     )
     stats = solver.stats()
-    words, iterations = stats["return_status"], int(stats["iter_count"])
+    outcome, iterations = stats["return_status"], int(stats["iter_count"])
     y = np.array(answer["x"]).ravel()[:-1]
     stuck = bool((made_up & (np.stack([y - lower, upper - y]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
     z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
     F, violation = nlp.evaluate(z[None])
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
-        z, said = start, FAILED
+        z, status = start, FAILED
         F, violation = nlp.evaluate(z[None])
     elif violation[0] <= tolerance and task.excess(F[0]) <= tolerance:
-        said = CONVERGED if words in SOLVED else SAID.get(words, FAILED)
+        status = CONVERGED if outcome in SOLVED else STATUS_OF_IPOPT.get(outcome, FAILED)
     else:
-        said = INFEASIBLE if words in SOLVED else SAID.get(words, FAILED)
-    return Solved(z, F[0], float(violation[0]), said, iterations, "Time" in words), stuck
+        status = INFEASIBLE if outcome in SOLVED else STATUS_OF_IPOPT.get(outcome, FAILED)
+    return Solved(z, F[0], float(violation[0]), status, iterations, "Time" in outcome), stuck
 
 
 def _box(nlp: NLP, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -285,11 +288,11 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
     return (missed if missed > tolerance else 0.0, value if np.isfinite(value) else np.inf)
 
 
-@lru_cache(maxsize=32)
+@remembered
 def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
     """The program of `_parts` for IPOPT, with these settings and options."""
     parts, derivatives = _parts(nlp)
-    options = quiet(settings.seconds, settings.max_iterations) | {
+    options = ipopt_options(settings.seconds, settings.max_iterations) | {
         "ipopt.tol": ACCURACY,
         "ipopt.acceptable_tol": 100 * ACCURACY,
         "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
@@ -299,7 +302,7 @@ def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], 
     return ca.nlpsol("scalarized", "ipopt", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
 
 
-@lru_cache(maxsize=16)
+@remembered
 def _parts(nlp: NLP) -> tuple[dict[str, Any], dict[str, ca.Function]]:
     """The program in x = (y, a), y the scaled variables, and its derivatives; its parameters are shift, 1 / scale and slope of `_Task`."""
     refuse_peaks(nlp.problem)

@@ -1,24 +1,25 @@
-"""What the nonlinear programs of this floor share: variables in units of their scales, and a silent IPOPT."""
+"""Scaling of nonlinear programs, their derivatives, and options of IPOPT."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from problems.derived import remembered
+
 from ..base import INFEASIBLE, NLP, TIMEOUT
 
-SAID = {
+STATUS_OF_IPOPT = {
     "Infeasible_Problem_Detected": INFEASIBLE,
     "Maximum_CpuTime_Exceeded": TIMEOUT,
     "Maximum_WallTime_Exceeded": TIMEOUT,
 }
-"""What IPOPT's last words mean, where they say more than that it failed."""
+"""The status that a return status of IPOPT means, where it is not just a failure."""
 
 
-def quiet(seconds: float, max_iterations: int) -> dict[str, Any]:
+def ipopt_options(seconds: float, max_iterations: int) -> dict[str, Any]:
     """Options of a CasADi `nlpsol` with IPOPT that prints nothing, raises nothing and ends in time."""
     return {
         "print_time": False,
@@ -33,7 +34,7 @@ def quiet(seconds: float, max_iterations: int) -> dict[str, Any]:
 
 
 def origin(nlp: NLP) -> np.ndarray:
-    """Where y = (z - origin) / scale is 0, (n,): the lower bounds, so that a narrow range far from zero keeps its digits."""
+    """The origin (n,) of y = (z - origin) / scale: the lower bounds, so that a narrow range far from zero keeps its digits."""
     return np.where(np.isfinite(nlp.lower), nlp.lower, 0.0)
 
 
@@ -52,13 +53,13 @@ def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
 
 
 SAMPLES = 31
-"""Where the slopes of objectives are looked at to know their scales."""
+"""Number of places where the slopes of objectives are evaluated for their scales."""
 
 
-@lru_cache(maxsize=16)
-def objective_scales(nlp: NLP) -> np.ndarray:
-    """What counts as one in each objective (m,) as long as nobody knows the front: what it would change by, to first order, if all
-    variables moved by their scales; the median over the box, 1 where that is nothing.
+@remembered
+def nlp_scales(nlp: NLP) -> np.ndarray:
+    """The scales of the objectives (m,) where the front is not known: its change, to first order, if all variables moved by
+    their scales; the median over the box, 1 where that is 0.
     """
     rng = np.random.default_rng(0)
     lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
@@ -67,7 +68,7 @@ def objective_scales(nlp: NLP) -> np.ndarray:
     return np.where(sizes > 0, sizes, 1.0)
 
 
-@lru_cache(maxsize=8)
+@remembered
 def gradients(nlp: NLP) -> ca.Function:
     """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
     z = symbol(nlp, "z", len(nlp.variables))

@@ -63,7 +63,7 @@ class Batched:
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
 
-        Every input holds what the calls take one after the other, column by column: its leading axis is k, or a multiple of it.
+        Every input has what the calls take one after the other, column by column: its leading axis is k, or a multiple of it.
 
         Raises
         ------
@@ -205,7 +205,7 @@ def widened(function: ca.Function, k: int) -> ca.Function:
 
 
 CHAIN = "chain"
-"""What a Function is called that repeats so much that it, and what it is a part of, is not to be written out."""
+"""Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
 
 
 def expanded(function: ca.Function) -> ca.Function:

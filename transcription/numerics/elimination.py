@@ -13,8 +13,8 @@ def eliminate(matrix: ca.SX, right: ca.SX) -> ca.SX:
     """The solution of `matrix` x = `right` as an expression.
 
     Gaussian elimination with pivots on the diagonal, in the order that fills in least (Markowitz 1957). There is no pivoting for size, so
-    the values are only good where the diagonal dominates or nearly does, as in a Newton step of a short element: whoever uses them looks
-    at what is left of the residual.
+    the values are only good where the diagonal dominates or nearly does, as in a Newton step of a short element: the caller has to check
+    the residual.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def eliminate(matrix: ca.SX, right: ca.SX) -> ca.SX:
 
 
 def _forward(rows: list[Row], sides: list[Row]) -> list[int]:
-    """Bring the rows to triangular form; returns the order of the pivots. Row p then holds itself and the columns of later pivots."""
+    """Bring the rows to triangular form; returns the order of the pivots. Row p then has itself and the columns of later pivots."""
     left = set(range(len(rows)))
     order = []
     while left:

@@ -32,7 +32,7 @@ def lobatto_nodes(n: int) -> np.ndarray:
 
 @cache
 def nodes(basis: str, degree: int) -> np.ndarray:
-    """Where a basis' coefficients live on [-1, 1], shape (degree + 1,).
+    """The places of a basis' coefficients on [-1, 1], shape (degree + 1,).
 
     Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends), those of Bernstein's the equally spaced
     abscissae of the control points. Raises ValueError for an unknown basis.

@@ -1,1 +1,1 @@
-"""What every method shares about one phase."""
+"""One phase, as far as all methods share it."""

@@ -1,4 +1,4 @@
-"""Where each quantity of a problem lives in the vector of the NLP."""
+"""The places of a problem's quantities in the vector of the NLP."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Layout:
     A slot is the index of a variable, or a negative number for a constant: a quantity whose bounds coincide is no variable. Two quantities
     that are always equal (a linked boundary state) share one slot. Beside these there are *hidden* quantities, which are no variables
     either, but follow from them at some expense: states in between, integrals. Slots are those of the *extended* vector: the variables,
-    the hidden quantities, then the constants; `index` tells where.
+    the hidden quantities, then the constants; see `index`.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class Layout:
         return len(self.variables) + self.hidden + len(self._constants)
 
     def index(self, slots: np.ndarray) -> np.ndarray:
-        """Where in the extended vector slots are, a flat array."""
+        """Indices of slots in the extended vector, a flat array."""
         flat = slots.ravel()
         return np.where(flat >= HIDDEN, flat - HIDDEN + len(self.variables), flat % self.total)
 
@@ -85,10 +85,10 @@ class Layout:
         shape = slots.shape[-1], int(np.prod(slots.shape[:-1]))
         return ca.reshape(extended[self.index(slots).tolist()], *shape) if slots.size else ca.MX(*shape)
 
-    def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX) -> ca.MX:
-        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are. It is one
-        permutation: to split rows and join them again would cost far more."""
-        total, kept = extended.shape[0], np.flatnonzero(slots.ravel() >= 0)
+    def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX, *, constants: bool = False) -> ca.MX:
+        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are, unless they are
+        to be replaced too. It is one permutation: to split rows and join them again would cost far more."""
+        total, kept = extended.shape[0], np.flatnonzero((slots.ravel() >= 0) | constants)
         places = np.arange(total)
         places[self.index(slots)[kept]] = total + kept
         return ca.vertcat(extended, values)[places.tolist(), :]

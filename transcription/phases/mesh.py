@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import check_count
+
 SHORTEST = 1e-9
 """Shortest element, relative to its phase: below, its length is mostly rounding."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PhaseMesh:
     """Elements of any lengths, of one order.
 
@@ -39,10 +41,12 @@ class PhaseMesh:
             edges = np.empty((0, 0))
         if edges.ndim != 1 or len(edges) < 2 or (edges[0], edges[-1]) != (0.0, 1.0) or not (np.diff(edges) >= SHORTEST).all():
             raise ValueError(f"edges of a mesh must increase from 0 to 1, by at least {SHORTEST:g} each, not {self.edges!r}")
-        if isinstance(self.order, bool) or not isinstance(self.order, int | np.integer) or self.order < 0:
-            raise ValueError(f"order of a mesh must be a whole number of at least 0, not {self.order!r}")
+        check_count("order of a mesh", self.order, 0)
         object.__setattr__(self, "edges", tuple(edges.tolist()))
         object.__setattr__(self, "order", int(self.order))
+
+    def __repr__(self) -> str:
+        return f"PhaseMesh({self.elements} elements of order {self.order})"
 
     @classmethod
     def uniform(cls, elements: int, order: int) -> PhaseMesh:

@@ -18,12 +18,12 @@ from .writer import PhaseWriter
 SOLVED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
 MOST = 20_000_000
-"""Most derivatives that are held at once."""
+"""Most derivatives in memory at once."""
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
-    """Propagated vectors `Z` (k, n), the values (k, rows) of what is left to satisfy, and F (k, m) and g (k, r) if they show on the way."""
+class Propagated:
+    """Propagated vectors `Z` (k, n), values (k, rows) of the constraints that are left, and F (k, m) and g (k, r) where known."""
 
     Z: np.ndarray
     values: np.ndarray
@@ -31,7 +31,7 @@ class Flown:
 
 
 class Reduced:
-    """What propagation leaves to satisfy: lower <= values <= upper.
+    """The constraints that propagation leaves to satisfy: lower <= values <= upper.
 
     The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
     propagation does not satisfy.
@@ -42,11 +42,11 @@ class Reduced:
     writers : sequence of PhaseWriter
         In the order of time.
     peaks : pair of array (p,) and Function
-        Slots of the peaks, and z -> (p,), what they have to be; here and below, z are the variables and the hidden quantities.
+        Slots of the peaks, and z -> (p,), their values; here and below, z are the variables and the hidden quantities.
     rest : tuple of Function and arrays (r,)
         z -> (r,), those constraints; their lower and upper limits and scales.
     scores : Function and array (r,) of int, optional
-        z -> (F, g), to be known of whatever is propagated, and which of the rows of g are those constraints.
+        z -> (F, g), to be evaluated with each propagation, and which of the rows of g are those constraints.
 
     Attributes
     ----------
@@ -82,36 +82,36 @@ class Reduced:
         self.inside = self._rows_inside()
         self._among_ends = np.cumsum(~self.inside) - 1
 
-    def fly(self, Z: np.ndarray) -> Flown:
+    def propagate(self, Z: np.ndarray) -> Propagated:
         """Propagate vectors (k, n), of which only the free entries matter."""
-        flown, values, residual, *scores = self._quick(Z)
+        propagated, values, residual, *scores = self._quick(Z)
         if not residual.max(initial=0.0) <= SOLVED:
             unsolved = ~(residual.max(axis=1) <= SOLVED)
-            flown[unsolved], values[unsolved], _, *again = self._robust(Z[unsolved])
+            propagated[unsolved], values[unsolved], _, *again = self._robust(Z[unsolved])
             for found, better in zip(scores, again, strict=True):
                 found[unsolved] = better
-        return Flown(flown, values, (scores[0], scores[1]) if scores else None)
+        return Propagated(propagated, values, (scores[0], scores[1]) if scores else None)
 
-    def derivatives(self, flown: Flown, rows: np.ndarray) -> np.ndarray:
+    def derivatives(self, propagated: Propagated, rows: np.ndarray) -> np.ndarray:
         """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
         interior = bool(self.inside[rows].any())
         function, chosen = (self._everywhere, rows) if interior else (self._at_ends, self._among_ends[rows])
         count, d = len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
-        found = np.empty((len(flown.Z), len(rows), d))
+        found = np.empty((len(propagated.Z), len(rows), d))
         some = max(1, MOST // max(1, count * d))
         for first in range(0, len(found), some):
-            part = flown.Z[first : first + some]
+            part = propagated.Z[first : first + some]
             found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
         return found
 
     @cached_property
     def _quick(self) -> Batched:
-        wide = (lambda k: self._flight(robust=False, k=k)) if all(writer.wide for writer in self._writers) else None
-        return Batched(self._flight(robust=False), compiled=self._compilable, wide=wide)
+        wide = (lambda k: self._propagation(robust=False, k=k)) if all(writer.wide for writer in self._writers) else None
+        return Batched(self._propagation(robust=False), compiled=self._compilable, wide=wide)
 
     @cached_property
     def _robust(self) -> Batched:
-        return Batched(self._flight(robust=True), compiled=False)
+        return Batched(self._propagation(robust=True), compiled=False)
 
     @cached_property
     def _at_ends(self) -> Batched:
@@ -125,7 +125,7 @@ class Reduced:
     def _compilable(self) -> bool:
         return all(writer.compilable for writer in self._writers)
 
-    def _flight(self, *, robust: bool, k: int = 1) -> ca.Function:
+    def _propagation(self, *, robust: bool, k: int = 1) -> ca.Function:
         """z -> (propagated z, values, residuals of the equations of states [, F, g]); for k vectors side by side, if writers are `wide`."""
         start = ca.MX.sym("z", len(self._layout.variables), k)
         extended, finals, residuals = self._layout.extended_symbol(start), [], []
@@ -134,7 +134,7 @@ class Reduced:
             finals.append(final)
             residuals.append(residual)
         z, *found = self._judged().map(k).call([extended, ca.vertcat(*finals)])
-        return ca.Function("flight", [start], [ca.densify(value) for value in (z, found[0], ca.vertcat(*residuals), *found[1:])])
+        return ca.Function("propagation", [start], [ca.densify(value) for value in (z, found[0], ca.vertcat(*residuals), *found[1:])])
 
     def _judged(self) -> ca.Function:
         """(propagated extended vector, final states of all phases) -> (z with its peaks, values [, F, g])."""

@@ -1,18 +1,23 @@
-"""What a method writes: one phase. The rest of an NLP is the same for all methods (`assembly.py`)."""
+"""The contract of a method: how it writes one phase. The rest of an NLP is the same for all methods (`assembly.py`)."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..trajectories.trajectory import PhaseTrajectory
-from .guess import along
+from ..numerics.periodic import wrapped
+from ..trajectories.limits import paths_and_peaks
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from .guess import along, line
+from .layout import Layout
+from .state_equations import StateEquations
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +62,12 @@ class Rows:
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
 
     @property
+    def propagated_equations(self) -> ca.MX:
+        """Scaled residuals (count, 1) of the equations that propagation satisfies."""
+        chosen = [i for i, propagated in enumerate(self.propagated) if propagated and (self.lower[i] == self.upper[i]).all()]
+        return ca.vertcat(ca.MX(0, 1), *(self.expressions[i] / self.scale[i] for i in chosen))
+
+    @property
     def left(self) -> np.ndarray:
         """Indices of the rows that propagation does not satisfy."""
         return np.flatnonzero(np.repeat(~np.array(self.propagated, dtype=bool), [e.numel() for e in self.expressions]))
@@ -64,8 +75,8 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a phase gives to objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
-    and what the variables at `PhaseWriter.magnitudes` have to be at least (column)."""
+    """Quantities of a phase for objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
+    and the least values of the variables at `PhaseWriter.magnitudes` (column)."""
 
     first_control: ca.MX
     last_control: ca.MX
@@ -75,34 +86,73 @@ class Written:
 
 
 class PhaseWriter(ABC):
-    """One phase, written by one method. Made with the layout, in which it has put its variables, and with the phase's ends."""
+    """One phase, written by one method: its variables, its rows, its propagation and its trajectory.
 
-    phase: CompiledPhase
-    ends: Ends
-    interior: np.ndarray
-    """Slots of the states and hidden quantities that `sensitivity` replaces only on demand."""
-    compilable: bool
-    """Whether what `propagate` does fast, and `sensitivity`, can be written in C."""
+    An implementation puts its variables into the layout when it is made, and has the four abstract methods below. Propagation and its
+    derivatives follow from the rows of dynamics, guess and interpolation from the nodes; a method that can do better overrides them.
+
+    Parameters
+    ----------
+    phase : CompiledPhase
+    layout : Layout
+    ends : Ends
+
+    Attributes
+    ----------
+    interior : array of int
+        Slots of the states and hidden quantities that `sensitivity` replaces only on demand.
+    magnitudes : array of int
+        Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known.
+    compilable : bool
+        Whether fast propagation, and `sensitivity`, can be written in C.
+    wide : bool
+        Whether `propagate` takes several extended vectors side by side.
+    """
+
+    interior: np.ndarray = np.empty(0, dtype=int)
     magnitudes: np.ndarray = np.empty(0, dtype=int)
-    """Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known."""
+    compilable: bool = False
     wide: bool = False
-    """Whether `propagate` takes several extended vectors side by side."""
+
+    def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+        self.phase, self.layout, self.ends = phase, layout, ends
+
+    @abstractmethod
+    def write(self, extended: ca.MX, rows: Rows) -> Written:
+        """Add the rows of dynamics and path constraints of an extended symbol, hidden quantities and all.
+
+        `add_dynamics` and `add_paths` do so with the labels and scales that all methods share.
+        """
+
+    @abstractmethod
+    def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slots (k, nx) of the states that the rows of dynamics determine, the final ones among them, and where they lie (k,): 0 at t0, 1
+        at tf."""
+
+    @abstractmethod
+    def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slots (k, nu) of the coefficients of the controls, in their order in time, and where they lie (k,): 0 at t0, 1 at tf."""
+
+    @abstractmethod
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """The phase's trajectory from one extended vector; `trajectory` completes what the method knows."""
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
         return extended
 
-    @abstractmethod
-    def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """Add the rows of dynamics and path constraints of an extended symbol, hidden quantities and all."""
-
-    @abstractmethod
     def guess(self, extended: np.ndarray) -> None:
         """Fill in the states of extended vectors (k, ...), whose times, parameters, controls and initial states are set."""
-
-    @abstractmethod
-    def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Slots (k, nu) of the coefficients of the controls, in their order in time, and where they lie (k,): 0 at t0, 1 at tf."""
+        t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
+        slots, share = self.state_nodes()
+        for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
+            start = extended[:, self.ends.initial[i]]
+            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
+            given = self.phase.guesses.get(state.name)
+            values = line(start, end, share) if given is None else along(given, t0, tf, share)
+            self.layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
+            last = self.ends.final[i : i + 1]
+            self.layout.write(extended, last, np.clip(extended[:, last], *final))
 
     def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
         """The user's guess of the controls, where there is one, by slot."""
@@ -114,16 +164,28 @@ class PhaseWriter(ABC):
                 found.update(zip(places.tolist(), np.clip(values, control.lower, control.upper), strict=True))
         return found
 
-    @abstractmethod
+    def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
+        """Fill in the states between the ends, and the controls, of one extended vector (1, ...) from a trajectory of the phase.
+
+        By default their values at the nodes. Bounds are seen to afterwards.
+        """
+        length = trajectory.tf - trajectory.t0
+        slots, share = self.control_nodes()
+        controls = trajectory.control(trajectory.t0 + length * share)
+        self.layout.write(extended, slots, wrapped(controls, self.phase.controls)[None])
+        slots, share = self.state_nodes()
+        between = (slots != self.ends.final).any(axis=1)
+        self.layout.write(extended, slots[between], trajectory.state(trajectory.t0 + length * share[between])[None])
+
     def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Propagation from the initial states.
+        """Propagation from the initial states. By default Newton's method on all rows of dynamics, from constant states.
 
         Parameters
         ----------
         extended : MX (e, 1), or (e, k) if the writer is `wide`
             An extended symbol, of which the states are to be replaced. What comes back has as many columns.
         robust : bool
-            To solve the equations of states by whatever it takes; otherwise fast, if need be with a residual.
+            To solve the equations of states at any cost; otherwise fast, if need be with a residual.
 
         Returns
         -------
@@ -132,12 +194,13 @@ class PhaseWriter(ABC):
         MX (nx, 1)
             The final states, also where they are imposed and so no variables.
         MX (any, 1)
-            Scaled residuals of the equations of states, which have to be looked at where it is not `robust`.
+            Scaled residuals of the equations of states, which have to be checked where it is not `robust`.
         """
+        return self._equations.propagate(extended, self.ends.initial)
 
-    @abstractmethod
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
-        """Derivatives of the states of an extended symbol, which are propagated, by the free variables.
+        """Derivatives of the states of an extended symbol, which are propagated, by the free variables. By default those of the implicit
+        function that the rows of dynamics define.
 
         Parameters
         ----------
@@ -155,11 +218,55 @@ class PhaseWriter(ABC):
         MX (nx, d)
             Of the final states, also where they are imposed.
         """
+        return self._equations.sensitivity(extended, S)
 
-    @abstractmethod
-    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
-        """Fill in states and controls of one extended vector (1, ...) from a trajectory of the phase; bounds are seen to afterwards."""
+    @cached_property
+    def _equations(self) -> StateEquations:
+        """The rows of dynamics as equations of the states; to be asked for once the layout is complete."""
+        extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
+        self.write(extended, rows)
+        return StateEquations(self.phase, self.layout, extended, rows.propagated_equations, self.state_nodes()[0], self.ends.final)
 
-    @abstractmethod
-    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
-        """The phase's trajectory from one extended vector."""
+    def add_dynamics(self, rows: Rows, residual: ca.MX) -> None:
+        """Add rows residual = 0 of a matrix (nx, k) in the order of time, which propagation satisfies.
+
+        An imposed final value enters the last column, whose rows therefore bear its name.
+        """
+        states, k = self.phase.states, residual.shape[1]
+        names = [f"dynamics of {self.phase.name}.{v.name}" for v in states]
+        last = [
+            f"final value of {self.phase.name}.{v.name}" if low == high else name
+            for v, (low, high), name in zip(states, self.phase.final, names, strict=True)
+        ]
+        rows.add(residual, 0, 0, np.tile([v.scale for v in states], k), names * (k - 1) + last, propagated=True)
+
+    def add_paths(self, rows: Rows, values: ca.MX) -> None:
+        """Add the path constraints, of which `values` (npath, k) are samples."""
+        for k, limit in enumerate(self.phase.paths):
+            rows.add(values[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+
+    def trajectory(
+        self,
+        extended: np.ndarray,
+        time: np.ndarray,
+        states: np.ndarray,
+        controls: np.ndarray,
+        state: PiecewisePolynomial,
+        control: PiecewisePolynomial,
+    ) -> PhaseTrajectory:
+        """The trajectory of an extended vector from states (n, nx) and controls (n, nu) at nodes in time (n,), and the two polynomials."""
+        phase, controls = self.phase, wrapped(controls, self.phase.controls)
+        s = extended[self.layout.index(self.ends.statics)]
+        return PhaseTrajectory(
+            name=phase.name,
+            time_unit=phase.time_unit,
+            time=time,
+            states=states,
+            controls=controls,
+            paths=paths_and_peaks(phase, states, controls, time, s)[0],
+            state=state,
+            control=control,
+            state_variables=phase.states,
+            control_variables=phase.controls,
+            path_limits=phase.paths,
+        )

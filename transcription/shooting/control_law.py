@@ -19,7 +19,7 @@ DEGREES = {"constant": 0, "linear": 1, "spline": 3}
 
 @dataclass(frozen=True)
 class ControlLaw:
-    """What the values of a control at equally spaced nodes mean in between.
+    """A control by its values at equally spaced nodes.
 
     "constant": a value for each interval between two nodes; "linear": straight lines through a value at each node; "spline": the
     cubic spline through them that has a continuous third derivative at the second node and the last but one (de Boor, "A Practical Guide
@@ -52,7 +52,7 @@ class ControlLaw:
 
     @property
     def count(self) -> int:
-        """How many values there are of each control."""
+        """Number of values of each control."""
         return self.nodes - 1 if self.jumps else self.nodes
 
     @property
@@ -88,7 +88,7 @@ class ControlLaw:
         return values @ _sparse(self._on_steps(steps))
 
     def _on_steps(self, steps: np.ndarray) -> np.ndarray:
-        """How the coefficients on the steps follow from what describes the pieces between two nodes, (descriptions, N (degree + 1))."""
+        """Matrix (descriptions, N (degree + 1)) of the coefficients on the steps by what describes the pieces between two nodes."""
         middle, last = 0.5 * (steps[1:] + steps[:-1]), self.nodes - 1
         piece = np.minimum((middle * last).astype(int), last - 1)
         tau = 0.5 * (1.0 + lobatto_nodes(self.degree + 1))
@@ -122,7 +122,7 @@ def spline_slopes(nodes: int) -> ca.Function:
     inside = [3.0 * (u[k + 1] - u[k - 1]) for k in range(1, nodes - 1)]
     first, last = 0.5 * (u[2] + 4.0 * u[1] - 5.0 * u[0]), -0.5 * (u[-3] + 4.0 * u[-2] - 5.0 * u[-1])
     if nodes == 3:
-        # The two ends say the same: a parabola.
+        # The conditions at both ends are the same: a parabola.
         middle = 0.5 * (u[2] - u[0])
         return ca.Function("slopes", [u], [ca.vertcat(first - 2.0 * middle, middle, last - 2.0 * middle)])
     below, diagonal, above = ([1.0] * (nodes - 2) + [2.0], [1.0] + [4.0] * (nodes - 2) + [1.0], [2.0] + [1.0] * (nodes - 2))

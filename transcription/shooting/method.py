@@ -8,11 +8,10 @@ steps see `runge_kutta.py`.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-import numpy as np
-
+from problems.checks import check_choice, check_count
 from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
@@ -22,14 +21,14 @@ from ..phases.layout import Layout
 from ..phases.writer import Ends
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
-from .runge_kutta import tableau
+from .runge_kutta import TABLEAUX
 from .stability import check_steps
 from .step import Step, StepMesh
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True)
 class Shooting(Transcription):
-    """What single and multiple shooting have in common.
+    """Settings and transcription that single and multiple shooting share.
 
     Parameters
     ----------
@@ -38,13 +37,13 @@ class Shooting(Transcription):
     steps : int
         Equal steps of that method on each interval.
     control : "constant", "linear" or "spline"
-        What controls are between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
-        spline through a value at each. Their bounds hold at the nodes: everywhere, but for splines.
+        Controls between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
+        spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere.
     control_nodes : int, optional
-        How many equally spaced nodes the controls have, both ends among them; by default those of the states. No step leads across one:
+        Number of equally spaced nodes of the controls, both ends among them; by default those of the states. No step leads across one:
         where they fall into a step, it is divided.
     path_points : int
-        Path constraints hold, and peaks are looked at, at the ends of all steps and at as many equally spaced points inside each, which
+        Path constraints are imposed, and peaks sampled, at the ends of all steps and at as many equally spaced points inside each, which
         are reached by a step of the same method of that part of its length.
 
     Raises
@@ -59,51 +58,54 @@ class Shooting(Transcription):
     control_nodes: int | None = None
     path_points: int = 0
 
+    _counted: ClassVar[tuple[str, int]]
+    """The setting from which the number of intervals follows, and its least value."""
+
     def __post_init__(self) -> None:
         name = type(self).__name__
-        least = {**self._counted, "steps": 1, "control_nodes": 2, "path_points": 0}
-        for setting, smallest in least.items():
-            value = getattr(self, setting)
-            if setting == "control_nodes" and value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < smallest:
-                raise ValueError(f"{name}: {setting} must be an integer of at least {smallest}, not {value!r}")
-        try:
-            tableau(self.scheme)
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
-        if self.control not in DEGREES:
-            raise ValueError(f"{name}: control must be one of {', '.join(map(repr, DEGREES))}, not {self.control!r}")
-
-    @property
-    @abstractmethod
-    def _counted(self) -> dict[str, int]:
-        """The setting that says how many intervals there are, and its least value."""
+        for setting, least in (self._counted, ("steps", 1), ("path_points", 0)):
+            check_count(f"{name}: {setting}", getattr(self, setting), least)
+        if self.control_nodes is not None:
+            check_count(f"{name}: control_nodes", self.control_nodes, 2)
+        check_choice(f"{name}: scheme", self.scheme, TABLEAUX)
+        check_choice(f"{name}: control", self.control, DEGREES)
 
     @property
     @abstractmethod
     def _intervals(self) -> int:
-        """How many intervals there are between nodes."""
+        """Number of intervals between nodes."""
 
     @property
     @abstractmethod
     def _apart(self) -> bool:
         """Whether the states at the nodes are variables of their own."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """See `Transcription.to_dict`."""
-        settings = asdict(self)
-        return {"method": type(self).__name__, "settings": {**{name: settings[name] for name in self._counted}, **settings}}
+    @classmethod
+    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
+        """See `Transcription.from_word`: options are, in any order, a kind of control, its number of nodes, and a scheme."""
+        if not 1 <= len(numbers) <= 2:
+            raise ValueError(f"write it as {cls.examples}")
+        settings: dict[str, Any] = dict(zip((cls._counted[0], "steps"), numbers, strict=False))
+        for option in options:
+            name = "control" if option in DEGREES else "scheme" if option in TABLEAUX else "control_nodes" if option.isdecimal() else ""
+            if not name or name in settings:
+                known = f"{', '.join(DEGREES)}; {', '.join(TABLEAUX)}; or a number of nodes of the controls"
+                raise ValueError(f"'{option}' is given twice or unknown; there are {known}")
+            settings[name] = int(option) if name == "control_nodes" else option
+        return cls(**settings)
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.to_dict()['settings'].items())})"
+    def to_word(self) -> str:
+        """See `Transcription.to_word`."""
+        steps = f"x{self.steps}" if self.steps > 1 else ""
+        defaults = (self.control, "constant"), (self.control_nodes, None), (self.scheme, "rk4")
+        return ":".join([super().to_word() + steps, *(str(value) for value, default in defaults if value != default)])
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`. Raises ValueError, too, where steps are too long to be stable."""
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
-        scheme, law = tableau(self.scheme), ControlLaw(self.control, self.control_nodes or self._intervals + 1)
+        compiled = problem.compile()
+        scheme, law = TABLEAUX[self.scheme], ControlLaw(self.control, self.control_nodes or self._intervals + 1)
         mesh = StepMesh.of(self._intervals, self.steps, law.edges)
-        (count,) = self._counted
+        count, _ = self._counted
         check_steps(compiled, scheme, mesh.places, f"{type(self).__name__}: ", {count: getattr(self, count), "steps": self.steps})
 
         def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ShootingPhase:
@@ -115,13 +117,13 @@ class Shooting(Transcription):
         return Assembly(compiled, writer).nlp(self)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class SingleShooting(Shooting):
     """Each phase is integrated in one go from its initial states; its final states are the only ones that are variables.
 
     Made for searches that propagate their candidates (`inner="propagate"`): one pass gives trajectory, objectives and all residuals.
-    Bounds of states hold at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of nodes:
-    `MultipleShooting` is made for these.
+    Bounds of states are imposed at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of
+    nodes: `MultipleShooting` is made for these.
 
     Parameters
     ----------
@@ -133,9 +135,12 @@ class SingleShooting(Shooting):
 
     nodes: int
 
-    @property
-    def _counted(self) -> dict[str, int]:
-        return {"nodes": 2}
+    _counted = "nodes", 2
+    word = "shooting"
+    examples = (
+        "shooting:200 (200 nodes), shooting:200x2:linear:rk8 (2 steps between each, linear controls, another Runge-Kutta scheme), "
+        "shooting:200:spline:21 (controls on 21 nodes)"
+    )
 
     @property
     def _intervals(self) -> int:
@@ -146,7 +151,7 @@ class SingleShooting(Shooting):
         return False
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class MultipleShooting(Shooting):
     """The states at the nodes between equal intervals are variables of their own, and each interval is integrated from its left one.
 
@@ -162,9 +167,9 @@ class MultipleShooting(Shooting):
 
     intervals: int
 
-    @property
-    def _counted(self) -> dict[str, int]:
-        return {"intervals": 1}
+    _counted = "intervals", 1
+    word = "multiple-shooting"
+    examples = "multiple-shooting:40 (intervals), the rest as for shooting"
 
     @property
     def _intervals(self) -> int:

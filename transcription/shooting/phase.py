@@ -12,12 +12,10 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics.batched import CHAIN, Batched, widened, work
-from ..numerics.periodic import wrapped, wrapped_controls
+from ..numerics.periodic import wrapped_controls
 from ..numerics.polynomials import basis_matrix, lobatto_nodes
-from ..phases.guess import along, line
 from ..phases.layout import Layout
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
-from ..trajectories.limits import looked_at
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .control_law import ControlLaw
 from .step import Step, StepMesh
@@ -32,16 +30,17 @@ class ShootingPhase(PhaseWriter):
     """One phase on M intervals.
 
     Slots: `U` (values, nu) of the controls and, where the intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends,
-    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of whatever is flown in one
-    go; `Y` (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) what path
-    constraints and peaks see.
+    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of each shot; `Y`
+    (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) samples of path
+    constraints and peaks.
     """
 
     def __init__(
         self, mesh: StepMesh, law: ControlLaw, step: Step, phase: CompiledPhase, layout: Layout, ends: Ends, *, apart: bool
     ) -> None:
-        self.mesh, self.law, self.step, self.phase, self.ends, self.apart = mesh, law, step, phase, ends, apart
-        self._layout, nx, prefix = layout, len(phase.states), f"{phase.name}."
+        super().__init__(phase, layout, ends)
+        self.mesh, self.law, self.step, self.apart = mesh, law, step, apart
+        nx, prefix = len(phase.states), f"{phase.name}."
         inner = len(mesh.ends) - 2
         self.U = layout.add_table(prefix, phase.controls, law.count, 1, free=True)[:, 0]
         at_nodes = [replace(v, name=f"{v.name}[node]") for v in phase.states]
@@ -58,34 +57,24 @@ class ShootingPhase(PhaseWriter):
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """See `PhaseWriter.fill`."""
-        states, integrals, samples = zip(*self._shots_flown(extended), strict=True)
+        states, integrals, samples = zip(*self._propagated_shots(extended), strict=True)
         return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
-        phase, pick, n = self.phase, self._layout.pick, len(self.R)
-        residual = pick(extended, self.R) - pick(extended, self._arrivals)
-        rows.add(residual, 0, 0, np.tile([v.scale for v in phase.states], n), self._labels(), propagated=True)
+        phase, pick = self.phase, self.layout.pick
+        self.add_dynamics(rows, pick(extended, self.R) - pick(extended, self._arrivals))
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
             rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
         seen = pick(extended, self.W)
-        for k, limit in enumerate(phase.paths):
-            rows.add(seen[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{phase.name}'")
+        self.add_paths(rows, seen)
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
         return Written(self._control(first, 0.0), self._control(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
 
-    def guess(self, extended: np.ndarray) -> None:
-        """See `PhaseWriter.guess`."""
-        t0, tf, share = extended[:, self.ends.t0], extended[:, self.ends.tf], self.mesh.places[self._shots][1:]
-        slots = self._arrivals
-        for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
-            start = extended[:, self.ends.initial[i]]
-            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
-            given = self.phase.guesses.get(state.name)
-            values = line(start, end, share) if given is None else along(given, t0, tf, share)
-            self._layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
-            self._layout.write(extended, slots[-1:, i], np.clip(extended[:, slots[-1:, i]], *final))
+    def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `PhaseWriter.state_nodes`."""
+        return self._arrivals, self.mesh.places[self._shots][1:]
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.control_nodes`."""
@@ -98,18 +87,18 @@ class ShootingPhase(PhaseWriter):
         if k == 1:
             return *self._after(extended, *self._chain(n)(*begun)), ca.MX(0, 1)
         step = self.step.forward
-        flown = widened(step, k).mapaccum("steps", n)(_by_step(begun[0], k, 1), *(_by_step(part, k, n) for part in begun[1:]))
-        back = (_by_candidate(part, k, n, step.size_out(i)) for i, part in enumerate(flown))
+        results = widened(step, k).mapaccum("steps", n)(_by_step(begun[0], k, 1), *(_by_step(part, k, n) for part in begun[1:]))
+        back = (_by_candidate(part, k, n, step.size_out(i)) for i, part in enumerate(results))
         return *self._after.map(k)(extended, *back), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
         nx, nq, n = len(self.phase.states), len(self.Q), self.mesh.steps
-        inputs, initial = self._inputs(extended), self._layout.pick(extended, self.ends.initial)
-        states = self._fly(initial, *inputs)[0]
+        inputs, initial = self._inputs(extended), self.layout.pick(extended, self.ends.initial)
+        states = self._propagated(initial, *inputs)[0]
         before = ca.horzcat(initial, states[:, :-1])
         blocks = ca.horzsplit(self.step.gradient(samples=interior).map(n)(before, *inputs), self.step.inputs)
-        ends, q, seen = [S[self._layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
+        ends, q, seen = [S[self.layout.index(self.ends.initial).tolist(), :]], ca.MX(nq, S.shape[1]), []
         for i, D in enumerate(blocks):
             out = D[:, :nx] @ ends[-1] + D[:, nx:] @ self._outer[i]
             ends.append(out[:nx, :])
@@ -122,25 +111,17 @@ class ShootingPhase(PhaseWriter):
                 D = self.step.end_gradient(states[:, -1], *self._inputs(extended, n - 1))
                 seen.append(D[:, :nx] @ ends[-1] + D[:, nx:] @ self._outer[n - 1])
             slots, values = [*slots, self.Y, self.W], [*values, *(ends[i] for i in self.mesh.ends[1:-1] if len(self.Y)), *seen]
-        return self._layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), ends[n]
-
-    def interpolate(self, extended: np.ndarray, flown: PhaseTrajectory) -> None:
-        """See `PhaseWriter.interpolate`."""
-        length = flown.tf - flown.t0
-        values = flown.control(flown.t0 + length * self.law.places)
-        self._layout.write(extended, self.U, wrapped(values, self.phase.controls)[None])
-        nodes = self.mesh.places[self.mesh.ends][1:-1] if self.apart else np.empty(0)
-        self._layout.write(extended, self.B[1:-1], flown.state(flown.t0 + length * nodes)[None])
+        return self.layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), ends[n]
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, k = self.phase, self.law.degree + 1
-        C, states = (values[0] for values in self._flight(extended[None]))
-        s = extended[self._layout.index(self.ends.statics)]
+        C, states = (values[0] for values in self._on_steps(extended[None]))
+        s = extended[self.layout.index(self.ends.statics)]
         edges = s[0] + (s[1] - s[0]) * self.mesh.places
         control = PiecewisePolynomial(edges, C.reshape(self.mesh.steps, k, len(phase.controls)), "lobatto")
         table = states.reshape(self.mesh.steps, -1, len(phase.states))
-        B = extended[self._layout.index(self.B)].reshape(self.B.shape)
+        B = extended[self.layout.index(self.B)].reshape(self.B.shape)
         shots = self._shots
         table[shots[:-1], 0], table[shots[1:] - 1, -1] = B[:-1], B[1:]
         state = PiecewisePolynomial(edges, table, "lobatto")
@@ -148,43 +129,29 @@ class ShootingPhase(PhaseWriter):
         time = np.append((edges[:-1, None] + 0.5 * (1.0 + inside) * np.diff(edges)[:, None]).ravel(), edges[-1])
         nodes = np.vstack([*state.on_elements(inside), B[-1:]])
         controls = np.vstack([*control.on_elements(inside), control.ends()[1][-1:]])
-        controls = wrapped(controls, phase.controls)
-        paths, _ = looked_at(phase, nodes, controls, time, s)
-        return PhaseTrajectory(
-            name=phase.name,
-            time_unit=phase.time_unit,
-            time=time,
-            states=nodes,
-            controls=controls,
-            paths=paths,
-            state=state,
-            control=control,
-            state_variables=phase.states,
-            control_variables=phase.controls,
-            path_limits=phase.paths,
-        )
+        return self.trajectory(extended, time, nodes, controls, state, control)
 
     @property
     def _arrivals(self) -> np.ndarray:
-        """Slots of the states at the ends of what is flown in one go, as variables."""
+        """Slots of the states at the ends of the shots, as variables."""
         return self.B[1:] if self.apart else self.B[-1:]
 
     @cached_property
-    def _flight(self) -> Batched:
+    def _on_steps(self) -> Batched:
         """Extended vectors -> coefficients (N, degree + 1, nu) of the controls and states (N, order + 1, nx) at Gauss-Lobatto nodes of the
         steps, both flat."""
-        extended = ca.MX.sym("extended", self._layout.total)
-        inputs, left = self._inputs(extended), self._layout.pick(extended, self.B[:-1])
-        before = [part for j, (states, *_) in enumerate(self._shots_flown(extended)) for part in (left[:, j], states[:, :-1])]
+        extended = ca.MX.sym("extended", self.layout.total)
+        inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
+        before = [part for j, (states, *_) in enumerate(self._propagated_shots(extended)) for part in (left[:, j], states[:, :-1])]
         places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
         states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
         return Batched(ca.Function("unpacked", [extended], [ca.densify(inputs[0]), ca.densify(states)]), compiled=self.compilable)
 
     def _inputs(self, extended: ca.MX, first: int = 0, last: int | None = None) -> tuple[ca.MX, ...]:
-        """What else goes into the steps, or some of them, side by side: coefficients of the controls, starts, lengths, and s."""
-        s = self._layout.pick(extended, self.ends.statics)
+        """The other inputs of the steps, or of some of them, side by side: coefficients of the controls, starts, lengths, and s."""
+        s = self.layout.pick(extended, self.ends.statics)
         places = self.mesh.places[first : None if last is None else last + 1]
-        C = self.law.coefficients(self._layout.pick(extended, self.U), places, self.phase)
+        C = self.law.coefficients(self.layout.pick(extended, self.U), places, self.phase)
         length = s[1] - s[0]
         starts, lengths = s[0] + length * ca.DM(places[:-1]).T, length * ca.DM(np.diff(places)).T
         return C, starts, lengths, ca.repmat(s, 1, len(places) - 1)
@@ -197,42 +164,42 @@ class ShootingPhase(PhaseWriter):
     def _chain(self, n: int) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
         chain = self.step.forward.mapaccum("steps", n) if n > 1 else self.step.forward
-        if work(chain) * min(len(self._layout.free), n * self.step.inputs) <= LONG:
+        if work(chain) * min(len(self.layout.free), n * self.step.inputs) <= LONG:
             return chain
-        # Its derivatives, written out, would take all memory there is.
+        # Its derivatives, written out, would take too much memory.
         symbols = chain.mx_in()
         return ca.Function(CHAIN, symbols, chain.call(symbols))
 
-    def _fly(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+    def _propagated(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
         """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
         nx = len(self.phase.states)
         y, samples = self._chain(inputs[1].shape[1])(self._begun(initial), *inputs)
         return y[:nx, :], y[nx:, -1], samples
 
-    def _shots_flown(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
-        """What `_fly` gives of each shot, from its own initial states."""
-        k, left = self.law.degree + 1, self._layout.pick(extended, self.B[:-1])
+    def _propagated_shots(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
+        """The results of `_propagated` for each shot, from its own initial states."""
+        k, left = self.law.degree + 1, self.layout.pick(extended, self.B[:-1])
         C, *others = self._inputs(extended)
         return [
-            self._fly(left[:, j], C[:, first * k : last * k], *(values[:, first:last] for values in others))
+            self._propagated(left[:, j], C[:, first * k : last * k], *(values[:, first:last] for values in others))
             for j, (first, last) in enumerate(pairwise(self._shots.tolist()))
         ]
 
     @cached_property
     def _before(self) -> ca.Function:
-        """Extended vector -> what goes into the chain of all steps."""
-        extended = ca.MX.sym("extended", self._layout.total)
-        inputs = self._begun(self._layout.pick(extended, self.ends.initial)), *self._inputs(extended)
+        """Extended vector -> inputs of the chain of all steps."""
+        extended = ca.MX.sym("extended", self.layout.total)
+        inputs = self._begun(self.layout.pick(extended, self.ends.initial)), *self._inputs(extended)
         return ca.Function("before", [extended], [ca.densify(part) for part in inputs])
 
     @cached_property
     def _after(self) -> ca.Function:
-        """(extended vector, what comes out of it) -> (the same with the states and hidden quantities, final states)."""
+        """(extended vector, outputs of that chain) -> (the same with the states and hidden quantities, final states)."""
         nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
-        extended = ca.MX.sym("extended", self._layout.total)
-        y, samples = (ca.MX.sym(f"flown{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
+        extended = ca.MX.sym("extended", self.layout.total)
+        y, samples = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
         filled = self._filled(extended, y[:nx, :], y[nx:, -1], samples)
-        filled = self._layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
+        filled = self.layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
         return ca.Function("after", [extended, y, samples], [ca.densify(filled), ca.densify(y[:nx, -1])])
 
     def _begun(self, initial: ca.MX) -> ca.MX:
@@ -240,24 +207,24 @@ class ShootingPhase(PhaseWriter):
         return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1))
 
     def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> ca.MX:
-        """With the hidden quantities of a flight: states (nx, N) after each step, integrals, samples."""
+        """With the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples."""
         if len(self.W) > samples.shape[1]:
             samples = ca.horzcat(samples, self.step.at_end(states[:, -1], *self._inputs(extended, self.mesh.steps - 1)))
         at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
         right = states[:, (self._shots[1:] - 1).tolist()]
         slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W)])
-        return self._layout.replaced(extended, slots, ca.veccat(right, at_nodes, q, samples))
+        return self.layout.replaced(extended, slots, ca.veccat(right, at_nodes, q, samples))
 
     @cached_property
     def _outer(self) -> list[ca.DM]:
         """Derivatives of the coefficients of the controls, the start, the length and s of each step by the free variables: constants."""
-        seeds, n = self._layout.seeds(), self.mesh.steps
+        seeds, n = self.layout.seeds(), self.mesh.steps
         U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
         C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
         # The slopes of a spline forget values that are far away, by a factor of 3.7 a node.
         by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0), FORGOTTEN)
-        controls = by_values @ seeds[self._layout.index(self.U).tolist(), :]
-        statics = seeds[self._layout.index(self.ends.statics).tolist(), :]
+        controls = by_values @ seeds[self.layout.index(self.U).tolist(), :]
+        statics = seeds[self.layout.index(self.ends.statics).tolist(), :]
         length, each = statics[1, :] - statics[0, :], C.numel() // n
         places, widths = self.mesh.places[:-1].tolist(), np.diff(self.mesh.places).tolist()
         return [
@@ -265,18 +232,9 @@ class ShootingPhase(PhaseWriter):
             for i in range(n)
         ]
 
-    def _labels(self) -> list[str]:
-        """What a miss is called: an imposed final value enters the last row of its state, which therefore bears its name."""
-        names = [f"dynamics of {self.phase.name}.{v.name}" for v in self.phase.states]
-        last = [
-            f"final value of {self.phase.name}.{v.name}" if low == high else name
-            for v, (low, high), name in zip(self.phase.states, self.phase.final, names, strict=True)
-        ]
-        return names * (len(self.R) - 1) + last
-
 
 def _by_step(values: ca.MX, k: int, n: int) -> ca.MX:
-    """What k candidates, side by side, have for n steps each: one row a candidate, step after step."""
+    """Values of k candidates, side by side, for n steps each: one row a candidate, step after step."""
     order = np.arange(values.numel()).reshape(k, n, -1).transpose(1, 2, 0).ravel()
     return ca.reshape(ca.vec(values)[order.tolist()], k, len(order) // k) if len(order) else ca.MX(k, 0)
 

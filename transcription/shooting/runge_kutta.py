@@ -25,7 +25,7 @@ class Tableau:
     order : int
         The global error falls with this power of the step.
     A : tuple of s tuples
-        Row i holds the i coefficients of the stages before stage i.
+        Row i has the i coefficients of the stages before stage i.
     b : tuple of s floats
     """
 
@@ -36,7 +36,7 @@ class Tableau:
 
     @property
     def c(self) -> tuple[float, ...]:
-        """Where in the step the stages are, (s,): the sums of the rows of A."""
+        """Places of the stages in the step, (s,): the sums of the rows of A."""
         return tuple(float(sum(row)) for row in self.A)
 
     @property
@@ -57,7 +57,7 @@ class Tableau:
         return np.array(terms)
 
     def stability(self, z: np.ndarray) -> np.ndarray:
-        """R(z): by what a step of length h multiplies the solution of y' = lambda y, where z = h lambda; any shape, complex or not."""
+        """R(z): the factor of a step of length h for y' = lambda y, where z = h lambda; any shape, complex or not."""
         return np.polynomial.polynomial.polyval(z, self.growth)
 
     def step(self, rates: Callable[[float, Any], Any], y: Any, h: Any) -> tuple[Any, list[Any]]:
@@ -87,13 +87,6 @@ def moved(y: Any, h: Any, weights: Sequence[float], slopes: Sequence[Any]) -> An
         if weight:
             y = y + (h * weight) * slope
     return y
-
-
-def tableau(name: str) -> Tableau:
-    """A method by its name. Raises ValueError that names those there are."""
-    if name not in TABLEAUX:
-        raise ValueError(f"unknown Runge-Kutta scheme {name!r}; there are {', '.join(TABLEAUX)}")
-    return TABLEAUX[name]
 
 
 def _cooper_verner() -> Tableau:

@@ -1,11 +1,11 @@
-"""Steps that no trajectory can survive, found before any work.
+"""Refuses step sizes for which an explicit Runge-Kutta method is certainly unstable.
 
 An explicit method multiplies a decaying mode of rate lambda by R(h lambda) with each step (Hairer and Wanner, "Solving Ordinary
 Differential Equations II", IV.2). Where that is more than 1, what should vanish grows.
 
-All that is known before any work are the dynamics where flights may be. So only what cannot be otherwise is refused: a step that is too
-long although flights are as short as they may be; a mode that really decays during such a flight, and grows by a lot if it is computed with
-these steps; and that at each of several points, from the initial to the final or guessed states, under low, middle and high controls.
+Before any work only the dynamics within the bounds are known. So only what is certain is refused: a step that is too long although the
+phase is as short as it may be; a mode that decays during so short a phase, and grows by a lot if it is computed with these steps; and that
+at each of several points, from the initial to the final or guessed states, under low, middle and high controls.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..phases.guess import along, line
 from .runge_kutta import Tableau
 
 FACTOR = log(1e3)
-"""What decays by this much really, and grows by this much in computation, is unstable."""
+"""A mode that decays by this much really, and grows by this much in computation, is unstable."""
 POINTS = np.linspace(0.0, 1.0, 5)
 FINEST = 1e4
-"""How many times shorter a step a message speaks of at most."""
+"""Most times that a message proposes to shorten a step."""
 
 
-def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, who: str, settings: Mapping[str, int]) -> None:
+def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, prefix: str, settings: Mapping[str, int]) -> None:
     """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable.
 
     Parameters
@@ -37,7 +37,7 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, w
     scheme : Tableau
     places : array (N + 1,)
         Ends of the steps, relative to a phase.
-    who : str
+    prefix : str
         What the message begins with.
     settings : mapping
         The settings that make steps shorter: the first is the number of nodes or intervals, "steps" those between them.
@@ -58,9 +58,9 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, w
         (count, value), (_, steps) = settings.items()
         cure = f"{count}={ceil(value * enough[0]) + 1} or more, or steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
         raise ValueError(
-            f"{who}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate of "
-            f"{-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and there "
-            f"are {n}; take {cure}"
+            f"{prefix}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate "
+            f"of {-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and "
+            f"there are {n}; take {cure}"
         )
 
 

@@ -1,4 +1,4 @@
-"""One explicit Runge-Kutta step of a phase: the states and integrals after it, and what constraints and peaks see on the way."""
+"""One explicit Runge-Kutta step of a phase: the states and integrals after it, and samples of constraints and peaks on the way."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Step:
     """A step as Functions of its inputs: the states at its beginning, the coefficients of the controls, its start and length, and s.
 
     Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
-    length, which is as accurate as the step itself whatever the method.
+    length, which is as accurate as the step itself.
 
     Parameters
     ----------
@@ -30,15 +30,15 @@ class Step:
     degree : int
         Of the controls on the step.
     points : sequence of float
-        Where path constraints and peaks are looked at, in [0, 1].
+        Where path constraints and peaks are sampled, in [0, 1].
     phase : CompiledPhase
 
     Attributes
     ----------
     rows : int
-        How many path constraints and peaks there are.
+        Number of path constraints and peaks.
     inputs : int
-        nx + (degree + 1) nu + 2 + len(s): how many numbers the states after the step are a function of.
+        nx + (degree + 1) nu + 2 + len(s): the number of scalar inputs of a step.
     symbolic : bool
         Whether the phase can be written as scalar operations and calls, which is several times faster and can be compiled.
     """
@@ -142,7 +142,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class StepMesh:
-    """Where steps begin and end: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
+    """The ends of steps: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
 
     places: np.ndarray
     ends: np.ndarray
@@ -157,5 +157,5 @@ class StepMesh:
 
     @property
     def steps(self) -> int:
-        """How many steps there are, N."""
+        """Number of steps, N."""
         return len(self.places) - 1

@@ -1,16 +1,16 @@
-"""Arcs of flights, flown by an integrator that knows nothing of the transcription, many at a time."""
+"""Arcs of trajectories, integrated independently of the transcription, many at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase
+from problems.derived import remembered
 
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped
@@ -20,14 +20,14 @@ from .trajectory import PhaseTrajectory
 
 EXPLICIT = ("RK23", "RK45", "DOP853")
 METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
-"""Those that are implicit solve for all arcs in one dense system, so that each is flown alone."""
+"""Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
 MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which the integration counts as broken down."""
 
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """n arcs of one phase, each an element of some flight, with controls of one basis and degree.
+    """n arcs of one phase, each an element of a trajectory, with controls of one basis and degree.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Arcs:
         Of the controls.
     basis : str
     s : array (n, ns)
-        t0, tf and the parameters of the flight.
+        t0, tf and the parameters of the trajectory.
     """
 
     phase: CompiledPhase
@@ -51,17 +51,17 @@ class Arcs:
     @classmethod
     def of(cls, phase: CompiledPhase, pieces: Sequence[tuple[PhaseTrajectory, int, np.ndarray]]) -> Arcs:
         """Of (trajectory, element, parameters), with controls of one basis and degree."""
-        edges = np.array([flight.state.edges[j : j + 2] for flight, j, _ in pieces])
-        laws = np.array([flight.control.coefficients[j] for flight, j, _ in pieces])
-        s = np.array([[flight.t0, flight.tf, *parameters] for flight, _, parameters in pieces])
+        edges = np.array([one.state.edges[j : j + 2] for one, j, _ in pieces])
+        laws = np.array([one.control.coefficients[j] for one, j, _ in pieces])
+        s = np.array([[one.t0, one.tf, *parameters] for one, _, parameters in pieces])
         return cls(phase, edges[:, 0], edges[:, 1] - edges[:, 0], laws, pieces[0][0].control.basis, s)
 
     def take(self, rows: np.ndarray) -> Arcs:
         """The arcs of `rows` (indices or mask)."""
         return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
 
-    def fly(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
-        """Fly all of them.
+    def integrate(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
+        """States and integrals along all arcs.
 
         Parameters
         ----------
@@ -85,15 +85,15 @@ class Arcs:
         groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
         while groups:
             group = groups.pop()
-            flown = self.take(group)._flown(y[group], rtol, atol, method) if len(group) else None
-            if flown is not None:
-                found[group] = flown
+            values = self.take(group)._integrated(y[group], rtol, atol, method) if len(group) else None
+            if values is not None:
+                found[group] = values
             elif len(group) > 1:
                 # One that breaks down takes the others with it: look for it.
                 groups += np.array_split(group, 2)
         return found
 
-    def _flown(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
+    def _integrated(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
         """All together; None if the integration breaks down."""
         n, ny = y.shape
         # The integrator bounds the mean square over all arcs, of which any one may have as much of the error as this leaves it.
@@ -102,12 +102,12 @@ class Arcs:
         try:
             solution = solve_ivp(self._rates(), (-1.0, 1.0), y.ravel(), method=method, **options)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):
-            # The implicit methods raise where rates are no numbers; so do ours where an integrator gets nowhere.
+            # The implicit methods raise where rates are no numbers; so do ours after too many evaluations.
             return None
         return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
 
     def _rates(self) -> Callable[[float, np.ndarray], np.ndarray]:
-        """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a flight."""
+        """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a trajectory."""
         n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
         function, degree = _rate_function(self.phase, n), self.coefficients.shape[1] - 1
         laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
@@ -126,7 +126,7 @@ class Arcs:
             nonlocal calls
             calls += 1
             if calls > MOST_CALLS:
-                raise ArithmeticError("the integrator gets nowhere")
+                raise ArithmeticError("too many evaluations of the dynamics")
             x[:] = y.reshape(n, -1)[:, :nx]
             time[:] = self.begins + (tau + 1.0) * half[:, 0]
             values = (basis_matrix(self.basis, degree, np.array([tau])) @ laws).reshape(n, nu) if degree else laws.reshape(n, nu)
@@ -137,7 +137,7 @@ class Arcs:
         return rates
 
 
-@lru_cache(maxsize=64)
+@remembered
 def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
     """(x, u, t, s) -> rates of the states and of the integrals, in n columns."""
     inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]

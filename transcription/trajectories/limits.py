@@ -1,21 +1,21 @@
-"""How far values leave their limits, looked at densely."""
+"""Excursions of values beyond their limits, sampled densely."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
+from problems.derived import remembered
 
 from ..numerics.batched import Batched, expanded
 from ..numerics.polynomials import lobatto_nodes
 from .trajectory import PhaseTrajectory, Trajectory
 
 DENSE = lobatto_nodes(33)
-"""Where an element is looked at, on [-1, 1]."""
+"""Places where an element is sampled, on [-1, 1]."""
 NEGLIGIBLE = 1e-6
 """Excursions up to this, in scales, are those of a feasible point's tolerance."""
 
@@ -28,22 +28,23 @@ def excess(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray
     return np.maximum(np.maximum(lower - values, values - upper) / scale, 0.0).max(axis=-2, initial=0.0)
 
 
-def looked_at(
+def paths_and_peaks(
     phase: CompiledPhase, states: np.ndarray, controls: np.ndarray, times: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Path constraints (k, c) and peaks (k, p) at k places of a flight whose times and parameters are `s` (ns,)."""
-    paths, peaks = _watched(phase)(states, controls, times, np.tile(s, (len(times), 1)))
+    """Path constraints (k, c) and peaks (k, p) at k places of a trajectory whose times and parameters are `s` (ns,)."""
+    paths, peaks = _paths_and_peaks_function(phase)(states, controls, times, np.tile(s, (len(times), 1)))
     return paths, peaks
 
 
-@lru_cache(maxsize=64)
-def _watched(phase: CompiledPhase) -> Batched:
+@remembered
+def _paths_and_peaks_function(phase: CompiledPhase) -> Batched:
     inputs = [ca.MX.sym(name, phase.path.size1_in(i)) for i, name in enumerate("xuts")]
-    return Batched(expanded(ca.Function("watched", inputs, [ca.densify(function(*inputs)) for function in (phase.path, phase.peaks)])))
+    outputs = [ca.densify(function(*inputs)) for function in (phase.path, phase.peaks)]
+    return Batched(expanded(ca.Function("paths_and_peaks", inputs, outputs)))
 
 
 def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, float]:
-    """How far states, controls and path constraints leave their limits between the nodes, by the transcription's own polynomials.
+    """Largest excursions of states, controls and path constraints between the nodes, by the transcription's own polynomials.
 
     Parameters
     ----------
@@ -64,23 +65,23 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
     return found
 
 
-def excess_by_element(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
-    """How far each state, control and path constraint leaves its limits on each element, by name, in its scale: arrays (N,).
+def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
+    """Excursions of each state, control and path constraint on each element, by name, in its scale: arrays (N,).
 
     Controls that are periodic never do, and are left out.
     """
-    states, controls, paths = _dense(phase, flown, parameters)
+    states, controls, paths = _dense(phase, trajectory, parameters)
     bounded = [i for i, v in enumerate(phase.controls) if v.period is None]
     limits: tuple[Variable | Limit, ...] = (*phase.states, *(phase.controls[i] for i in bounded), *phase.paths)
     amounts = excess(np.concatenate([states, controls[..., bounded], paths], axis=2), limits)
     return {limit.name: amounts[:, i] for i, limit in enumerate(limits)}
 
 
-def _dense(phase: CompiledPhase, flown: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _dense(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States, controls and path constraints (N, len(DENSE), ...) on all elements."""
-    edges = flown.state.edges
+    edges = trajectory.state.edges
     times = edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]
-    states, controls = flown.state.on_elements(DENSE), flown.controls_on_elements(DENSE)
+    states, controls = trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE)
     x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
-    paths, _ = looked_at(phase, x, u, times.ravel(), np.array([flown.t0, flown.tf, *parameters]))
+    paths, _ = paths_and_peaks(phase, x, u, times.ravel(), np.array([trajectory.t0, trajectory.tf, *parameters]))
     return states, controls, paths.reshape(*times.shape, len(phase.paths))

@@ -1,4 +1,4 @@
-"""The independent check of trajectories: their controls, flown by an integrator that knows nothing of the transcription."""
+"""Independent simulation of trajectories: their controls under an integrator of scipy, which knows nothing of the transcription."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .arcs import METHODS, Arcs
-from .limits import DENSE, excess, looked_at
+from .limits import DENSE, excess, paths_and_peaks
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Simulation:
-    """What came of flying a trajectory's controls.
+    """The result of simulating a trajectory's controls.
 
     Attributes
     ----------
@@ -24,20 +24,24 @@ class Simulation:
         `defect[phase][state]`: largest difference from the transcription at the ends of its elements, divided by the span of the state's
         bounds; infinite where the integration broke down.
     violation : float
-        Largest scaled residual of state bounds, final values, path constraints, links and constraints of the flown trajectory, looked at
+        Largest scaled residual of state bounds, final values, path constraints, links and constraints of the simulated trajectory, sampled
         densely. Bounds of the controls between nodes are the same as in the transcription: see `Point.excursions`.
     violations : mapping
         The same by constraint.
     objectives : mapping
         Re-evaluated, by name, in the user's senses.
     trajectory : Trajectory
-        What was flown.
+        The simulated one.
     """
 
     defect: Mapping[str, Mapping[str, float]]
     violations: Mapping[str, float]
     objectives: Mapping[str, float]
     trajectory: Trajectory
+
+    def __repr__(self) -> str:
+        objectives = ", ".join(f"'{name}': {value:g}" for name, value in self.objectives.items())
+        return f"Simulation(max_defect={self.max_defect:.1e}, violation={self.violation:.1e}, objectives={{{objectives}}})"
 
     @property
     def max_defect(self) -> float:
@@ -53,9 +57,9 @@ class Simulation:
 def simulate(
     problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
 ) -> Simulation:
-    """Fly a trajectory's controls, phase after phase, with an integrator of scipy.
+    """The simulation of a trajectory's controls, phase after phase, by an integrator of scipy.
 
-    Each phase starts where the phases linked to it ended in this simulation; what is not linked starts where the trajectory says.
+    Each phase starts where the phases linked to it ended in this simulation; what is not linked starts where the trajectory does.
 
     Parameters
     ----------
@@ -81,10 +85,10 @@ def simulate(
 def simulate_all(
     problem: CompiledProblem, trajectories: Sequence[Trajectory], *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
 ) -> list[Simulation]:
-    """Fly several trajectories; see `simulate`.
+    """The simulations of several trajectories; see `simulate`.
 
-    Those whose phases have as many elements and controls of the same degree are flown side by side, which takes far less time than one
-    after the other. Each is flown within the same tolerances, but by other steps than alone, so that its last digits differ.
+    Those whose phases have as many elements and controls of the same degree are simulated side by side, which takes far less time than one
+    after the other. Each is simulated within the same tolerances, but by other steps than alone, so that its last digits differ.
     """
     if method not in METHODS:
         raise ValueError(f"unknown integration method {method!r}; there are {', '.join(METHODS)}")
@@ -101,40 +105,44 @@ def simulate_all(
 
 
 def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
-    """Fly trajectories of one shape."""
+    """Simulations of trajectories of one shape."""
     parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]
-    flights: list[dict[int, _Flight]] = [{} for _ in trajectories]
+    simulated: list[dict[int, _SimulatedPhase]] = [{} for _ in trajectories]
     violations: list[dict[str, float]] = [{} for _ in trajectories]
     for i in problem.order_in_time:
         phase = problem.phases[i]
         planned = [one[phase.name] for one in trajectories]
-        starts = np.array([_start(problem, i, *one) for one in zip(planned, flights, violations, strict=True)])
-        for k, flight in enumerate(_fly(phase, planned, starts, parameters, rtol, atol, method)):
-            flights[k][i] = flight
-            violations[k] |= flight.violations(phase)
-    return [_judged(problem, *one) for one in zip(flights, violations, trajectories, parameters, strict=True)]
+        starts = np.array([_start(problem, i, *one) for one in zip(planned, simulated, violations, strict=True)])
+        for k, one in enumerate(_simulated_phases(phase, planned, starts, parameters, rtol, atol, method)):
+            simulated[k][i] = one
+            violations[k] |= one.violations(phase)
+    return [_simulation(problem, *one) for one in zip(simulated, violations, trajectories, parameters, strict=True)]
 
 
-def _judged(
-    problem: CompiledProblem, flights: Mapping[int, _Flight], violations: dict[str, float], planned: Trajectory, parameters: np.ndarray
+def _simulation(
+    problem: CompiledProblem,
+    simulated: Mapping[int, _SimulatedPhase],
+    violations: dict[str, float],
+    planned: Trajectory,
+    parameters: np.ndarray,
 ) -> Simulation:
-    """What came of one trajectory, whose phases are flown."""
-    quantities = [flights[i].quantities for i in range(len(problem.phases))]
+    """The simulation of one trajectory, from those of its phases."""
+    quantities = [simulated[i].quantities for i in range(len(problem.phases))]
     objectives = np.array(problem.objectives(*quantities, parameters)).ravel() * problem.signs
     constraints = np.array(problem.constraints(*quantities, parameters)).reshape(1, -1)
     for limit, amount in zip(problem.limits, excess(constraints, problem.limits), strict=True):
         violations[f"constraint '{limit.name}'"] = _or_infinite(amount)
     return Simulation(
-        defect={phase.name: flights[i].defect(phase) for i, phase in enumerate(problem.phases)},
+        defect={phase.name: simulated[i].defect(phase) for i, phase in enumerate(problem.phases)},
         violations=violations,
         objectives={goal.name: float(value) for goal, value in zip(problem.goals, objectives, strict=True)},
-        trajectory=Trajectory(tuple(flights[i].trajectory for i in range(len(problem.phases))), planned.parameters),
+        trajectory=Trajectory(tuple(simulated[i].trajectory for i in range(len(problem.phases))), planned.parameters),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Flight:
-    """One flown phase: what was planned and what was flown, the quantities q for objectives and constraints, what its paths exceed."""
+class _SimulatedPhase:
+    """One phase: the planned and the simulated trajectory, the quantities q for objectives and constraints, the excess of its paths."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
@@ -157,7 +165,7 @@ class _Flight:
 
 
 def _start(
-    problem: CompiledProblem, i: int, planned: PhaseTrajectory, flights: dict[int, _Flight], violations: dict[str, float]
+    problem: CompiledProblem, i: int, planned: PhaseTrajectory, simulated: dict[int, _SimulatedPhase], violations: dict[str, float]
 ) -> np.ndarray:
     """Initial states of phase i; a state into which several phases lead follows the first link, the others are checked."""
     start = planned.edge_states[0].copy()
@@ -168,8 +176,8 @@ def _start(
             continue
         before = problem.phases[link.first]
         place = f"link from '{before.name}' to '{problem.phases[i].name}'"
-        violations[f"{place}: t0"] = _or_infinite(abs(flights[link.first].planned.tf - planned.t0) / before.tf.scale)
-        end = dict(zip((v.name for v in before.states), flights[link.first].trajectory.edge_states[-1], strict=True))
+        violations[f"{place}: t0"] = _or_infinite(abs(simulated[link.first].planned.tf - planned.t0) / before.tf.scale)
+        end = dict(zip((v.name for v in before.states), simulated[link.first].trajectory.edge_states[-1], strict=True))
         for name in link.states:
             j = names.index(name)
             if name in taken:
@@ -180,7 +188,7 @@ def _start(
     return start
 
 
-def _fly(
+def _simulated_phases(
     phase: CompiledPhase,
     planned: Sequence[PhaseTrajectory],
     starts: np.ndarray,
@@ -188,26 +196,26 @@ def _fly(
     rtol: float,
     atol: float,
     method: str,
-) -> list[_Flight]:
-    """Fly one phase of n trajectories of one shape from their `starts` (n, nx)."""
+) -> list[_SimulatedPhase]:
+    """One phase of n trajectories of one shape, from their `starts` (n, nx)."""
     integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
     y, elements = np.hstack([starts, integrals]), []
     tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
     for j in range(len(planned[0].state.edges) - 1):
         arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
-        elements.append(arcs.fly(y, rtol, tolerances, method))
+        elements.append(arcs.integrate(y, rtol, tolerances, method))
         y = elements[-1][:, -1]
-    return [_flight(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
+    return [_simulated_phase(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
 
 
-def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _Flight:
-    """What is to be known of a flown phase, of which there are states and integrals (N, len(DENSE), ny) on its elements."""
+def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _SimulatedPhase:
+    """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
     edges, nx = planned.state.edges, len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
     times = (edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]).ravel()
     states = elements[:, :, :nx].reshape(-1, nx)
     controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
-    paths, peaks = looked_at(phase, states, controls, times, s)
+    paths, peaks = paths_and_peaks(phase, states, controls, times, s)
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
     trajectory = replace(
@@ -221,7 +229,7 @@ def _flight(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
     quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks.max(axis=0)])
-    return _Flight(planned, trajectory, quantities, excess(paths, phase.paths))
+    return _SimulatedPhase(planned, trajectory, quantities, excess(paths, phase.paths))
 
 
 def _or_infinite(value: float) -> float:

@@ -1,4 +1,4 @@
-"""What a user looks at: the states and controls of one flight, interpolated by the polynomials of the method that made it."""
+"""Trajectories: states and controls, interpolated by the polynomials of the method that made them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PiecewisePolynomial:
     """Polynomials on consecutive elements, right-continuous.
 
@@ -30,6 +30,11 @@ class PiecewisePolynomial:
     edges: np.ndarray
     coefficients: np.ndarray
     basis: str
+
+    def __repr__(self) -> str:
+        elements, coefficients, quantities = self.coefficients.shape
+        ends = f"from {self.edges[0]:g} to {self.edges[-1]:g}"
+        return f"PiecewisePolynomial({quantities} of degree {coefficients - 1} on {elements} elements {ends})"
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """Values at `times` (any shape), with a last axis of length k. Times outside the elements use the nearest element."""
@@ -55,11 +60,11 @@ class PiecewisePolynomial:
         return ends[:, 0], ends[:, 1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PhaseTrajectory:
-    """One phase of a flight, at nodes and between them.
+    """One phase of a trajectory, at nodes and between them.
 
-    `time` (n,) increases strictly and holds the ends of the elements and the points in between at which the method imposes the dynamics;
+    `time` (n,) increases strictly and contains the ends of the elements and the points in between at which the method imposes the dynamics;
     `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there; `state`, which is continuous, and `control`
     interpolate. A periodic control is continued beyond its bounds inside an element, so that it interpolates the short way round. All in
     the user's units.
@@ -76,6 +81,10 @@ class PhaseTrajectory:
     state_variables: tuple[Variable, ...]
     control_variables: tuple[Variable, ...]
     path_limits: tuple[Limit, ...]
+
+    def __repr__(self) -> str:
+        size = f"{len(self.time)} nodes on {len(self.state.edges) - 1} elements"
+        return f"PhaseTrajectory('{self.name}', {self.t0:g} to {self.tf:g} {self.time_unit}, {size}, [{', '.join(self.names)}])"
 
     @property
     def t0(self) -> float:
@@ -129,12 +138,17 @@ class PhaseTrajectory:
         return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Mapping[str, PhaseTrajectory]):
-    """A whole flight: its phases by name, in the order in which they were declared, and its static parameters."""
+    """A whole trajectory: its phases by name, in the order in which they were declared, and its static parameters."""
 
     phases: tuple[PhaseTrajectory, ...]
     parameters: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        phases = ", ".join(f"'{phase.name}' {phase.t0:g} to {phase.tf:g} {phase.time_unit}" for phase in self.phases)
+        parameters = "".join(f", {name}={value:g}" for name, value in self.parameters.items())
+        return f"Trajectory({phases}{parameters})"
 
     def __getitem__(self, name: str) -> PhaseTrajectory:
         for phase in self.phases:

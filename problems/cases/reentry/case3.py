@@ -39,5 +39,5 @@ def plot(flights: Sequence[Any]) -> dict[str, Figure]:
 
 
 def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Where a flight goes over the ground."""
+    """Coordinates of a ground track by label."""
     return figures.track(values)

@@ -48,7 +48,7 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     Parameters
     ----------
     flights : Front, Points, Simulations
-        Whatever has a `trajectory`. Of Simulations, what was flown is drawn; of Points, what the transcription says.
+        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
     """
     phases = _phases(flights)
     limits = phases[0].path_limits
@@ -127,7 +127,7 @@ def _colors(phases: Sequence[Any]) -> list[Any]:
 
 
 def _bar(figure: Figure, phases: Sequence[Any], axes: Sequence[Any]) -> None:
-    """What the colours mean, where there are several."""
+    """A colour bar, where there are several colours."""
     if len(phases) > 1:
         figure.colorbar(_shades(phases), ax=axes, label="cross-range [deg]", shrink=0.5, aspect=30, pad=0.02).outline.set_visible(False)
 

@@ -7,13 +7,13 @@ from importlib.resources import files
 import numpy as np
 
 REFERENCE = "the front that gradients found"
-"""What reports call it: every row is a local solve within narrower limits, so that there may be better flights."""
+"""Name of the reference in reports: every row is a local solve within narrower limits, so that there may be better flights."""
 
 
 def known(case: str) -> np.ndarray:
     """The front (k, 4) of a case, as the user sees it: cross-range, heat load, oscillation, peak heating rate.
 
-    The further columns of the table are the commands that were flown, from which anyone can check each row.
+    The further columns of the table are the commands that were simulated, from which each row can be checked.
     """
     with files("problems.cases.reentry").joinpath(f"{case}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", usecols=range(4), ndmin=2)

@@ -34,7 +34,7 @@ def guess(phase: Phase, rates: Mapping[str, ca.MX], start: Mapping[str, float], 
     """
     times = np.linspace(0.0, final_time, STEPS + 1)
     laws = {name: np.interp(times, np.linspace(0.0, final_time, len(law)), law) for name, law in zip(controls, (ATTACK, BANK), strict=True)}
-    states = _flown(phase, rates, [start[name] for name in rates], laws, times)
+    states = _propagated(phase, rates, [start[name] for name in rates], laws, times)
     for name, values in zip(rates, states, strict=True):
         # With other data it may lead anywhere: then it is a poor guess, but one.
         lower, upper = phase._states[name].lower, phase._states[name].upper
@@ -43,7 +43,7 @@ def guess(phase: Phase, rates: Mapping[str, ca.MX], start: Mapping[str, float], 
         phase.guess(**{name: (times, law)})
 
 
-def _flown(
+def _propagated(
     phase: Phase, rates: Mapping[str, ca.MX], start: Sequence[float], laws: Mapping[str, np.ndarray], times: np.ndarray
 ) -> np.ndarray:
     """States (nx, n) at equidistant times (n,), by the classical Runge-Kutta method."""

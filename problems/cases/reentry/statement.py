@@ -154,8 +154,8 @@ def reentry(
     problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
 
     guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
-    # Commands within bounds everywhere, and fine enough that most of what is feasible on it is so as flown, to 1 % of each limit. It takes
-    # seconds to make a candidate feasible: they are scored as they fly, and what is worth it is left to the gradients.
+    # Commands within bounds everywhere, and fine enough that most feasible points are feasible when simulated, to 1 % of each limit. It
+    # takes seconds to make a candidate feasible: they are only propagated, and the best are left to the gradients.
     problem.default_transcription = "dfet:50x2:bernstein:1"
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"

@@ -1,9 +1,9 @@
-"""A winged shuttle in the air: its constants, what the air does to it, and its motion over a round Earth that does not turn.
+"""A winged shuttle: its constants, its aerodynamics, and its motion over a round Earth that does not turn.
 
 Betts, "Practical Methods for Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 6.1, with figures in feet,
 slugs and Btu; equations (5) and (9) of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an extended
 evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020, in which the sign of the density's exponent is a slip. All is SI with
-angles in radians, but for the heating rate, the dynamic pressure and the load, which are in the units in which their limits are told.
+angles in radians, but for the heating rate, the dynamic pressure and the load, which are in the units of their limits.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""Studies whose points are flown: what counts in their reports, and the published tables that need it."""
+"""Studies whose points are simulated: what counts in their reports, and the published tables that need it."""
 
 from __future__ import annotations
 
 import csv
-import json
 import shutil
 from pathlib import Path
 
@@ -15,8 +14,9 @@ from macs import MACS, NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.comparison import grounds
-from runs.report.published import check, published_tables
+from runs.data.records import from_bytes, to_bytes
+from runs.report.comparison import comparisons
+from runs.report.published import papers, published_tables
 
 ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
 ROW = {"problem": "braking", "by": "the paper"}
@@ -55,38 +55,38 @@ def folder(tmp_path_factory) -> Path:
     return out
 
 
-def test_only_what_holds_counts_and_as_it_is_flown(folder):
-    ground = grounds(Store.open(folder), {})[0]
+def test_only_points_feasible_as_simulated_count(folder):
+    comparison = comparisons(Store.open(folder), {})[0]
     problem = braking()
-    claimed = held = 0
-    for solver, runs in ground.runs.items():
-        for run, front, verified in zip(runs, ground.fronts[solver], ground.verified[solver], strict=True):
-            flown = Front.load(run.path, problem).simulate(tolerance=0.01)
-            best = Front.merge([flown])
+    claimed = feasible = 0
+    for solver, runs in comparison.runs.items():
+        for run, front, verified in zip(runs, comparison.fronts[solver], comparison.verified[solver], strict=True):
+            simulated = Front.load(run.path, problem).simulate(tolerance=0.01)
+            best = Front.merge([simulated])
             np.testing.assert_allclose(front.F, best.F, rtol=1e-9)
             assert (front.status == "converged").all() and (front.violation <= 0.01).all()
             ends = [point.trajectory["run"].edge_states[-1] for point in best]
             np.testing.assert_allclose(np.transpose([verified.ends["run"][name] for name in "xv"]), ends, rtol=1e-9)
-            assert (verified.claimed, verified.held) == (len(flown), (flown.status == "converged").sum())
-            claimed, held = claimed + len(flown), held + verified.held
-    assert 0 < held < claimed, "some of them lie"
+            assert (verified.claimed, verified.feasible) == (len(simulated), (simulated.status == "converged").sum())
+            claimed, feasible = claimed + len(simulated), feasible + verified.feasible
+    assert 0 < feasible < claimed, "some of them lie"
 
 
 def test_the_report_says_how_many_were_claimed(folder):
     text = str(study().report(folder, figures=False))
-    assert "what was claimed, and what holds" in text and "flown by DOP853" in text
-    ground = grounds(Store.open(folder), {})[0]
+    assert "points claimed, and points feasible as simulated" in text and "simulated by DOP853" in text
+    comparison = comparisons(Store.open(folder), {})[0]
     with (folder / "report" / "braking-dfet-1x2-claims.csv").open() as file:
         rows = {row["solver"]: row for row in csv.DictReader(file)}
-    for solver, runs in ground.verified.items():
+    for solver, runs in comparison.verified.items():
         assert int(rows[solver]["points claimed"]) == sum(one.claimed for one in runs)
-        assert int(rows[solver]["hold as flown"]) == sum(one.held for one in runs)
+        assert int(rows[solver]["feasible as simulated"]) == sum(one.feasible for one in runs)
 
 
 def test_published_ends_and_feasibility_beside_ours(folder):
     study().report(folder, figures=False)
-    ground = grounds(Store.open(folder), {})[0]
-    x = np.concatenate([one.ends["run"]["x"] for one in ground.verified["nsga2"]])
+    comparison = comparisons(Store.open(folder), {})[0]
+    x = np.concatenate([one.ends["run"]["x"] for one in comparison.verified["nsga2"]])
     with (folder / "report" / "published-1.csv").open() as file:
         rows = {(row["by"], row["statistic"]): row for row in csv.DictReader(file)}
     assert rows["the paper", "mean"]["miss [cm]"] == "5.0"
@@ -94,31 +94,31 @@ def test_published_ends_and_feasibility_beside_ours(folder):
         assert float(rows["nsga2, dfet:1x2", statistic]["miss [cm]"]) == pytest.approx(value(100 * np.abs(x - 2.0)), rel=1e-9)
     with (folder / "report" / "published-2.csv").open() as file:
         rows = {row["by"]: list(row.values()) for row in csv.DictReader(file)}
-    told = [run.front.stats["population"] for run in ground.runs["nsga2"]]
+    told = [run.front.stats["population"] for run in comparison.runs["nsga2"]]
     ours = rows["nsga2, dfet:1x2"]
     assert float(ours[3]) == np.mean([one["first_feasible"] for one in told]) and ours[5] == "0"
     assert float(ours[-2]) == np.mean([one["nondominated"] for one in told])
-    assert float(ours[-1]) == np.mean([len(front) for front in ground.fronts["nsga2"]])
+    assert float(ours[-1]) == np.mean([len(front) for front in comparison.fronts["nsga2"]])
     assert "macs, dfet:1x2" not in rows, "it has no population"
 
 
 def test_without_flights_points_are_what_the_solver_says(tmp_path):
     given = study(verify=None)
     given.run(tmp_path / "out", executor=Inline())
-    ground = grounds(Store.open(tmp_path / "out"), {})[0]
-    for run, verified in zip(ground.runs["macs"], ground.verified["macs"], strict=True):
+    comparison = comparisons(Store.open(tmp_path / "out"), {})[0]
+    for run, verified in zip(comparison.runs["macs"], comparison.verified["macs"], strict=True):
         np.testing.assert_array_equal(verified.front.F, run.front.F)
         np.testing.assert_array_equal(verified.ends["run"]["x"], [p.trajectory["run"].edge_states[-1, 0] for p in run.front])
     assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")
 
 
-def test_points_whose_flights_are_lost_are_flown_again_if_their_problem_is_found(folder, tmp_path):
+def test_points_whose_flights_are_lost_are_simulated_again_if_their_problem_is_found(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "out")
-    records = sorted((tmp_path / "out").glob("*/000?.json"))
-    data = json.loads(records[0].read_text())
-    records[0].write_text(json.dumps({**data, "flown": {}}))
-    records[1].unlink()
-    with pytest.raises(ValueError, match=r"points of run 1 of braking, dfet:1x2, \w+ cannot be flown: .* was stated in a script"):
+    files = sorted((tmp_path / "out").glob("*/000?.json"))
+    data = from_bytes(files[0].read_bytes())
+    files[0].write_bytes(to_bytes({**data, "simulated": {}}))
+    files[1].unlink()
+    with pytest.raises(ValueError, match=r"points of run 1 of braking, dfet:1x2, \w+ cannot be simulated: .* was stated in a script"):
         study().report(tmp_path / "out")
 
 
@@ -128,7 +128,7 @@ def test_a_flight_that_fails_costs_no_run(tmp_path, monkeypatch, caplog):
 
     monkeypatch.setattr("runs.execution.task.record", fails)
     assert study().run(tmp_path / "out", executor=Inline()).finished == 4
-    assert "could not be flown" in caplog.text
+    assert "could not be simulated" in caplog.text
 
 
 def test_reports_of_runs_that_are_not_there_yet(folder, tmp_path):
@@ -136,7 +136,7 @@ def test_reports_of_runs_that_are_not_there_yet(folder, tmp_path):
     for path in (tmp_path / "out").glob("*nsga2*/*"):
         path.unlink()
     text = str(study().report(tmp_path / "out", figures=False))
-    assert "nsga2: 2 missing" in text and "what was claimed, and what holds" in text
+    assert "nsga2: 2 missing" in text and "points claimed, and points feasible as simulated" in text
 
 
 @pytest.mark.parametrize(("value", "message"), [(0.0, "verify must be a positive number"), ("much", "verify must be a positive number")])
@@ -150,23 +150,23 @@ def test_how_much_may_be_violated_is_a_number(value, message):
     [
         ([], "ends must be a list of tables"),
         ("x", "ends must be a list of tables"),
-        ([{"name": "miss"}], "each of ends must be a table with name, state and at"),
-        ([{**ENDS[0], "at": "2"}], "ends: at must be a finite number"),
-        ([{**ENDS[0], "at": float("inf")}], "ends: at must be a finite number"),
+        ([{"name": "miss"}], "ends 1: state is missing"),
+        ([{**ENDS[0], "at": "2"}], "ends 1: at must be a finite number"),
+        ([{**ENDS[0], "at": float("inf")}], "ends 1: at must be a finite number"),
         ([ENDS[0], ENDS[0]], "ends: 'miss' is there twice"),
-        ([{**ENDS[0], "unit": 2}], "ends: unit must be a text"),
+        ([{**ENDS[0], "unit": 2}], "ends 1: unit must be a text"),
         ([{**ENDS[0], "units": "m"}], "units"),
     ],
 )
 def test_ends_that_make_no_sense_are_refused(ends, message):
     with pytest.raises(ValueError, match=message):
-        check([{"of": "ends", "ends": ends, "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}])
+        papers([{"of": "ends", "ends": ends, "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}])
 
 
 def test_a_state_that_does_not_exist_is_named(folder):
-    paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean"}]}
+    paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}
     with pytest.raises(ValueError, match="unknown state 'y'; there are x, v"):
-        published_tables(grounds(Store.open(folder), {}), [paper])
+        published_tables(comparisons(Store.open(folder), {}), papers([paper]))
 
 
 def test_where_nothing_is_found_the_report_says_so(tmp_path):
@@ -175,6 +175,6 @@ def test_where_nothing_is_found_the_report_says_so(tmp_path):
     nothing = study(problems=braking(pace=100.0), reference=str(truth))
     nothing.run(tmp_path / "out", executor=Inline())
     text = str(nothing.report(tmp_path / "out"))
-    assert "no run found a point that counts" in text and "braking, dfet:1x2: what a run spent" in text
+    assert "no run found a point that counts" in text and "braking, dfet:1x2: costs of a run" in text
     with (tmp_path / "out" / "report" / "published-3.csv").open() as file:
         assert [row["best"] for row in csv.DictReader(file)] == ["3.0", "0.0", "0.0"]

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runs.measures.statistics import pairwise, summarise
-from runs.report.statistics_tables import comparison_table, overall_table, summary_table
+from runs.measures.statistics import overall, pairwise, summarise
+from runs.report.statistics_tables import overall_table, pairs_table, summary_table
 from runs.report.tables import Column, escaped, latex_number, short, table
 
 EXAMPLE = table(
@@ -113,13 +113,14 @@ def test_tables_of_statistics_say_what_the_statistics_are():
     assert summary.rows[1][:6] == ("igd", "theirs", 3, 1, first.mean, first.variance) and summary.rows[1][-1] == np.inf
     assert summary.rows[3][-2:] == (0.9, 0.8), "of the hypervolume, the largest is best"
     assert "divisor n - 1" in summary.notes[0] and "failed runs are worse" in summary.notes[1]
-    pairs = comparison_table(samples)
+    pairs = pairs_table(samples)
     for row, c in zip(pairs.rows[:3], pairwise(samples["igd"]), strict=True):
         assert row[3:7] == (c.p, c.p_holm, c.a12, c.effect) and row[7] == "neither"
     assert "cannot be below 0.1" in pairs.notes[1]
     many = {"igd": {name: list(np.arange(10.0) + shift) for name, shift in (("ours", 0.0), ("theirs", 20.0))}}
-    assert comparison_table(many).rows[0][-1] == "ours"
-    assert comparison_table({"hypervolume": many["igd"]}).rows[0][-1] == "theirs"
-    together = overall_table(samples, paired=True)
+    assert pairs_table(many).rows[0][-1] == "ours"
+    assert pairs_table({"hypervolume": many["igd"]}).rows[0][-1] == "theirs"
+    together = overall_table(samples)
     assert [column.title for column in together.columns][3:] == ["rank of ours", "rank of theirs", "rank of others"]
-    assert together.rows[0][0] == "igd" and "Friedman" in together.notes[0] and together.rows[0][4] == 3.0
+    assert together.rows[0][0] == "igd" and "Kruskal-Wallis" in together.notes[0]
+    assert together.rows[0][3:] == tuple(overall(samples["igd"]).ranks.values())

@@ -1,4 +1,4 @@
-"""Who makes the runs: processes of this machine, or an executor's workers. Both answer with futures of outcomes."""
+"""Workers that make runs: processes of this machine, or those of an executor. Both return futures of outcomes."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .child import Child, perform_apart
 from .task import Outcome, Report, Task
 
 
-class Crew(Protocol):
-    """What `executing` needs."""
+class Workers(Protocol):
+    """The interface that `runs.batch.running` uses."""
 
     def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """Have a run made; `report` is called with its progress, where that can be known."""
+        """The outcome of a run, in the future; `report` is called with its progress, where that is known."""
 
     def stop(self) -> None:
-        """End all work, now, as far as that is possible."""
+        """End all work now, as far as possible."""
 
 
-class Local:
-    """So many processes at a time on this machine, each with a thread that watches it."""
+class LocalWorkers:
+    """`jobs` processes on this machine, each with a thread that watches it."""
 
     def __init__(self, jobs: int) -> None:
         self._children = [Child() for _ in range(jobs)]
@@ -34,11 +34,11 @@ class Local:
         self._threads = ThreadPoolExecutor(jobs, thread_name_prefix="run")
 
     def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """See `Crew`."""
+        """See `Workers`."""
         return self._threads.submit(self._perform, task, report)
 
     def stop(self) -> None:
-        """See `Crew`."""
+        """See `Workers`."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         for child in self._children:
             child.close()
@@ -53,43 +53,48 @@ class Local:
             self._idle.put(child)
 
 
-class Hired:
-    """An executor's workers, wherever they are; each thread of theirs keeps a process of its own for runs."""
+class ExecutorWorkers:
+    """The workers of an executor. Each of their threads keeps one process for runs."""
 
     def __init__(self, executor: Executor) -> None:
         self._submit: Callable[..., Any] = executor.submit
         self._futures: list[Any] = []
 
     def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """See `Crew`; there is no word from them before the end."""
+        """See `Workers`; `report` is not called."""
         future = self._submit(perform_apart, task)
         self._futures.append(future)
         return future
 
     def stop(self) -> None:
-        """Take back what has not begun; the executor is not ours to shut down, and what it is at, it ends."""
+        """Cancel the runs that have not begun. The executor belongs to the caller: it is not shut down, and ends the runs it has begun."""
         for future in self._futures:
             future.cancel()
 
 
 PATIENCE = 5.0
-"""Seconds in which a scheduler has to answer."""
+"""Seconds to wait for the answer of a scheduler."""
 
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The workers of the Dask scheduler at `address`, as long as this is entered.
+    """The executor of a Dask cluster, open within the context.
+
+    Parameters
+    ----------
+    address : str
+        Of its scheduler, such as tcp://10.0.0.1:8786.
 
     Raises
     ------
     ValueError
-        Dask is not installed, the address makes no sense, or nobody answers there.
+        Dask is not installed, the address is wrong, or no scheduler answers there.
     """
     try:
         from distributed import Client
     except ImportError as error:
         raise ValueError(f"--dask needs Dask, which is not installed ({error}): pip install 'macs-trajectories[dask]'") from None
-    # It would tell at length, on several channels, what is told here in one line.
+    # Its own log repeats the error at length; one line is enough.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)

@@ -13,8 +13,8 @@ from macs import NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.changed_data import FLOWN, MANY, Changed, changed_figure, changes
-from runs.report.comparison import grounds
+from runs.report.changed_data import MANY, SIMULATED, ChangedData, changed_data, changed_figure
+from runs.report.comparison import comparisons
 from runs.report.report import report
 
 CART = '''
@@ -62,21 +62,21 @@ def folder(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("carts")
     (place / "cart.py").write_text(CART, encoding="utf-8")
     (place / "carts.toml").write_text(STUDY, encoding="utf-8")
-    Study.load(place / "carts.toml").run(place / "out")
+    Study.load(place / "carts.toml", trust=True).run(place / "out")
     return place / "out"
 
 
 @pytest.fixture(scope="module")
-def changed(folder) -> Changed:
-    (found,) = changes(grounds(Store.open(folder), {}), "light")
+def changed(folder) -> ChangedData:
+    (found,) = changed_data(comparisons(Store.open(folder, trust=True), {}), {"nominal": "light"})
     return found
 
 
 def union(folder: Path, problem: str) -> Front:
-    return Front.merge([run.front for run in Store.open(folder).runs() if run.cell.problem == problem])
+    return Front.merge([run.front for run in Store.open(folder, trust=True).runs() if run.cell.problem == problem])
 
 
-def rows(changed: Changed, name: str) -> list[dict[str, str]]:
+def rows(changed: ChangedData, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(changed.tables()[name].csv().splitlines()))
 
 
@@ -122,7 +122,7 @@ def test_a_panel_for_each_data(folder, changed):
     for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
         lines = {line.get_label(): line.get_xydata() for line in ax.lines}
         np.testing.assert_allclose(lines["nominal front"], light.objectives, rtol=1e-5)
-        there = np.vstack([lines["its flights under these data"], lines["those not feasible"]])
+        there = np.vstack([lines["simulated under these data"], lines["those not feasible"]])
         np.testing.assert_allclose(np.sort(there[:, 0]), np.sort(share * light.objectives[:, 0]), rtol=1e-5)
         problem = ax.get_title("left")
         np.testing.assert_allclose(np.sort(lines["found under these data"], axis=0), np.sort(union(folder, problem).objectives, axis=0))
@@ -144,22 +144,22 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
         nominal="2",
     )
     study.run(tmp_path / "out")
-    (found,) = changes(grounds(Store.open(tmp_path / "out"), {}), "2")
+    (found,) = changed_data(comparisons(Store.open(tmp_path / "out", trust=True), {}), {"nominal": "2"})
     figure = changed_figure(found.changes[0])
     assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
-    alone = [ground for ground in grounds(Store.open(tmp_path / "out"), {}) if ground.problem == "2"]
-    assert [one.figures() for one in changes(alone, "2")] == [{}], "nothing to draw as long as there is only the nominal front"
-    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == FLOWN["mfc"]]
+    alone = [comparison for comparison in comparisons(Store.open(tmp_path / "out", trust=True), {}) if comparison.problem == "2"]
+    assert [one.figures() for one in changed_data(alone, {"nominal": "2"})] == [{}], "only the nominal front: nothing to draw"
+    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == SIMULATED["mfc"]]
     assert len(marks) == 1 and len(marks[0].get_xdata()) == len(found.changes[0].nominal)
     assert [ax.get_xlabel() for ax in figure.axes[:3]] == [""] * 3 and "distance" in figure.axes[5].get_xlabel()
 
 
 def test_the_report_has_all_of_it(folder):
-    said = str(report(folder, figures=False))
+    said = str(report(folder, trust=True, figures=False))
     assert "The front of light under changed data." in said and "Points of the front of light" in said
     names = {path.name for path in (folder / "report").iterdir()}
     assert {f"changed-data{part}.{suffix}" for part in ("", "-points", "-best") for suffix in ("txt", "csv", "tex")} <= names
-    assert "solutions that stand for the front" in said
+    assert "representative solutions of the front" in said
 
 
 def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_path):
@@ -172,16 +172,16 @@ def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_p
         study = Study("gliders", problems=problems, solvers=Plain(), evaluations=20, runs=1, seed=1, nominal="one")
         out = tmp_path / "-".join(problems)
         study.run(out)
-        (found,) = changes(grounds(Store.open(out), {}), "one")
+        (found,) = changed_data(comparisons(Store.open(out, trust=True), {}), {"nominal": "one"})
         assert found.figures() == {} and "changed-data-points" not in found.tables()
         return found.tables()["changed-data"].text()
 
     assert "nothing feasible was found under the nominal data" in told(one=stated(19.0), two=stated(1.0))
-    assert "nothing was flown: problem 'glide' was stated in a script" in told(one=stated(1.0), three=stated(2.0))
+    assert "nothing was simulated: problem 'glide' was stated in a script" in told(one=stated(1.0), three=stated(2.0))
 
 
 def test_nothing_without_a_nominal_problem(folder):
-    assert changes(grounds(Store.open(folder), {}), None) == []
+    assert changed_data(comparisons(Store.open(folder, trust=True), {}), {"nominal": None}) == []
 
 
 @pytest.mark.parametrize(

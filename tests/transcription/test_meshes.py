@@ -5,17 +5,18 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from cases import decay, flown, oscillator
+from cases import decay, oscillator, propagated
 from hypothesis import given
 from hypothesis import strategies as st
 
 from problems import Problem
 from transcription import DFET
-from transcription.meshes.adaptation import HIGHEST, cuts, degrees, judge, next_method, refine, split
+from transcription.meshes.adaptation import cuts, degrees, judge, next_method, refine, split
 from transcription.meshes.errors import decay_rates, phase_errors
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
 from transcription.trajectories.simulate import simulate
 
+HIGHEST = DFET.highest_order
 EDGES = np.array([0.0, 0.2, 0.5, 1.0])
 NONE = np.full(3, np.nan)
 
@@ -40,7 +41,7 @@ def meshes(draw):
 def test_meshes_stay_meshes_and_lose_nothing(mesh, room):
     edges, order, error, rate, steep = mesh
     most = len(edges) - 1 + room
-    finer, raised = refine(edges, order, error, rate, steep, most=most)
+    finer, raised = refine(edges, order, error, rate, steep, most=most, highest=HIGHEST)
     assert finer[0] == 0.0 and finer[-1] == 1.0 and (np.diff(finer) > 0).all()
     assert set(edges) <= set(finer) and len(finer) - 1 <= most
     assert order <= raised <= max(order, HIGHEST)
@@ -49,29 +50,30 @@ def test_meshes_stay_meshes_and_lose_nothing(mesh, room):
 
 
 def test_only_where_the_error_is_large_are_elements_cut():
-    finer, order = refine(EDGES, 4, np.array([5.0, 0.2, 0.1]), np.zeros(3), NONE, most=20)
+    finer, order = refine(EDGES, 4, np.array([5.0, 0.2, 0.1]), np.zeros(3), NONE, most=20, highest=HIGHEST)
     assert finer.tolist() == [0.0, 0.1, 0.2, 0.5, 1.0] and order == 4
 
 
 def test_smooth_elements_get_a_higher_order():
-    finer, order = refine(EDGES, 4, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20)
+    finer, order = refine(EDGES, 4, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20, highest=HIGHEST)
     assert finer.tolist() == EDGES.tolist() and order == 5
-    assert refine(EDGES, HIGHEST, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20)[0].tolist() == [0.0, 0.1, 0.2, 0.5, 1.0]
+    finer, _ = refine(EDGES, HIGHEST, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20, highest=HIGHEST)
+    assert finer.tolist() == [0.0, 0.1, 0.2, 0.5, 1.0]
 
 
 def test_what_a_higher_order_would_not_mend_is_cut():
-    finer, order = refine(EDGES, 6, np.array([1e9, 0.2, 0.1]), np.full(3, 0.9), NONE, most=20)
+    finer, order = refine(EDGES, 6, np.array([1e9, 0.2, 0.1]), np.full(3, 0.9), NONE, most=20, highest=HIGHEST)
     assert len(finer) == 5 and order == 6
 
 
 def test_an_element_is_cut_around_a_steep_place():
-    finer, order = refine(EDGES, 4, np.array([0.1, 0.1, 9.0]), np.full(3, 3.0), np.array([np.nan, np.nan, 0.2]), most=20)
+    finer, order = refine(EDGES, 4, np.array([0.1, 0.1, 9.0]), np.full(3, 3.0), np.array([np.nan, np.nan, 0.2]), most=20, highest=HIGHEST)
     assert finer == pytest.approx([0, 0.2, 0.5, 0.725, 0.875, 1.0]) and order == 4
     assert cuts(0.95) == [pytest.approx(0.65)] and cuts(np.nan) == [0.0]
 
 
 def test_the_worst_elements_come_first_where_there_is_little_room():
-    finer, _ = refine(EDGES, 4, np.array([5.0, 50.0, 6.0]), np.zeros(3), NONE, most=4)
+    finer, _ = refine(EDGES, 4, np.array([5.0, 50.0, 6.0]), np.zeros(3), NONE, most=4, highest=HIGHEST)
     assert finer.tolist() == [0.0, 0.2, 0.35, 0.5, 1.0]
     assert split(EDGES, {0: [0.0]}, most=3) is EDGES
 
@@ -97,7 +99,7 @@ def test_decay_rates_are_those_of_the_function():
 
 def test_local_defects_are_those_of_the_single_elements():
     nlp = DFET(1, 1, mesh={"fall": ((0, 0.5, 1), 0)}).transcribe(decay(tf=2.0)[0])
-    flight = nlp.unpack(flown(nlp, k=1)[0])
+    flight = nlp.unpack(propagated(nlp, k=1)[0])
     found = phase_errors(nlp.problem, flight, rtol=1e-12, atol=1e-13)[0]
     edges = flight["fall"].edge_states[:, 0]
     assert found.defect == pytest.approx(np.abs(edges[:-1] * np.exp(-1.0) - edges[1:]) / 4.0, rel=1e-6)
@@ -138,11 +140,11 @@ def test_controls_that_switch_are_found():
 def test_trajectories_become_as_exact_as_wanted(method):
     """Flown anew on each mesh with the same controls: nothing is optimised, and errors fall all the same."""
     nlp = method.transcribe(oscillator())
-    z = flown(nlp, k=1)[0]
+    z = propagated(nlp, k=1)[0]
     for _ in range(8):
         flight = nlp.unpack(z)
         verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
-        if not verdict.flight.max_defect > 1e-6:
+        if not verdict.simulation.max_defect > 1e-6:
             break
         finer = next_method(method, verdict, flight)
         assert finer != method
@@ -153,7 +155,7 @@ def test_trajectories_become_as_exact_as_wanted(method):
 
 def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
     nlp = DFET(1, 2).transcribe(oscillator())
-    z = flown(nlp, k=1)[0]
+    z = propagated(nlp, k=1)[0]
     for i in nlp.free:
         if ".u[" in nlp.variables[i].name:
             z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0

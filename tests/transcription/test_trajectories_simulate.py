@@ -5,7 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, flown, integrator, oscillator, solved
+from cases import candidates, decay, integrator, oscillator, propagated, solved
 
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
@@ -14,7 +14,7 @@ from transcription.trajectories.limits import excursions
 from transcription.trajectories.simulate import simulate, simulate_all
 
 
-def fly(nlp, z, **options):
+def simulated(nlp, z, **options):
     return simulate(nlp.problem, nlp.unpack(z), **options)
 
 
@@ -33,7 +33,7 @@ def test_a_flight_without_controls_has_its_closed_form(method):
     problem.minimize("top", phase.peak(-phase["x"]))
     problem.maximize("end", phase.final(phase["x"] * phase.time))
     nlp = DFET(3, 4).transcribe(problem)
-    check = fly(nlp, nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0], rtol=1e-9, method=method)
+    check = simulated(nlp, nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0], rtol=1e-9, method=method)
     e = np.exp(-1.5)
     exact = {"rest": e, "square": (1 - e**2) / 2, "moment": 1.125, "top": -e, "end": 1.5 * e}
     assert check.objectives == pytest.approx(exact, rel=1e-5)
@@ -45,8 +45,8 @@ def test_an_exact_trajectory_has_no_defect():
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(3, 4).transcribe(problem)
-    for z in flown(nlp):
-        check = fly(nlp, z, rtol=1e-12, atol=1e-14)
+    for z in propagated(nlp):
+        check = simulated(nlp, z, rtol=1e-12, atol=1e-14)
         assert check.max_defect < 1e-12 and check.violation == 0
         F, _ = nlp.evaluate(z[None])
         assert check.objectives["end"] == pytest.approx(F[0, 0], abs=1e-10)
@@ -86,7 +86,7 @@ def test_objectives_and_violations_are_those_of_the_transcription():
     C = candidates(nlp, 1)
     C[0, 4:] = 0.3
     z = nlp.propagate(nlp.first_guess(C))[0]
-    check, F = fly(nlp, z), nlp.evaluate(z[None])[0][0]
+    check, F = simulated(nlp, z), nlp.evaluate(z[None])[0][0]
     assert list(check.objectives.values()) == pytest.approx((F * nlp.problem.signs).tolist(), rel=1e-8)
     assert set(check.defect) == {"swing"} and set(check.defect["swing"]) == {"x", "y"}
 
@@ -99,7 +99,7 @@ def test_violations_of_paths_constraints_bounds_and_ends_are_named():
     problem.minimize("end", phase.final(phase["x"]))
     nlp = DFET(2, 2).transcribe(problem)
     C = np.full((1, 6), 6.0)
-    check = fly(nlp, nlp.propagate(nlp.first_guess(C))[0])
+    check = simulated(nlp, nlp.propagate(nlp.first_guess(C))[0])
     assert check.violations["final value of run.x"] == pytest.approx(11 / 20)
     assert check.violations["bounds of run.x"] == pytest.approx(2 / 20)
     assert check.violations["path 'gate' of 'run'"] == pytest.approx(20)
@@ -127,7 +127,7 @@ def two_legs(jump: float) -> Problem:
     return problem
 
 
-def test_linked_phases_are_flown_on_from_where_the_first_ended():
+def test_linked_phases_are_simulated_from_where_the_first_ended():
     nlp = DFET(3, 6).transcribe(two_legs(2.0))
     found = solved(nlp)
     assert set(found.status) == {"converged"}
@@ -158,9 +158,9 @@ def test_a_meeting_that_does_not_take_place_is_found():
         problem.link(phase, together)
     problem.minimize("place", together.final(x))
     nlp = DFET(2, 2).transcribe(problem)
-    good, bad = solved(nlp, k=1).z[0], flown(nlp, k=1)[0]
-    assert fly(nlp, good).violation < 1e-5
-    check = fly(nlp, bad)
+    good, bad = solved(nlp, k=1).z[0], propagated(nlp, k=1)[0]
+    assert simulated(nlp, good).violation < 1e-5
+    check = simulated(nlp, bad)
     flight = nlp.unpack(bad)
     assert check.violations["link from 'right' to 'together': x"] == pytest.approx(
         abs(flight["right"]["x"][-1] - flight["left"]["x"][-1]) / 20, rel=1e-6
@@ -169,7 +169,7 @@ def test_a_meeting_that_does_not_take_place_is_found():
     assert check.violation == pytest.approx(nlp.evaluate(bad[None])[1][0], rel=1e-6)
 
 
-def test_a_phase_of_no_duration_is_flown_through():
+def test_a_phase_of_no_duration_is_simulated():
     problem = Problem("coast")
     burn = problem.phase("burn", t0=0, tf=(1, 3))
     burn.state("x", bounds=(-10, 10), initial=0)
@@ -180,7 +180,7 @@ def test_a_phase_of_no_duration_is_flown_through():
     problem.link(burn, coast)
     problem.minimize("end", coast.final(coast["x"]) + coast.integral(coast["x"]))
     nlp = DFET(2, 2).transcribe(problem)
-    check = fly(nlp, nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
+    check = simulated(nlp, nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
     assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
 
 
@@ -195,7 +195,7 @@ def test_stiff_dynamics_have_their_methods():
     problem.minimize("end", phase.final(x))
     nlp = DFET(4, 3).transcribe(problem)
     z = nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0]
-    assert fly(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
+    assert simulated(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
 
 
 @pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
@@ -214,14 +214,14 @@ def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_unstable_dynamics_are_flown_as_far_as_they_go():
+def test_unstable_dynamics_are_simulated_as_far_as_they_go():
     problem = Problem("blow up")
     phase = problem.phase("run", t0=0, tf=2)
     x = phase.state("x", bounds=(-100, 100), initial=1)
     phase.dynamics(x=x**2)
     problem.minimize("end", phase.final(x))
     nlp = DFET(4, 3).transcribe(problem)
-    check = fly(nlp, nlp.first_guess(np.empty((1, 0)))[0])
+    check = simulated(nlp, nlp.first_guess(np.empty((1, 0)))[0])
     assert check.max_defect == np.inf
 
 
@@ -233,13 +233,13 @@ def test_bad_settings_are_refused(options):
     nlp = DFET(1, 1).transcribe(problem)
     z = nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0]
     with pytest.raises(ValueError, match=next(iter(options))):
-        fly(nlp, z, **options)
+        simulated(nlp, z, **options)
 
 
 def test_a_tighter_tolerance_than_arithmetic_allows_is_met_as_well_as_can_be():
     problem, _ = decay()
     nlp = DFET(2, 5).transcribe(problem)
-    assert fly(nlp, nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
+    assert simulated(nlp, nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
 
 
 # Between nodes
@@ -261,13 +261,13 @@ def test_a_control_that_overshoots_between_nodes_is_found():
     law = nlp.unpack(z)["run"].at(np.linspace(0, 2, 4001))["u"]
     assert found["run.u"] == pytest.approx(max(law.max() - 1, -1 - law.min()) / 2, rel=1e-2)
     assert found["run.push"] == pytest.approx(law.max() - 1.2, rel=1e-2)
-    assert fly(nlp, z).violations["path 'push' of 'run'"] == pytest.approx(law.max() - 1.2, rel=1e-2)
+    assert simulated(nlp, z).violations["path 'push' of 'run'"] == pytest.approx(law.max() - 1.2, rel=1e-2)
 
 
 def test_bernstein_does_not_overshoot():
     nlp, z = overshooting("bernstein")
     assert excursions(nlp.problem, nlp.unpack(z)) == {}
-    assert fly(nlp, z).violation == 0
+    assert simulated(nlp, z).violation == 0
 
 
 def test_periodic_controls_and_missing_controls_have_no_excursions():
@@ -278,15 +278,15 @@ def test_periodic_controls_and_missing_controls_have_no_excursions():
     nlp = DFET(1, 3).transcribe(problem)
     z = nlp.propagate(nlp.first_guess(np.array([[3, -3, 3.1, -2.5]])))[0]
     assert excursions(nlp.problem, nlp.unpack(z)) == {}
-    assert fly(nlp, z).max_defect < 1e-3
+    assert simulated(nlp, z).max_defect < 1e-3
     problem, _ = decay()
     nlp = DFET(1, 3).transcribe(problem)
     assert excursions(nlp.problem, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0])) == {}
 
 
-def test_what_was_flown_is_a_trajectory():
+def test_what_was_simulated_is_a_trajectory():
     nlp = DFET(3, 3).transcribe(oscillator())
-    flight = fly(nlp, flown(nlp, k=1)[0]).trajectory
+    flight = simulated(nlp, propagated(nlp, k=1)[0]).trajectory
     phase = flight["swing"]
     assert list(flight) == ["swing"] and set(flight.parameters) == {"m"}
     assert (np.diff(phase.time) >= 0).all()
@@ -297,7 +297,7 @@ def test_what_was_flown_is_a_trajectory():
 
 def test_simulations_leave_no_trace_in_each_other():
     nlp = DFET(3, 3).transcribe(oscillator())
-    first, second = (nlp.unpack(z) for z in flown(nlp, k=2))
+    first, second = (nlp.unpack(z) for z in propagated(nlp, k=2))
     alone = simulate(nlp.problem, first)
     simulate(nlp.problem, second)
     again = simulate(nlp.problem, first)
@@ -325,7 +325,7 @@ def planned(nlp, x0: float, tf: float) -> Trajectory:
     return nlp.unpack(nlp.propagate(nlp.first_guess(np.array(C)))[0])
 
 
-def test_several_are_flown_as_each_is_alone():
+def test_several_are_simulated_as_each_is_alone():
     nlp = DFET(4, 4).transcribe(oscillator())
     flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 6)))]
     other = DFET(3, 5).transcribe(oscillator())

@@ -5,6 +5,7 @@ import shutil
 import casadi as ca
 import numpy as np
 import pytest
+from euler import Euler
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -47,35 +48,36 @@ def two_phases():
         (load("orbit_rise"), DFET(5, 2)),
         (load("goddard"), DFET(3, 3, control_order=4, basis="bernstein")),
         (two_phases(), DFET(3, 2)),
+        (two_phases(), Euler(6)),
     ],
-    ids=["goddard", "orbit", "bernstein", "two phases"],
+    ids=["goddard", "orbit", "bernstein", "two phases", "default derivatives"],
 )
 def test_total_derivatives_are_those_of_differences(problem, mesh):
     nlp = mesh.transcribe(problem)
     reduced, free = nlp.reduced, nlp.free
     inner = nlp.lower[free] + 0.1 * nlp.span[free] + 0.8 * (candidates(nlp, 2) - nlp.lower[free])
     Z = nlp.first_guess(inner)
-    flown = reduced.fly(Z)
+    propagated = reduced.propagate(Z)
     every = np.arange(len(reduced.scale))
-    A = reduced.derivatives(flown, every)
+    A = reduced.derivatives(propagated, every)
     for j, variable in enumerate(free):
         h = 1e-6 * nlp.span[variable]
         up, down = Z.copy(), Z.copy()
         up[:, variable] += h
         down[:, variable] -= h
-        differences = (reduced.fly(up).values - reduced.fly(down).values) / (2 * h)
+        differences = (reduced.propagate(up).values - reduced.propagate(down).values) / (2 * h)
         error = np.abs(differences - A[:, :, j]) * nlp.span[variable] / reduced.scale
         assert error.max() < 1e-6
     at_ends = np.flatnonzero(~reduced.inside)
-    assert reduced.derivatives(flown, at_ends) == pytest.approx(A[:, at_ends], rel=1e-9, abs=1e-12)
+    assert reduced.derivatives(propagated, at_ends) == pytest.approx(A[:, at_ends], rel=1e-9, abs=1e-12)
 
 
 def test_what_propagation_leaves_is_what_the_nlp_says():
     nlp = DFET(3, 2).transcribe(two_phases())
-    flown = nlp.reduced.fly(nlp.first_guess(candidates(nlp, 4)))
+    propagated = nlp.reduced.propagate(nlp.first_guess(candidates(nlp, 4)))
     reduced = nlp.reduced
-    outside = np.maximum(np.maximum(reduced.lower - flown.values, flown.values - reduced.upper) / reduced.scale, 0).max(axis=1)
-    assert outside == pytest.approx(nlp.evaluate(flown.Z)[1], rel=1e-9)
+    outside = np.maximum(np.maximum(reduced.lower - propagated.values, propagated.values - reduced.upper) / reduced.scale, 0).max(axis=1)
+    assert outside == pytest.approx(nlp.evaluate(propagated.Z)[1], rel=1e-9)
 
 
 def test_warm_solves_agree_with_the_projection():
@@ -153,9 +155,9 @@ def test_compiled_functions_give_the_same_bits(monkeypatch):
 def test_what_is_feasible_already_is_one_propagation():
     nlp = DFET(30, 1).transcribe(load("orbit_rise"))
     C = candidates(nlp, 5)
-    flown, found = Propagate().solve(nlp, C), Newton().solve(nlp, C)
-    inside = flown.status == "converged"
-    assert inside.any() and np.array_equal(found.z[inside], flown.z[inside])
+    propagated, found = Propagate().solve(nlp, C), Newton().solve(nlp, C)
+    inside = propagated.status == "converged"
+    assert inside.any() and np.array_equal(found.z[inside], propagated.z[inside])
     assert (found.iterations[inside] == 1).all() and not found.moved[inside].any()
 
 

@@ -1,4 +1,4 @@
-"""How a study stands, for people: a table of the runs that are going on on a terminal, plain lines elsewhere. It writes to stderr."""
+"""Display of a study's progress on stderr: a live table of the current runs on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from typing import Any, TextIO
 from macs.io.console import EVERY, minutes
 
 from ..execution.task import FINISHED, Outcome
-from .store import Run, reason
+from .store import StoredRun, reason
 
 SHOWN = 20
 """Most runs in the table."""
 
 
-class Watch(AbstractContextManager["Watch"]):
-    """Tells, if it is to be shown, which runs are going on and what is left.
+class StudyDisplay(AbstractContextManager["StudyDisplay"]):
+    """The progress of a study, if it is shown: its current runs, and how many are left.
 
     Parameters
     ----------
     title : str
-    runs, todo : sequences of Run
+    runs, todo : sequences of StoredRun
         All there are to be, and those to be made now.
     shown : bool
     stream : text stream, optional
         stderr by default.
     """
 
-    def __init__(self, title: str, runs: Sequence[Run], todo: Sequence[Run], shown: bool, stream: TextIO | None = None) -> None:
+    def __init__(self, title: str, runs: Sequence[StoredRun], todo: Sequence[StoredRun], shown: bool, stream: TextIO | None = None) -> None:
         self._title, self._total, self._shown, self._stream = title, len(runs), shown, stream or sys.stderr
         self._finished, self._failed = sum(run.finished for run in runs), len(runs) - len(todo) - sum(run.finished for run in runs)
         self._work = sum(run.cell.evaluations for run in todo)
         self._done = 0
-        self._going: dict[tuple[str, int], tuple[Run, int, float]] = {}
+        self._going: dict[tuple[str, int], tuple[StoredRun, int, float]] = {}
         self._began, self._written = time.perf_counter(), -float("inf")
         self._live: Any = None
 
-    def __enter__(self) -> Watch:
+    def __enter__(self) -> StudyDisplay:
         if self._shown and self._stream.isatty():
             from rich.console import Console
             from rich.live import Live
@@ -55,8 +55,8 @@ class Watch(AbstractContextManager["Watch"]):
         if self._live is not None:
             self._live.stop()
 
-    def reporter(self, run: Run) -> Callable[[int, float], None]:
-        """What a run that is being made is to call, from any thread, with evaluations and seconds."""
+    def reporter(self, run: StoredRun) -> Callable[[int, float], None]:
+        """The function that a run calls, from any thread, with evaluations and seconds."""
         key = run.cell.folder, run.number
 
         def report(evaluations: int, elapsed: float) -> None:
@@ -64,7 +64,7 @@ class Watch(AbstractContextManager["Watch"]):
 
         return report
 
-    def ended(self, run: Run, outcome: Outcome) -> None:
+    def ended(self, run: StoredRun, outcome: Outcome) -> None:
         """A run is kept."""
         self._going.pop((run.cell.folder, run.number), None)
         self._done += run.cell.evaluations
@@ -73,7 +73,7 @@ class Watch(AbstractContextManager["Watch"]):
         if outcome.status != FINISHED:
             self._say(f"{self._title}: run {run.number} of {run.cell.name} {reason(outcome.status, outcome.message)}")
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Time to write a line, perhaps."""
         if self._shown and self._live is None and time.perf_counter() - self._written >= EVERY:
             self._write(f"{self._title}: {self._standing()}")

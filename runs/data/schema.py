@@ -1,0 +1,146 @@
+"""Schemas of plain data, checked by msgspec. Errors are one line: the place, the value, what it must be, and the nearest known word."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+import types
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from problems.checks import unknown
+
+LONGEST = 80
+"""Characters of a value in a message."""
+LARGEST = sys.float_info.max
+Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST, description="a finite number")]
+Positive = Annotated[float, Meta(gt=0, le=LARGEST, description="a positive number")]
+Count = Annotated[int, Meta(ge=1, description="a whole number of at least 1")]
+Natural = Annotated[int, Meta(ge=0, description="a whole number of at least 0")]
+Text = Annotated[str, Meta(description="a text")]
+Flag = Annotated[bool, Meta(description="true or false")]
+
+
+class Section(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A section of a file: its fields are the keys that it may have. Those without a default are required."""
+
+
+def checked(value: Any, kind: Any, name: str = "it") -> Any:
+    """Plain data converted to a type.
+
+    Parameters
+    ----------
+    value : plain data
+        Numbers of numpy and arrays count as numbers and lists.
+    kind : type
+        A `Section`, one of the annotated types of this module, or any other type that msgspec converts to.
+    name : str
+        Of the value, for messages about the value as a whole.
+
+    Raises
+    ------
+    ValueError
+        The value does not fit; one line that names the key.
+    """
+    data = plain(value)
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(_in_words(str(error), data, kind, name)) from None
+
+
+def _in_words(error: str, data: Any, kind: Any, name: str) -> str:
+    """One line for an error of msgspec, whose place is a path such as `$.paper[0].point`."""
+    text, _, path = error.partition(" - at `$")
+    place = ""
+    for key, index in re.findall(r"\.(\w+)|\[(\d+|\.\.\.)\]", path):
+        if index == "...":  # the entry of a mapping, whose key msgspec does not name
+            break
+        if index:
+            place, kind, data = f"{place or name} {int(index) + 1}", get_args(_bare(kind))[0], data[int(index)]
+        else:
+            member, tags = _member(kind, data), _tags(kind)
+            known = get_type_hints(member, include_extras=True) if isinstance(member, type) else {}
+            place, kind, data = f"{place}: {key}" if place else key, known.get(key, Literal[tuple(tags)] if tags else Any), data.get(key)
+    before, field = f"{place}: " if place else "", re.search(r"field `(.*)`$", text)
+    if field and "unknown" in text:
+        return f"{before}{unknown('key', field[1], _member(kind, data).__struct_fields__)}"
+    if field:
+        tags = {} if isinstance(_member(kind, data), type) else _tags(kind)
+        return f"{before}{field[1]} {'must be one of ' if tags else 'is missing'}{', '.join(tags)}"
+    if text.startswith(("Expected", "Invalid")):
+        return f"{place or name} must be {_description(kind)}, not {repr(data)[:LONGEST]}"
+    return f"{before}{text}"  # from a `__post_init__`, in words already
+
+
+def _bare(kind: Any) -> Any:
+    """A type without its annotation and without None."""
+    if get_origin(kind) is Annotated:
+        return _bare(get_args(kind)[0])
+    if get_origin(kind) in (Union, types.UnionType):
+        members = [one for one in get_args(kind) if one is not type(None)]
+        return _bare(members[0]) if len(members) == 1 else Union[tuple(members)]  # noqa: UP007 - of a list
+    return kind
+
+
+def _tags(kind: Any) -> dict[str, Any]:
+    """{tag: section} of a union of tagged sections."""
+    return {str(one.__struct_config__.tag): one for one in get_args(_bare(kind)) if hasattr(one, "__struct_config__")}
+
+
+def _member(kind: Any, data: Any) -> Any:
+    """The section that data is to be: of a union the one that its tag names, if it has one."""
+    for tag, member in _tags(kind).items():
+        if isinstance(data, Mapping) and data.get(member.__struct_config__.tag_field) == tag:
+            return member
+    return _bare(kind)
+
+
+def _description(kind: Any) -> str:
+    """What a value must be, in words."""
+    stated = [one.description for one in get_args(kind)[1:] if isinstance(one, Meta) and one.description]
+    if stated:
+        return str(stated[0])
+    if get_origin(kind) in (Union, types.UnionType) and type(None) in get_args(kind):
+        return _description(get_args(kind)[0])
+    bare = _bare(kind)
+    if get_origin(bare) is Literal:
+        return f"one of {', '.join(map(str, get_args(bare)))}"
+    if hasattr(bare, "__struct_fields__"):
+        return f"a table with {', '.join(bare.__struct_fields__)}"
+    words = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list"}
+    entries = f" whose entries are each {_description(get_args(bare)[1])}" if get_origin(bare) is dict else ""
+    return words.get(get_origin(bare) or bare, f"a table{entries}")
+
+
+def plain(data: Any) -> Any:
+    """`data` as it comes back from JSON; what JSON does not know, as its `repr`."""
+
+    def converted(one: Any) -> Any:
+        return one.tolist() if hasattr(one, "tolist") else dict(one) if isinstance(one, Mapping) else repr(one)
+
+    return json.loads(json.dumps(data, default=converted))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, and finite."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+@contextmanager
+def errors_begin_with(where: str, anything: str = "") -> Iterator[None]:
+    """A context in which the text of a ValueError begins with `where`. With `anything`, every other error becomes such a ValueError."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
+    except (Exception, SystemExit) as error:
+        if not anything:
+            raise
+        raise ValueError(f"{where}: {anything}: {type(error).__name__}: {error}") from error
