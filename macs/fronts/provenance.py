@@ -69,7 +69,7 @@ class Source:
             )
         if not (self.trusted or is_catalogued(self.address)):
             raise ValueError(
-                f"the file says that its problem '{self.name}' is made by the code at '{self.address}', which is not run unasked: "
+                f"the file says that its problem '{self.name}' is made by the code at {self.address!r}, which is not run unasked: "
                 "give problem=, or trust=True (--problem or --trust)"
             )
         try:
