@@ -22,7 +22,7 @@ examples:
   macs solve goddard
   macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
   macs show front.nc --point 3 --plot flight.png
-  macs verify front.nc
+  macs verify front.nc --problem my_problem.py:build
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
   macs bench inner --quick
