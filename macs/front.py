@@ -182,7 +182,16 @@ class Front(Points):
         return draw_front(self, ax)
 
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
-        """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group."""
+        """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.
+
+        Each variable has its `long_name` and `units`. In a phase, each state, control and path constraint is a variable `(point, node)` of
+        its own name; a name that netCDF does not allow, or that the file needs itself, is changed, and remains as the `long_name`.
+
+        Raises
+        ------
+        KeyError
+            If there is no such phase.
+        """
         from .fronts.dataset import phase_dataset, root_dataset
 
         return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
@@ -192,33 +201,44 @@ class Front(Points):
         files.save_csv(self, path)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything to one netCDF-4 file, whole or not at all.
+        """Write everything to one netCDF-4 file with a checksum, whole or not at all.
+
+        A symbolic link stays, and the file that it leads to is replaced; a file that is replaced keeps its permissions.
 
         Raises
         ------
         OSError
             If the folder is missing or cannot be written to, or the disk is full; a file that was there before is still there.
+        ValueError
+            If the front has more than 1 GiB.
         """
         files.save(self, path)
 
     @staticmethod
-    def load(path: str | PathLike[str], problem: Any = None) -> Front:
-        """Read a front that `save` wrote. No code is run: the problem that it names is loaded when a point is first simulated.
+    def load(path: str | PathLike[str], problem: Problem | CompiledProblem | None = None, trust: bool = False) -> Front:
+        """Read a front that `save` wrote. No code is run: the problem is loaded when a point is first simulated.
 
         Parameters
         ----------
         path : path
         problem : Problem or CompiledProblem, optional
-            The problem the front is of; needed to simulate the points of one that was stated in a script.
+            The problem of the front; needed to simulate the points of one that was stated in a script.
+        trust : bool
+            Whether the code at the address of the problem may be run, to simulate points. A problem of the catalogue needs no trust.
 
         Raises
         ------
         FileNotFoundError
             If there is no such file.
         ValueError
-            If it is not a front, is damaged, of another version of the format, or of another problem.
+            If it is not a front, is damaged, of a later version of the format, or of another problem.
+
+        Warns
+        -----
+        UserWarning
+            If an earlier MACS wrote it, without a checksum.
         """
-        return Front.of(files.load(path, problem))
+        return Front.of(files.load(path, problem, trust))
 
     @staticmethod
     def merge(fronts: Sequence[Front]) -> Front:

@@ -1,10 +1,11 @@
 """A front as one netCDF-4 file, whole or not at all; and as a table of comma-separated values.
 
-Root group: `dataset.root_dataset`. One group for each phase, by its name: `dataset.phase_dataset`. Group `_closest`, where there is one:
-the least infeasible point of an empty front, laid out like a root. Nothing is pickled and nothing that is read is run.
+Root group: `dataset.root_dataset`. One group for each phase: `dataset.phase_dataset`. Group `_closest`, if there is one: the least
+infeasible point of an empty front, laid out like a root. At the end, a checksum (`io.seal`), without which nothing of the file is read.
+Nothing is pickled, and no code that a file names is run.
 
 A file is made in memory, written under a temporary name in the same folder, flushed to the disk and renamed: a full disk, a crash or a
-second reader never meets half of one. It is read from memory too, so that no handle on it stays open.
+second reader never meets half of one. It is read into memory too, so that it does not stay open.
 """
 
 from __future__ import annotations
@@ -12,27 +13,44 @@ from __future__ import annotations
 import csv
 import io
 import json
+import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..io.atomic import check_target, write_whole
-from .dataset import FORMAT, VERSION, phase_dataset, phase_names, root_columns, root_dataset, trajectories
-from .labelled import Labelled, document, words
+from ..io import netcdf
+from ..io.atomic import check_target, read_whole, write_whole
+from ..io.netcdf import Group, Labelled, words
+from ..io.seal import sealed, unsealed
+from .dataset import (
+    CLOSEST,
+    FORMAT,
+    ROOT,
+    SPLIT,
+    VERSION,
+    group_names,
+    phase_dataset,
+    phase_names,
+    read_trajectories,
+    root_columns,
+    root_dataset,
+    split,
+)
+from .labelled import checked, document, read_attribute, read_document, variable_columns
 from .points import Points
+from .provenance import STATS, stats_attributes
 
-CLOSEST = "_closest"
-
-
+LARGEST = 2**30
+"""Bytes that a file may have."""
 PHASES = "phases"
-"""Attribute of a root: the groups that hold its phases, in their order, as JSON."""
-
-
-DIMENSION_ONLY = "This is a netCDF dimension but not a netCDF variable"
-"""What netCDF-4 calls a dimension without labels."""
+"""Attribute of a root: the groups of its phases, in their order, as JSON."""
+SEALED = b"long_name"
+"""What files have in many places since they have a checksum, and did not have before: one that lost it is not taken for an old one."""
+EDGE_STATES = "edge_states"
+"""An array that the first files of format 1 had beside the same values in the coefficients."""
 
 
 def save(front: Points, path: str | PathLike[str]) -> None:
@@ -41,23 +59,29 @@ def save(front: Points, path: str | PathLike[str]) -> None:
     write_whole(path, to_bytes(front))
 
 
-def load(path: str | PathLike[str], problem: Any = None) -> Points:
+def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) -> Points:
     """Read a front; see `Front.load`."""
     try:
-        content = Path(path).read_bytes()
+        content = read_whole(path, LARGEST)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file '{path}'") from None
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror or error}") from error
     try:
-        front = from_bytes(content)
+        front, version = _read(content)
     except Exception as error:
-        # Whatever a damaged or foreign file provokes in HDF5 or in what follows, the user's file is what is wrong.
+        # HDF5 raises errors of many classes for a damaged or foreign file: whichever it is, the user's file is wrong.
         raise ValueError(f"{path} does not hold a front that can be read: {_reason(content, error)}") from error
-    if problem is not None:
-        if front.source is None:
-            raise ValueError(f"{path} holds a front of a black box: it has no problem")
-        front._problem = front.source.check(problem, str(path))
+    if version < VERSION:
+        text = f"{path} was written by an earlier MACS (format {version}) and has no checksum: damage is not noticed. Save it again."
+        warnings.warn(text, stacklevel=3)
+    if front.source is None and problem is not None:
+        raise ValueError(f"{path} holds a front of a black box: it has no problem")
+    if front.source is not None:
+        source = replace(front.source, trusted=trust)
+        known = None if problem is None else source.check(problem, str(path))
+        for points in [front] if front._closest is None else [front, front._closest._points]:
+            points.source, points._problem = source, known
     return front
 
 
@@ -74,101 +98,90 @@ def save_csv(front: Points, path: str | PathLike[str]) -> None:
         for column, value in zip(place.tolist(), point.decision.tolist(), strict=True):
             cells[column] = repr(value)
         writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *cells])
-    check_target(path)
     write_whole(path, text.getvalue().encode())
 
 
 def to_bytes(front: Points) -> bytes:
-    """The content of a front's file."""
-    import h5netcdf
-
-    buffer = io.BytesIO()
-    with h5netcdf.File(buffer, "w") as file:
-        for group, data in _datasets(front):
-            _write_group(file if not group else file.create_group(group), data)
-    return buffer.getvalue()
+    """The content of a front's file. Raises ValueError for a front of more than `LARGEST` bytes."""
+    content = sealed(netcdf.to_bytes(dict(_datasets(front))))
+    if len(content) > LARGEST:
+        raise ValueError(f"the front has {len(content)} bytes, a file at most {LARGEST}: save fewer points")
+    return content
 
 
 def from_bytes(content: bytes) -> Points:
-    """The front in a file's content. Raises whatever comes if it is none."""
-    import h5py
-
-    with h5py.File(io.BytesIO(content), "r") as file:
-        if _text(file.attrs.get("format")) != FORMAT:
-            raise ValueError("it is a netCDF file of something else")
-        version = int(np.ravel(file.attrs["format_version"])[0])
-        if version != VERSION:
-            older = "update MACS" if version > VERSION else "an earlier MACS wrote it"
-            raise ValueError(f"its format is version {version}, this MACS reads version {VERSION}: {older}")
-        return _read_front(file)
+    """The front in a file's content. Raises an exception of any class if it is none."""
+    return _read(content)[0]
 
 
-def _datasets(front: Points, group: str = "") -> Iterator[tuple[str, Labelled]]:
-    """A front's groups by name, its root first."""
-    root = root_dataset(front)
-    groups = _group_names(phase_names(front), {CLOSEST, *root.variables, *root.sizes})
-    root.attrs[PHASES] = document(groups)
-    root.attrs["has_closest"] = int(front._closest is not None)
-    prefix = f"{group}/" if group else ""
-    yield group, root
-    for name, place in groups.items():
-        yield prefix + place, phase_dataset(front, name)
+def _datasets(front: Points) -> Iterator[tuple[str, Labelled]]:
+    """A front's groups by their paths, its root first."""
+    yield from _one_dataset(front, "")
     if front._closest is not None:
-        yield from _datasets(front._closest.alone(), prefix + CLOSEST)
+        yield from _one_dataset(front._closest.alone(), CLOSEST)
 
 
-def _group_names(phases: list[str], taken: set[str]) -> dict[str, str]:
-    """A group for each phase: its own name, unless HDF5 could not hold a group of that name there."""
-    groups: dict[str, str] = {}
-    for phase in phases:
-        place = phase.replace("/", "_").replace("\0", "_")
-        while not place.strip(". ") or place in taken:
-            place = f"phase_{place}"
-        taken.add(place)
-        groups[phase] = place
-    return groups
+def _one_dataset(front: Points, path: str) -> Iterator[tuple[str, Labelled]]:
+    root, groups = root_dataset(front), group_names(phase_names(front))
+    root.attrs[PHASES] = document(groups)
+    yield path, root
+    for name, group in groups.items():
+        yield f"{path}/{group}", phase_dataset(front, name)
 
 
-def _write_group(group: Any, data: Labelled) -> None:
-    """One group, as it is: no fill values, no packing, no time decoding."""
-    import h5py
-
-    group.dimensions = data.sizes
-    for name, (dimensions, values) in data.variables.items():
-        if values.dtype.kind in "UO":
-            group.create_variable(name, dimensions, dtype=h5py.string_dtype(), data=values.astype(object))
-        else:
-            group.create_variable(name, dimensions, data=values)
-    for key, value in data.attrs.items():
-        group.attrs[key] = value
-
-
-def _read_front(group: Any) -> Points:
-    root = _read_group(group)
-    phases = [_read_group(group[place]) for place in json.loads(root.attrs[PHASES]).values()]
-    closest = _read_front(group[CLOSEST])[0] if root.attrs["has_closest"] else None
-    return Points(**root_columns(root), trajectories=trajectories(root, phases), closest=closest)
+def _read(content: bytes) -> tuple[Points, int]:
+    """The front, and the version of its format."""
+    whole = unsealed(content)
+    if whole is None and SEALED in content:
+        raise ValueError("it is cut short or damaged: it has no checksum")
+    root = netcdf.from_bytes(content, older=True) if whole is None else netcdf.from_bytes(whole)
+    if root.attrs.get("format") != FORMAT:
+        raise ValueError("it is a netCDF file of something else")
+    version = read_attribute(root.attrs, "format_version", int)
+    if version > VERSION:
+        raise ValueError(f"its format is version {version}, this MACS reads up to version {VERSION}: update MACS")
+    if (whole is None) != (version < VERSION) or version < 1:
+        raise ValueError(f"its format is version {version}, {'without' if whole is None else 'with'} a checksum: no MACS wrote it so")
+    closest = root.groups.pop(CLOSEST, None)
+    return _read_front(root, version, None if closest is None else _read_front(closest, version)), version
 
 
-def _read_group(group: Any) -> Labelled:
-    """What `_write_group` wrote, by HDF5's own names for it; several times faster than through netCDF's, for the same values."""
-    import h5py
-
-    variables = {}
-    for name, data in group.items():
-        if isinstance(data, h5py.Dataset) and not str(_text(data.attrs.get("NAME", ""))).startswith(DIMENSION_ONLY):
-            dimensions = (name,) if data.is_scale else tuple(dim[0].name.rsplit("/")[-1] for dim in data.dims)
-            variables[name] = (dimensions, _values(data))
-    return Labelled(variables, {key: _text(value) for key, value in group.attrs.items()})
-
-
-def _values(data: Any) -> np.ndarray:
-    values = np.asarray(data[...])
-    return words([_text(word) for word in values.tolist()]) if values.dtype.kind == "O" else values
+def _read_front(root: Group, version: int, closest: Points | None = None) -> Points:
+    places = read_document(root.attrs, PHASES)
+    if set(places.values()) != set(root.groups) or len(places) > len(root.groups):
+        raise ValueError(f"its groups are {', '.join(root.groups) or 'none'}, its phases {', '.join(places) or 'none'}")
+    if closest is not None and len(closest) != 1:
+        raise ValueError(f"the closest point is one, not {len(closest)}")
+    root, phases = upgrade(root, {name: root.groups[place] for name, place in places.items()}, version)
+    data = checked(ROOT, root)
+    return Points(**root_columns(data), trajectories=read_trajectories(data, phases), closest=None if closest is None else closest[0])
 
 
-def _text(value: Any) -> Any:
-    return value.decode() if isinstance(value, bytes) else value
+def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group, dict[str, Group]]:
+    """A root and its phases in today's format, from those of an earlier one.
+
+    Format 1 had one transcription and no notes. Up to format 2, names without entries had no bounds, states, controls and path constraints
+    were in one array each, and the numbers of `stats` in its JSON.
+    """
+    if version == VERSION:
+        return root, phases
+    n = len(root.arrays["violation"])
+    arrays, attrs = {**root.arrays}, {**root.attrs}
+    if version == 1:
+        lengths, columns = arrays.pop("decision_length"), np.arange(arrays["decision"].shape[1])
+        arrays["place"] = np.where(columns < lengths[:, None], columns, -1)
+        arrays |= {"transcription": words([attrs["transcription"]] * n), "note": words([""] * n)}
+        for phase in phases.values():
+            phase.arrays.pop(EDGE_STATES, None)
+            phase.arrays.update({basis: words([phase.attrs[basis]] * n) for basis in ("state_basis", "control_basis")})
+    arrays["parameter_unit"] = words([""] * len(arrays["parameter"]))
+    attrs |= stats_attributes(STATS | json.loads(attrs["stats"]))
+    upgraded = {}
+    for name, phase in phases.items():
+        names = {kind: phase.arrays[kind].tolist() for kind in SPLIT.values()}
+        empty = variable_columns((), "state") | variable_columns((), "control") | variable_columns((), "path", limits=True)
+        upgraded[name] = Group(empty | split(phase.arrays, names), phase.attrs, {})
+    return Group(variable_columns((), "variable") | arrays, attrs, {}), upgraded
 
 
 def _reason(content: bytes, error: Exception) -> str:
@@ -180,4 +193,4 @@ def _reason(content: bytes, error: Exception) -> str:
         return f"it is cut short or damaged ({error})"
     if isinstance(error, KeyError):
         return f"{error.args[0] if error.args else 'something'} is missing from it"
-    return str(error) or type(error).__name__
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,128 +1,169 @@
-"""Labelled arrays, and named things as columns of them and back: variables with their bounds, dicts of numbers, JSON."""
+"""Columns of a front's file: tables of what they are, named things as arrays and back, JSON."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from problems.compiled import Limit, Variable
 
-if TYPE_CHECKING:
-    import xarray
+from ..io.netcdf import Group, Labelled, Labels, words
+
+NUMBER, COUNT, TEXT = "f", "i", "O"
+"""Kinds of a column: float64, whole numbers, str."""
+KINDS = {NUMBER: "numbers", COUNT: "whole numbers", TEXT: "texts"}
 
 
-@dataclass(frozen=True, eq=False)
-class Labelled:
-    """Arrays with named dimensions, as a group of a netCDF file has them: what files need of an xarray.Dataset, which takes a second or two
-    to import.
+class Column(NamedTuple):
+    """One array of a file.
 
-    Attributes
-    ----------
-    variables : name -> (names of dimensions, array)
-        Labels of a dimension are the variable of its name.
-    attrs : mapping
-        Strings and integers.
+    `rows` is the name of the column of `Points` that it is, where it has one entry for each point as it is; `optional`, whether it is left
+    out where the points have no such column.
+    """
+
+    dimensions: tuple[str, ...]
+    kind: str
+    long_name: str
+    units: str = "1"
+    rows: str = ""
+    optional: bool = False
+
+    @property
+    def labels(self) -> Labels:
+        """For the reader of the file."""
+        return Labels(self.dimensions, self.long_name, self.units)
+
+
+def labelled(table: Mapping[str, Column], values: Mapping[str, np.ndarray], attrs: dict[str, Any]) -> Labelled:
+    """Arrays of a table with their labels."""
+    return Labelled(values, {name: table[name].labels for name in values}, attrs)
+
+
+def checked(table: Mapping[str, Column], group: Group) -> Labelled:
+    """The arrays of a group, which are those of a table.
 
     Raises
     ------
     ValueError
-        If two arrays do not agree on how long a dimension is.
+        If one is missing, not in the table, or of another kind or shape.
     """
-
-    variables: Mapping[str, tuple[tuple[str, ...], np.ndarray]]
-    attrs: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        lengths = self.sizes
-        for name, (dimensions, values) in self.variables.items():
-            if values.shape != (shape := tuple(lengths[dimension] for dimension in dimensions)):
-                raise ValueError(f"'{name}' has the shape {values.shape}, its dimensions {', '.join(dimensions)} that of {shape}")
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """How long the dimensions are."""
-        return {
-            dimension: length
-            for dimensions, values in self.variables.values()
-            for dimension, length in zip(dimensions, values.shape, strict=False)
-        }
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self.variables[name][1]
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.variables
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The same for people."""
-        import xarray
-
-        return xarray.Dataset({name: (list(dimensions), values) for name, (dimensions, values) in self.variables.items()}, attrs=self.attrs)
+    unknown = [name for name in group.arrays if name not in table]
+    if unknown:
+        raise ValueError(f"it has an array '{unknown[0]}', which is not known")
+    for name, column in table.items():
+        if name not in group.arrays and not column.optional:
+            raise ValueError(f"'{name}' is missing from it")
+        if name in group.arrays and group.arrays[name].dtype.kind != column.kind:
+            raise ValueError(f"'{name}' has {KINDS[group.arrays[name].dtype.kind]}, not {KINDS[column.kind]}")
+    return labelled(table, group.arrays, group.attrs)
 
 
-def variable_columns(variables: Sequence[Variable | Limit], dimension: str) -> dict[str, Any]:
-    """Bounds, units and scales along a dimension whose labels are the names."""
-    if not variables:
-        return {dimension: ((dimension,), words([]))}
-    columns: dict[str, Any] = {
+def legal_names(names: Iterable[str], kind: str, taken: Iterable[str]) -> dict[str, str]:
+    """What arrays and groups are called that have names of the user's: these names, where netCDF allows them and they are not `taken`.
+
+    Else, each character other than a letter, digit or one of ``_ . + -`` becomes ``_``, and `kind` and ``_`` are put before the name until
+    it begins with a letter and is free.
+    """
+    free: dict[str, str] = {}
+    used = set(taken)
+    for name in names:
+        legal = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", name))
+        while legal in used or not legal[:1].isalpha():
+            legal = f"{kind}_{legal}"
+        used.add(legal)
+        free[name] = legal
+    return free
+
+
+def distinct(names: Sequence[Any], what: str) -> None:
+    """Raise ValueError if there is one twice."""
+    if len(set(names)) < len(names):
+        raise ValueError(f"two {what} have the same name")
+
+
+def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str, Column]:
+    """The columns of `variable_columns`."""
+    units = "not stated" if limits else f"see {dimension}_unit"
+    along = (dimension,)
+    table = {
+        dimension: Column(along, TEXT, f"name of the {what}"),
+        f"{dimension}_lower": Column(along, NUMBER, f"lower bound of the {what}", units),
+        f"{dimension}_upper": Column(along, NUMBER, f"upper bound of the {what}", units),
+        f"{dimension}_scale": Column(along, NUMBER, f"scale of the {what}", units),
+    }
+    if not limits:
+        table[f"{dimension}_unit"] = Column(along, TEXT, f"unit of the {what}")
+        table[f"{dimension}_period"] = Column(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
+    return table
+
+
+def variable_columns(variables: Sequence[Variable | Limit], dimension: str, limits: bool = False) -> dict[str, np.ndarray]:
+    """Names, bounds and scales along a dimension; of variables, units and periods too."""
+    columns = {
         dimension: words([v.name for v in variables]),
         f"{dimension}_lower": np.array([v.lower for v in variables], dtype=float),
         f"{dimension}_upper": np.array([v.upper for v in variables], dtype=float),
         f"{dimension}_scale": np.array([v.scale for v in variables], dtype=float),
     }
-    if isinstance(variables[0], Variable):
-        columns[f"{dimension}_unit"] = words([getattr(v, "unit", "") for v in variables])
+    if not limits:
         periods = [getattr(v, "period", None) for v in variables]
+        columns[f"{dimension}_unit"] = words([getattr(v, "unit", "") for v in variables])
         columns[f"{dimension}_period"] = np.array([np.nan if period is None else period for period in periods], dtype=float)
-    return {key: ((dimension,), values) for key, values in columns.items()}
+    return columns
 
 
 def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
-    """What `variable_columns` made; limits, which have no unit, come back as variables too."""
-    names = [str(name) for name in data[dimension]]
-    if not names:
-        return ()
-    n = len(names)
-    columns = [data[f"{dimension}_{key}"].tolist() for key in ("lower", "upper")]
-    units = [str(unit) for unit in data[f"{dimension}_unit"]] if f"{dimension}_unit" in data else [""] * n
-    periods = data[f"{dimension}_period"].tolist() if f"{dimension}_period" in data else [np.nan] * n
-    scales = data[f"{dimension}_scale"].tolist()
-    return tuple(
-        Variable(name, lower, upper, unit, scale, None if np.isnan(period) else period)
-        for name, lower, upper, unit, scale, period in zip(names, *columns, units, scales, periods, strict=True)
-    )
+    """Variables from their `variable_columns`. Raises ValueError for bounds, a scale or a period that are none."""
+    units, periods = data[f"{dimension}_unit"].tolist(), data[f"{dimension}_period"].tolist()
+    rows = zip(read_limits(data, dimension), units, periods, strict=True)
+    if not np.all(np.isnan(data[f"{dimension}_period"]) | (data[f"{dimension}_period"] > 0)):
+        raise ValueError(f"'{dimension}_period' has a period that is not above 0")
+    return tuple(Variable(v.name, v.lower, v.upper, unit, v.scale, None if np.isnan(period) else period) for v, unit, period in rows)
 
 
-def named_columns(rows: Sequence[Mapping[str, float] | None], name: str, dimension: str) -> dict[str, Any]:
-    """Dicts of numbers as an array; `<name>_given` (point, dimension) says which are there, `<name>_known` (point) which rows are."""
-    labels = list(dict.fromkeys(key for row in rows for key in row or {}))
-    values = np.array([[(row or {}).get(label, np.nan) for label in labels] for row in rows], dtype=float).reshape(len(rows), len(labels))
-    given = np.array([[label in (row or {}) for label in labels] for row in rows], dtype=np.int8).reshape(values.shape)
+def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:
+    """Limits from their `variable_columns`. Raises ValueError for bounds or a scale that are none."""
+    names = data[dimension].tolist()
+    lower, upper, scale = (data[f"{dimension}_{key}"] for key in ("lower", "upper", "scale"))
+    for wrong, why in ((~(lower <= upper), "bounds that are no interval"), (~(scale > 0), "a scale that is not above 0")):
+        if wrong.any():
+            raise ValueError(f"the {dimension} '{names[int(np.argmax(wrong))]}' has {why}")
+    return tuple(Limit(*row) for row in zip(names, lower.tolist(), upper.tolist(), scale.tolist(), strict=True))
+
+
+def named_table(name: str, dimension: str, what: str, entry: str) -> dict[str, Column]:
+    """The columns of `named_columns`."""
     return {
-        dimension: ((dimension,), words(labels)),
-        name: (("point", dimension), values),
-        f"{name}_given": (("point", dimension), given),
-        f"{name}_known": (("point",), np.array([row is not None for row in rows], dtype=np.int8)),
+        dimension: Column((dimension,), TEXT, f"name of the {entry}"),
+        name: Column(("point", dimension), NUMBER, what),
+        f"{name}_given": Column(("point", dimension), COUNT, f"1 where there is a number in {name}, else 0"),
+        f"{name}_known": Column(("point",), COUNT, f"1 for points that have {name}, else 0"),
     }
 
 
-def read_named(root: Labelled, name: str, dimension: str) -> list[dict[str, float] | None]:
-    """What `named_columns` made."""
-    labels = [str(label) for label in root[dimension]]
-    values, given, known = (root[key].tolist() for key in (name, f"{name}_given", f"{name}_known"))
+def named_columns(rows: Sequence[Mapping[str, float] | None], name: str, dimension: str) -> dict[str, np.ndarray]:
+    """Dicts of numbers as an array; which entries and which dicts there are."""
+    labels = list(dict.fromkeys(key for row in rows for key in row or {}))
+    values = np.array([[(row or {}).get(label, np.nan) for label in labels] for row in rows], dtype=float).reshape(len(rows), len(labels))
+    given = np.array([[label in (row or {}) for label in labels] for row in rows], dtype=np.int8).reshape(values.shape)
+    known = np.array([row is not None for row in rows], dtype=np.int8)
+    return {dimension: words(labels), name: values, f"{name}_given": given, f"{name}_known": known}
+
+
+def read_named(data: Labelled, name: str, dimension: str) -> list[dict[str, float] | None]:
+    """Dicts of numbers from their `named_columns`. Raises ValueError if a name is there twice."""
+    labels = data[dimension].tolist()
+    distinct(labels, f"entries of '{dimension}'")
+    values, given, known = (data[key].tolist() for key in (name, f"{name}_given", f"{name}_known"))
     return [
         {label: v for label, v, there in zip(labels, row, mask, strict=True) if there} if k else None
         for row, mask, k in zip(values, given, known, strict=True)
     ]
-
-
-def words(names: Sequence[str]) -> np.ndarray:
-    """Strings as an array, also none at all."""
-    return np.array(list(names), dtype=str) if len(names) else np.array([], dtype="<U1")
 
 
 def document(value: Any, strict: bool = False) -> str:
@@ -138,3 +179,33 @@ def document(value: Any, strict: bool = False) -> str:
         return repr(item)
 
     return json.dumps(value, default=plain)
+
+
+def read_documents(texts: Iterable[str], what: str, fits: Callable[[Any], bool]) -> list[Any]:
+    """Values of JSON texts, equal texts once. Raises ValueError if one is no JSON, or its value does not fit."""
+    values: dict[str, Any] = {}
+    found = []
+    for text in texts:
+        if text not in values:
+            try:
+                values[text] = json.loads(text)
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"'{what}' is no JSON: {error}") from error
+            if not fits(values[text]):
+                raise ValueError(f"'{what}' is not what it should be: {text[:60]}")
+        found.append(values[text])
+    return found
+
+
+def read_attribute(attrs: Mapping[str, Any], name: str, kinds: type | tuple[type, ...]) -> Any:
+    """An attribute of a kind."""
+    if name not in attrs:
+        raise ValueError(f"the attribute '{name}' is missing from it")
+    if not isinstance(attrs[name], kinds):
+        raise ValueError(f"the attribute '{name}' is of another kind than it should be")
+    return attrs[name]
+
+
+def read_document(attrs: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """An attribute that is a JSON object."""
+    return read_documents([read_attribute(attrs, name, str)], name, lambda value: isinstance(value, dict))[0]

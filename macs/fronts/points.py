@@ -186,7 +186,7 @@ class Points:
         if self.source is None:
             raise ValueError("this front is of a black box: there are no dynamics to simulate")
         if self._problem is None:
-            self._problem = self.source.load()
+            self._problem = self.source.load().compile()
         return self._problem
 
     def __len__(self) -> int:

@@ -10,37 +10,44 @@ from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
 import problems
+from problems.catalogue import is_catalogued
 from problems.compiled import CompiledProblem
+from problems.problem import Problem
 
 from ..evaluation.evaluator import Counts
+from .labelled import document, read_attribute, read_document
 
 
 @dataclass(frozen=True)
 class Source:
     """Identity of a problem: its name, its fingerprint, and the address and data that `problems.load` makes it from.
 
-    `address` is empty where a script stated the problem; then only the script can give it again.
+    `address` is empty where a script stated the problem; then only the script can give it again. To load a problem runs the code at its
+    address: one that was read from a file is only loaded if it is of the catalogue, or `trusted`.
     """
 
     name: str
     fingerprint: str
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
+    trusted: bool = field(default=False, compare=False)
 
     @classmethod
     def of(cls, problem: CompiledProblem) -> Source:
-        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data))
+        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True)
 
-    def check(self, problem: Any, whose: str) -> CompiledProblem:
-        """`problem` (a `Problem` or a `CompiledProblem`), compiled.
+    def check(self, problem: Problem | CompiledProblem, whose: str) -> CompiledProblem:
+        """`problem`, compiled.
 
         Raises
         ------
         ValueError
             If it is another problem than this source's; `whose` begins the message.
         """
-        compiled = problem.compile() if hasattr(problem, "compile") else problem
+        compiled = problem.compile() if isinstance(problem, Problem) else problem
         if compiled.fingerprint != self.fingerprint:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
             raise ValueError(
@@ -48,25 +55,31 @@ class Source:
             )
         return compiled
 
-    def load(self) -> CompiledProblem:
+    def load(self) -> Problem:
         """The problem from its address. This runs the code that the address names.
 
         Raises
         ------
         ValueError
-            If there is no address, nothing is found there, or something else is.
+            If there is no address, it may not be loaded, nothing is found there, or something else is.
         """
         if not self.address:
             raise ValueError(
                 f"problem '{self.name}' was stated in a script, so it cannot be found by name: pass it, Front.load(path, problem=problem)"
             )
+        if not (self.trusted or is_catalogued(self.address)):
+            raise ValueError(
+                f"the file says that its problem '{self.name}' is made by the code at {self.address!r}, which is not run unasked: "
+                "give problem=, or trust=True (--problem or --trust)"
+            )
         try:
             problem = problems.load(self.address, **self.data)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ValueError(
                 f"problem '{self.name}' does not load from '{self.address}' ({error}): pass it, Front.load(path, problem=problem)"
             ) from error
-        return self.check(problem, "the front")
+        self.check(problem, "the front")
+        return problem
 
 
 STATS: dict[str, Any] = {
@@ -145,3 +158,62 @@ def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "reproducible": all(stats["reproducible"] for stats in several),
         "versions": {package: ", ".join(numbers) for package, numbers in found.items()},
     }
+
+
+# As attributes of a file
+
+
+def stats_attributes(stats: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of `STATS` that are numbers, each as an attribute; versions, and the others together, as JSON."""
+    found = {key: _number(value) for key, value in stats.items() if key in STATS}
+    numbers = {key: value for key, value in found.items() if value is not None}
+    rest = {key: value for key, value in stats.items() if key not in numbers and key != "versions"}
+    return {**numbers, "versions": document(stats["versions"]), "stats": document(rest)}
+
+
+def _number(value: Any) -> float | int | list[int] | None:
+    """A number, or at least two whole ones, as an attribute of netCDF; None for anything else."""
+    if isinstance(value, float | np.floating):
+        return float(value)
+    several = value if isinstance(value, list) and len(value) > 1 else [value]
+    whole = [int(entry) for entry in several if isinstance(entry, int | np.integer | np.bool_) and abs(int(entry)) < 2**63]
+    if len(whole) < len(several):
+        return None
+    return whole if several is value else whole[0]
+
+
+def source_attributes(source: Source | None) -> dict[str, str]:
+    """A source, without its address if the data that it takes cannot be written down: then the problem has to be passed again."""
+    if source is None:
+        return {"problem": "", "fingerprint": "", "address": "", "data": "{}"}
+    try:
+        address, data = source.address, document(dict(source.data), strict=True)
+    except TypeError:
+        address, data = "", "{}"
+    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data}
+
+
+def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """`stats` from its attributes. Raises ValueError for what it cannot be."""
+    stats = read_document(attrs, "stats") | {"versions": read_document(attrs, "versions")}
+    for name, usual in STATS.items():
+        if name in attrs:
+            stats[name] = bool(attrs[name]) if isinstance(usual, bool) else attrs[name]
+        elif name not in stats:
+            raise ValueError(f"the attribute '{name}' is missing from it")
+    for name in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time", "tolerance"):
+        if not isinstance(stats[name], int | float) or not stats[name] >= 0:
+            raise ValueError(f"the attribute '{name}' is no number of at least 0")
+    counts = [*stats["failures"].values()] if isinstance(stats["failures"], dict) else [None]
+    if not all(isinstance(count, int) for count in counts) or not isinstance(stats["reproducible"], bool):
+        raise ValueError("the attribute 'stats' is not what it should be")
+    seeds = stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
+    if not all(seed is None or isinstance(seed, int) for seed in seeds):
+        raise ValueError("the attribute 'seed' is no whole number")
+    return stats
+
+
+def read_source(attrs: Mapping[str, Any]) -> Source | None:
+    """A source from its attributes; None for a black box, which has no fingerprint. Raises ValueError for what it cannot be."""
+    name, fingerprint, address = (read_attribute(attrs, key, str) for key in ("problem", "fingerprint", "address"))
+    return Source(name, fingerprint, address, read_document(attrs, "data")) if fingerprint else None

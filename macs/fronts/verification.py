@@ -1,8 +1,9 @@
-"""Is a front what it says? Three questions to every point, none of which trusts the search that found it.
+"""Checks of a front, point by point, by three questions, none of which trusts the search that found it.
 
 1. Are the trajectories that are stored those of the decision vectors that are stored?
 2. Does the transcription, evaluated anew, give the objectives that are stored, and a feasible point?
-3. Flown by an independent integrator, do the controls lead where the transcription says, to a feasible flight and to its objectives?
+3. Simulated by an independent integrator, do the controls lead where the transcription says, to a feasible trajectory and to its
+   objectives?
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ EQUAL = 1e-9
 
 @dataclass(frozen=True)
 class Check:
-    """What one point answered.
+    """Result for one point.
 
     Attributes
     ----------
@@ -41,11 +42,10 @@ class Check:
         Largest difference between stored and recomputed objectives, relative to the larger of 1 and the objective.
     defect : float
         Largest defect of the independent integration.
-    flown : float
-        Largest violation of the flown trajectory.
+    simulated : float
+        Largest violation of the simulated trajectory.
     missed : float
-        Largest difference between the objectives that are stored and those that are flown, integrals and peaks included, in
-        `objective_scales`.
+        Largest difference between the stored and the simulated objectives, integrals and peaks included, in `objective_scales`.
     reasons : tuple of str
         Why the point fails; empty if it does not.
     """
@@ -55,7 +55,7 @@ class Check:
     violation: float
     objectives: float
     defect: float
-    flown: float
+    simulated: float
     missed: float
     reasons: tuple[str, ...]
 
@@ -81,7 +81,7 @@ def verify(
     front : Points
         Of a problem that is known or can be loaded.
     tolerance : float
-        Largest defect, violation and miss of a flown trajectory that pass. The transcription's own violation is held against the front's
+        Largest defect, violation and miss of a simulated trajectory that pass. The transcription's own violation is compared to the front's
         tolerance.
     rtol, atol, method
         Of the integrator; see `Point.simulate`.
@@ -120,20 +120,20 @@ def verify(
     def check(index: int, point: Point, nlp: NLP) -> Check:
         mismatch, where = _mismatch(point, nlp)
         objectives, violation, worst = _recomputed(point, nlp)
-        defect, flown, most, miss = _flown(point, problem, scales, rtol, atol, method)
+        defect, simulated, most, miss = _simulated(point, problem, scales, rtol, atol, method)
         failures = (
             (not mismatch <= EQUAL, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
             (not objectives <= EQUAL, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
             (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, recomputed {violation:.1e}"),
             (point.status != CONVERGED, f"its status is '{point.status}'"),
             (not violation <= limit, f"violates '{worst}' by {violation:.1e} (tolerance {limit:.0e})"),
-            (not defect <= tolerance, f"flown, it ends {defect:.1e} away (tolerance {tolerance:.1e})"),
-            (not flown <= tolerance, f"flown, it violates '{most}' by {flown:.1e} (tolerance {tolerance:.1e})"),
-            (not miss <= tolerance, f"flown, its objectives differ by {miss:.1e} (tolerance {tolerance:.1e})"),
+            (not defect <= tolerance, f"simulated, it ends {defect:.1e} away (tolerance {tolerance:.1e})"),
+            (not simulated <= tolerance, f"simulated, it violates '{most}' by {simulated:.1e} (tolerance {tolerance:.1e})"),
+            (not miss <= tolerance, f"simulated, its objectives differ by {miss:.1e} (tolerance {tolerance:.1e})"),
         )
-        return Check(index, mismatch, violation, objectives, defect, flown, miss, tuple(reason for wrong, reason in failures if wrong))
+        return Check(index, mismatch, violation, objectives, defect, simulated, miss, tuple(reason for wrong, reason in failures if wrong))
 
-    # All of them first: what is wrong with the front as such is said before any flight.
+    # All of them first: what is wrong with the front as such is reported before any simulation.
     programs = [nlp_of(point) for point in front]
     return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
 
@@ -146,9 +146,9 @@ def objective_scales(front: Points) -> np.ndarray:
     return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
 
 
-def missed(flight: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
-    """The largest difference between a point's objectives, by name, and those of its flight, divided by `scales` (m,)."""
-    difference = np.abs([flight.objectives[name] - value for name, value in objectives.items()])
+def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives, by name, and those of its simulation, divided by `scales` (m,)."""
+    difference = np.abs([simulation.objectives[name] - value for name, value in objectives.items()])
     return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
 
 
@@ -206,12 +206,12 @@ def _recomputed(point: Point, nlp: NLP) -> tuple[float, float, str]:
     return float(np.where(np.isnan(off), np.inf, off).max()), float(violation[0]), max(violations, key=lambda key: violations[key])
 
 
-def _flown(
+def _simulated(
     point: Point, problem: CompiledProblem, scales: np.ndarray, rtol: float, atol: float, method: str
 ) -> tuple[float, float, str, float]:
-    """Largest defect and violation of the flown controls, the constraint that is violated most, and the objectives' largest miss."""
+    """Largest defect and violation of the simulated controls, the constraint that is violated most, and the objectives' largest miss."""
     if point.trajectory is None:
         return np.inf, np.inf, "everything", np.inf
-    flight = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
-    worst = max(flight.violations, key=lambda key: flight.violations[key], default="")
-    return flight.max_defect, flight.violation, worst, missed(flight, point.objectives, scales)
+    found = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
+    worst = max(found.violations, key=lambda key: found.violations[key], default="")
+    return found.max_defect, found.violation, worst, missed(found, point.objectives, scales)

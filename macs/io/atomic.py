@@ -1,39 +1,83 @@
-"""Files that are written whole or not at all."""
+"""Ordinary files, read within bounds and written whole or not at all."""
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from os import PathLike
 from pathlib import Path
 from uuid import uuid4
 
 
+def read_whole(path: str | PathLike[str], limit: int) -> bytes:
+    """The content of an ordinary file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is a folder, device or pipe, or larger than `limit` bytes.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe would wait for its writer.
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
+            found = os.fstat(file.fileno())
+            if not stat.S_ISREG(found.st_mode):
+                raise OSError(errno.EINVAL, "it is no ordinary file")
+            if found.st_size > limit:
+                raise OSError(errno.EFBIG, f"it has {found.st_size} bytes, more than {limit}")
+            return file.read(found.st_size)
+    except ValueError as error:
+        raise OSError(errno.EINVAL, str(error)) from error  # a name with a NUL character
+
+
 def check_target(path: str | PathLike[str]) -> None:
-    """Raise, before any work, the OSError that writing `path` would end in: a missing or unwritable folder, a folder in its place."""
-    target = Path(os.path.realpath(path))
-    if target.is_symlink():
-        raise OSError(f"cannot write '{path}': its symbolic links lead in a circle")
-    if target.is_dir():
-        raise IsADirectoryError(f"cannot write '{path}': it is a folder")
-    if target.exists() and not target.is_file():
-        raise OSError(f"cannot write '{path}': it is no ordinary file")
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"cannot write '{path}': there is no folder '{target.parent}'")
-    if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise PermissionError(f"cannot write '{path}': the folder '{target.parent}' is not writable")
+    """Raise, before any work, the OSError that writing `path` would end in."""
+    _target(path)
 
 
 def write_whole(path: str | PathLike[str], content: bytes) -> None:
-    """Replace a file by `content`, or raise OSError and leave everything as it was."""
-    target = Path(path).resolve()
-    temporary = target.with_name(f".{target.name[:60]}.{uuid4().hex}.part")
+    """Replace a file by `content`, or raise OSError and leave everything as it was.
+
+    A symbolic link stays, and the file that it leads to is replaced. A file that is replaced keeps its permissions.
+    """
+    target, mode = _target(path)
+    temporary = target.with_name(f".{uuid4().hex}.part")
     try:
         with temporary.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
+        if mode is not None:
+            temporary.chmod(mode)
         temporary.replace(target)
     except OSError as error:
         raise OSError(error.errno, f"cannot write '{path}': {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _target(path: str | PathLike[str]) -> tuple[Path, int | None]:
+    """The file that writing `path` replaces, and its permissions; None if it does not exist yet."""
+    found = None
+    try:
+        target = Path(os.path.realpath(path))
+        found = target.stat()
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        # A name that is too long or has a NUL character, symbolic links in a circle, a file where a folder should be.
+        number = getattr(error, "errno", errno.EINVAL)
+        circle = "its symbolic links lead in a circle" if number == errno.ELOOP else ""
+        raise OSError(number, f"cannot write '{path}': {circle or getattr(error, 'strerror', None) or error}") from error
+    if found is not None and stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(f"cannot write '{path}': it is a folder")
+    if found is not None and not stat.S_ISREG(found.st_mode):
+        raise OSError(f"cannot write '{path}': it is no ordinary file")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"cannot write '{path}': there is no folder '{target.parent}'")
+    if found is not None and not os.access(target, os.W_OK):
+        raise PermissionError(f"cannot write '{path}': the file is write-protected")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise PermissionError(f"cannot write '{path}': the folder '{target.parent}' is not writable")
+    return target, None if found is None else stat.S_IMODE(found.st_mode)

@@ -114,15 +114,15 @@ def show(arguments: Namespace) -> int:
 def verify(arguments: Namespace) -> int:
     """Check every point of a saved front."""
     with wrong_call_on_value_error():
-        front = Front.load(arguments.front)
+        front = Front.load(arguments.front, trust=arguments.trust)
     if front.source is None:
         raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to simulate")
     if not arguments.problem and not front.source.address:
         raise WrongCall(f"problem '{front.source.name}' was stated in a script; give it: --problem file.py:function")
-    problem = load_problem(arguments.problem) if arguments.problem else load_problem(front.source.address, **front.source.data)
-    tolerance = arguments.tolerance or problem.verify_tolerance
     with wrong_call_on_value_error():
-        front = Front.load(arguments.front, problem=problem)
+        problem = load_problem(arguments.problem) if arguments.problem else front.source.load()
+        tolerance = arguments.tolerance or problem.verify_tolerance
+        front = front.replace(problem=front.source.check(problem, arguments.front))
         checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
     print(verification_table(front, checks))
     failed = [check for check in checks if not check.ok]
@@ -263,7 +263,7 @@ def _ends(phase: Any) -> str:
 
 def verification_table(front: Front, checks: Sequence[Check]) -> str:
     """A row for each point, and the reasons of those that fail."""
-    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.flown, c.missed) for c in checks]
+    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.simulated, c.missed) for c in checks]
     rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
     headers = [
         ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],

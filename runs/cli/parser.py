@@ -22,7 +22,7 @@ examples:
   macs solve goddard
   macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
   macs show front.nc --point 3 --plot flight.png
-  macs verify front.nc
+  macs verify front.nc --problem my_problem.py:build
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
   macs bench inner --quick
@@ -182,7 +182,8 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
 def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify = _add(commands, "verify", "check every point of a saved front and simulate it again; exit 1 if any fails")
     verify.add_argument("front", metavar="FRONT.nc")
-    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name its address")
+    verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
+    verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
 

@@ -30,7 +30,7 @@ def check_trusted(address: str, trust: bool, where: str) -> None:
 def load_front(path: str | PathLike[str], trust: bool) -> Front:
     """A saved front whose problem may be loaded from its address. Raises ValueError or FileNotFoundError as `Front.load`, and ValueError
     for an address that is not trusted."""
-    front = Front.load(path)
+    front = Front.load(path, trust=trust)
     if front.source is not None and front.source.address:
         check_trusted(front.source.address, trust, f"'{path}'")
     return front

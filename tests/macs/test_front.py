@@ -93,7 +93,7 @@ def test_the_error_of_an_unknown_problem_names_the_argument_to_pass():
 
 def test_a_problem_that_changed_is_not_simulated(monkeypatch):
     monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
-    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs"))
+    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", trusted=True))
     with pytest.raises(ValueError, match="belongs to problem 'two legs'"):
         front[0].simulate()
 
@@ -101,7 +101,7 @@ def test_a_problem_that_changed_is_not_simulated(monkeypatch):
 def test_the_problem_is_found_by_its_address_once(monkeypatch):
     calls = []
     monkeypatch.setattr("problems.load", lambda name, **data: calls.append((name, data)) or state_problem())
-    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", {"a": 1}))
+    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", {"a": 1}, trusted=True))
     assert front.problem is None
     assert front.compiled() is front.compiled()
     assert calls == [("two_legs", {"a": 1})]

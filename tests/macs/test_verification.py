@@ -35,9 +35,9 @@ def test_an_honest_front_verifies(front, tmp_path):
     assert verify(Front.load(tmp_path / "front.nc"), tolerance=1.0) == checks
 
 
-def test_flights_are_held_against_the_tolerance(front):
+def test_simulations_are_compared_to_the_tolerance(front):
     checks = verify(front, tolerance=1e-12)
-    assert not any(check.ok for check in checks) and all("flown, it ends" in check.reasons[0] for check in checks)
+    assert not any(check.ok for check in checks) and all("simulated, it ends" in check.reasons[0] for check in checks)
 
 
 def test_objectives_that_were_touched_up_are_found(front):
@@ -80,7 +80,7 @@ def test_what_cannot_be_verified_says_why(front):
 
 
 def test_objectives_that_only_the_mesh_believes_are_found():
-    """An integrand that oscillates faster than the quadrature sees: states are exact, so only flying the objectives tells."""
+    """An integrand that oscillates faster than the quadrature sees: states are exact, so only a simulation of the objectives tells."""
     problem = problems.Problem("ripple")
     phase = problem.phase("run", t0=0, tf=(1, 2))
     x = phase.state("x", bounds=(0, 3), initial=0)

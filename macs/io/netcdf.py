@@ -1,0 +1,275 @@
+"""Labelled arrays as a netCDF-4 file in memory, and back from a file that need not be trusted.
+
+What is written is plain: arrays are stored in full, one after the other, without filters, and each has a name and a unit. Only such files
+are read: no links but hard ones, nothing stored elsewhere, nothing that is smaller in the file than in memory. So reading takes no more
+memory and time than the size of the file allows, whatever shapes the file claims.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+NUMBERS = ("float64", "int8", "int32", "int64")
+"""Types of the numbers that are read."""
+DEPTH = 3
+"""Most levels of groups, the root included."""
+OVERHEAD = 64
+"""Bytes that an array or a group takes in a file at the least, beside its values."""
+REFERENCE = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
+"""How an array refers to a text: its length in bytes, the address of a collection of texts, and its index there."""
+COLLECTION = b"GCOL\1\0\0\0"
+"""How HDF5 begins a collection of texts."""
+HEAD = 16
+"""Bytes before the objects of a collection, and before the content of each of them."""
+DIMENSION_ONLY = b"This is a netCDF dimension but not a netCDF variable"
+"""What netCDF-4 calls a dimension without labels."""
+
+
+class Labels(NamedTuple):
+    """What an array is: the names of its dimensions, and a name and a unit for its reader."""
+
+    dimensions: tuple[str, ...]
+    long_name: str
+    units: str = "1"
+
+
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """Arrays with named dimensions, as a group of a netCDF file has them: what files need of an xarray.Dataset, which takes a second or two
+    to import.
+
+    Attributes
+    ----------
+    arrays : name -> array
+        Of numbers, or of str as objects. Labels of a dimension are the array of its name.
+    labels : name -> Labels
+        Of each array.
+    attrs : mapping
+        Texts, numbers and arrays of numbers.
+
+    Raises
+    ------
+    ValueError
+        If two arrays do not agree on the length of a dimension.
+    """
+
+    arrays: Mapping[str, np.ndarray]
+    labels: Mapping[str, Labels]
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths: dict[str, int] = {}
+        for name, values in self.arrays.items():
+            dimensions = self.labels[name].dimensions
+            if values.ndim != len(dimensions):
+                raise ValueError(f"'{name}' has {values.ndim} dimensions, not {len(dimensions)} ({', '.join(dimensions)})")
+            for dimension, length in zip(dimensions, values.shape, strict=True):
+                if lengths.setdefault(dimension, length) != length:
+                    raise ValueError(f"'{name}' has {length} entries along '{dimension}', others have {lengths[dimension]}")
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Lengths of the dimensions."""
+        return {
+            dimension: length
+            for name, values in self.arrays.items()
+            for dimension, length in zip(self.labels[name].dimensions, values.shape, strict=True)
+        }
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.arrays[name]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same as a Dataset of xarray."""
+        import xarray
+
+        variables = {
+            name: (list(labels.dimensions), self.arrays[name], {"long_name": labels.long_name, "units": labels.units})
+            for name, labels in self.labels.items()
+        }
+        return xarray.Dataset(variables, attrs=self.attrs)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Content of a group of a file: its arrays, attributes and groups by name."""
+
+    arrays: dict[str, np.ndarray]
+    attrs: dict[str, Any]
+    groups: dict[str, Group]
+
+
+def to_bytes(groups: Mapping[str, Labelled]) -> bytes:
+    """The content of a file with these groups, by their paths; "" is the root."""
+    import h5netcdf
+    import h5py
+
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
+        for path, data in groups.items():
+            group = file.create_group(path) if path else file
+            group.dimensions = data.sizes
+            for name, labels in data.labels.items():
+                values = data[name]
+                dtype = h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
+                variable = group.create_variable(name, labels.dimensions, dtype=dtype, data=values)
+                variable.attrs["long_name"], variable.attrs["units"] = labels.long_name, labels.units
+            for key, value in data.attrs.items():
+                group.attrs[key] = _fixed(value) if isinstance(value, str) else value
+    return buffer.getvalue()
+
+
+def _fixed(text: str) -> np.ndarray:
+    """A text as an attribute that has its length in its type."""
+    import h5py
+
+    content = text.encode() or b"\0"
+    return np.array(content, dtype=h5py.string_dtype("utf-8", len(content)))
+
+
+def from_bytes(content: bytes, older: bool = False) -> Group:
+    """The root of a file with all that is in it.
+
+    Parameters
+    ----------
+    content : bytes
+    older : bool
+        Whether attributes may be texts of variable length. `to_bytes` does not write them, as HDF5 allocates any length that they claim.
+
+    Raises
+    ------
+    ValueError
+        If it has what `to_bytes` does not write: links to other places, compressed or incomplete arrays, types other than `NUMBERS` and
+        texts, more values than bytes.
+    Exception
+        Of any class, from HDF5, if it is none of its files.
+    """
+    import h5py
+
+    reader = _Reader(content, older)
+    with h5py.File(io.BytesIO(content), "r") as file:
+        return reader.group(file)
+
+
+class _Reader:
+    """Reads the content of a file, and no more values than would fit into it."""
+
+    def __init__(self, content: bytes, older: bool):
+        self._content, self._left = content, len(content)
+        self._older = older
+        self._texts = _find_texts(content)
+
+    def group(self, group: Any, level: int = 1) -> Group:
+        """A group with all that is in it."""
+        import h5py
+
+        if level > DEPTH:
+            raise ValueError(f"it has groups at more than {DEPTH} levels")
+        found = Group({}, {name: self._attribute(name, group.attrs) for name in group.attrs}, {})
+        for name in group:
+            self._take(OVERHEAD, name)
+            if group.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
+                raise ValueError(f"'{name}' is a link to another place")
+            item = group[name]
+            if isinstance(item, h5py.Group):
+                found.groups[name] = self.group(item, level + 1)
+            elif not isinstance(item, h5py.Dataset):
+                raise ValueError(f"'{name}' is no array")
+            elif not (h5py.h5ds.is_scale(item.id) and h5py.h5ds.get_scale_name(item.id).startswith(DIMENSION_ONLY)):
+                found.arrays[name] = self._array(name, item)
+        return found
+
+    def _take(self, count: int, name: str) -> None:
+        self._left -= count
+        if self._left < 0:
+            raise ValueError(f"'{name}' has more content than the file has bytes")
+
+    def _array(self, name: str, data: Any) -> np.ndarray:
+        import h5py
+
+        text = _is_text(data.dtype)
+        if not text and data.dtype.name not in NUMBERS:
+            raise ValueError(f"'{name}' is of type {data.dtype}, neither a number of 64 bits nor a text")
+        plan, count, stored = data.id.get_create_plist(), math.prod(data.shape), data.id.get_storage_size()
+        # netCDF gives dimensions without entries an unlimited length, for which HDF5 needs chunks.
+        plain = plan.get_layout() == (h5py.h5d.CONTIGUOUS if count else h5py.h5d.CHUNKED)
+        if not plain or plan.get_nfilters() or plan.get_external_count():
+            raise ValueError(f"'{name}' is not stored in this file as it is, but compressed, in pieces or elsewhere")
+        if max(data.shape, default=0) > len(self._content) or stored != count * (REFERENCE.itemsize if text else data.dtype.itemsize):
+            raise ValueError(f"'{name}' has a shape of {data.shape}, but {stored} bytes are stored")
+        self._take(stored, name)
+        if not text:
+            return np.asarray(data[...])
+        if data.ndim != 1:
+            raise ValueError(f"'{name}' has {data.ndim} dimensions, texts have 1")
+        references = np.frombuffer(self._content, REFERENCE, count, data.id.get_offset()) if count else np.empty(0, REFERENCE)
+        return words([self._text(name, *reference) for reference in references.tolist()])
+
+    def _text(self, name: str, length: int, address: int, index: int) -> str:
+        """The text that a reference is to, as HDF5 would read it; but HDF5 allocates any length that a reference claims."""
+        start, size = self._texts.get((address, index), (0, 0))
+        if length > size:
+            raise ValueError(f"'{name}' refers to a text that is not there")
+        self._take(length, name)
+        return self._content[start : start + length].decode()
+
+    def _attribute(self, name: str, attributes: Any) -> Any:
+        """A text, a number or a list of numbers; None for anything else, such as what netCDF and HDF5 note for themselves."""
+        found = attributes.get_id(name)
+        fixed = found.dtype.kind == "S" and not found.shape
+        number = found.dtype.name in NUMBERS and len(found.shape) < 2
+        self._take(math.prod(found.shape) * found.dtype.itemsize, name)
+        if fixed:
+            return attributes[name].decode()
+        if number:
+            return attributes[name].item() if math.prod(found.shape) == 1 else attributes[name].tolist()
+        if self._older and _is_text(found.dtype) and not found.shape:
+            return str(attributes[name])
+        return None
+
+
+def _find_texts(content: bytes) -> dict[tuple[int, int], tuple[int, int]]:
+    """Where the texts of a file begin, and their lengths in bytes, by the address of their collection and their index in it.
+
+    Raises ValueError if an object of a collection has no length or ends beyond it; in such, HDF5 could go in a circle.
+    """
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    address, left = content.find(COLLECTION), len(content) // HEAD
+    while address >= 0:
+        end = address + int.from_bytes(content[address + 8 : address + 16], "little")
+        place = address + HEAD
+        while place + HEAD <= end:
+            index, length = int.from_bytes(content[place : place + 2], "little"), int.from_bytes(content[place + 8 : place + 16], "little")
+            # Object 0 is the space that is free, its own head included; objects take whole multiples of 8 bytes.
+            step = length if index == 0 else HEAD + (length + 7) // 8 * 8
+            left -= 1
+            if step < HEAD or place + step > min(end, len(content)) or left < 0:
+                raise ValueError("its texts are damaged")
+            found[address, index] = place + HEAD, length
+            place += step
+        address = content.find(COLLECTION, address + 1)
+    return found
+
+
+def words(texts: Any) -> np.ndarray:
+    """An array of str as objects, each as long as it is."""
+    array = np.empty(len(texts), dtype=object)
+    array[:] = [str(text) for text in texts]
+    return array
+
+
+def _is_text(dtype: np.dtype) -> bool:
+    """Whether this is a type of texts of variable length."""
+    import h5py
+
+    info = h5py.check_string_dtype(dtype)
+    return info is not None and info.length is None

@@ -1,0 +1,730 @@
+from __future__ import annotations
+
+import errno
+import gzip
+import io
+import json
+import os
+import pickle
+from pathlib import Path
+
+import h5netcdf
+import h5py
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from synthetic_fronts import black_box, compiled, empty, flights, state_problem
+
+import problems
+from macs import MACS
+from macs.front import Front
+from macs.fronts import files
+from macs.fronts.dataset import ARRAYS, VERSION, _arrays, group_names
+from macs.fronts.labelled import legal_names
+from macs.fronts.points import Point
+from macs.fronts.provenance import Source
+from macs.io.seal import sealed, unsealed
+from problems.compiled import Variable
+from transcription import DFET
+
+
+def same(a, b) -> bool:
+    """Bit for bit."""
+    a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
+    return a.shape == b.shape and a.dtype.kind == b.dtype.kind and (a.dtype.kind == "U" or a.tobytes() == b.tobytes())
+
+
+def assert_same(one: Front, two: Front) -> None:
+    for name in ("F", "objectives", "violation", "decision"):
+        assert same(getattr(one, name), getattr(two, name)), name
+    assert one.status.tolist() == two.status.tolist()
+    for name in ("goals", "variables", "transcriptions", "solver", "message", "stats", "source"):
+        assert getattr(one, name) == getattr(two, name), name
+    for a, b in zip(one, two, strict=True):
+        assert same(a.decision, b.decision) and a.variables == b.variables and a.note == b.note
+        assert repr((a.violations, a.excursions, a.optimality, a.parameters)) == repr(
+            (b.violations, b.excursions, b.optimality, b.parameters)
+        )
+        assert_same_flight(a.trajectory, b.trajectory)
+    assert (one._closest is None) == (two._closest is None)
+    if one._closest is not None:
+        assert_same(one.closest.alone(), two.closest.alone())
+
+
+def assert_same_flight(a, b) -> None:
+    assert (a is None) == (b is None)
+    if a is None:
+        return
+    assert list(a) == list(b) and dict(a.parameters) == dict(b.parameters)
+    for name in a:
+        p, q = a[name], b[name]
+        assert all(same(_arrays(p)[array], _arrays(q)[array]) for array in ARRAYS)
+        assert (p.time_unit, p.state.basis, p.control.basis) == (q.time_unit, q.state.basis, q.control.basis)
+        assert (p.state_variables, p.control_variables, p.path_limits) == (q.state_variables, q.control_variables, q.path_limits)
+
+
+def mixed() -> Front:
+    """Points of different meshes, whose variables share some names and follow each other in different orders."""
+    names = (["a"], ["b", "a", "c", "d"], [], ["c", "b", "a"])
+    return flights(
+        4,
+        elements=[2, 5, 1, 3],
+        decision=[np.arange(len(own), dtype=float) + 10 * i for i, own in enumerate(names)],
+        variables=[[Variable(name, -1.0, 1.0, "km", 2.0) for name in own] for own in names],
+        transcriptions=[{"method": "DFET", "settings": {"elements": k}} for k in (2, 5, 2, 3)],
+        notes=["", "not as exact as it should be: 3e-5", None, ""],
+    )
+
+
+FRONTS = {
+    "flights": flights,
+    "one point": lambda: flights(1),
+    "meshes of different sizes": lambda: mixed(),
+    "empty": empty,
+    "empty, nothing evaluated": lambda: empty(closest=None),
+    "a failed point": lambda: flights(
+        2,
+        F=[[1.0, 2.0], [np.nan, np.nan]],
+        trajectories=[flights(1)[0].trajectory, None],
+        violation=[0, np.inf],
+        status=["converged", "failed"],
+        violations=[{"a": np.nan, "b": 1.0}, None],
+        excursions=[{}, None],
+        optimality=[1e-12, None],
+        sort=False,
+    ),
+    "payoff": lambda: flights(3, F=[[3.0, 1.0], [1.0, 3.0], [2.0, 2.0]], sort=False),
+    "black box": black_box,
+    "empty black box": lambda: black_box(0),
+    "three objectives": lambda: black_box(5, 3),
+    "merged": lambda: Front.merge([flights(3, 1), flights(4, 2)]),
+}
+
+
+@pytest.mark.parametrize("name", FRONTS)
+def test_everything_comes_back_bit_for_bit(tmp_path, name):
+    front = FRONTS[name]()
+    front.save(tmp_path / "front.nc")
+    assert_same(front, Front.load(tmp_path / "front.nc"))
+    assert [p.name for p in tmp_path.iterdir()] == ["front.nc"]
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    decision=arrays(float, (3, 3), elements=st.floats(width=64)),
+    message=st.text(st.characters(blacklist_categories=("Cs",), blacklist_characters="\0"), max_size=30),
+    violation=st.floats(),
+)
+def test_any_numbers_come_back(decision, message, violation):
+    front = black_box(3, decision=decision, message=message, violations=[{"row": violation}] * 3)
+    assert_same(front, files.from_bytes(files.to_bytes(front)))
+
+
+def test_trajectories_interpolate_as_before(tmp_path):
+    front = flights(3, elements=[2, 3, 4])
+    front.save(tmp_path / "front.nc")
+    for before, after in zip(front, Front.load(tmp_path / "front.nc"), strict=True):
+        times = np.linspace(before.trajectory["coast"].t0, before.trajectory["coast"].tf, 50)
+        assert same(before.trajectory["coast"].at(times)["h"], after.trajectory["coast"].at(times)["h"])
+
+
+def test_the_file_is_self_describing(tmp_path):
+    flights(3).save(tmp_path / "front.nc")
+    root = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf")
+    assert root["objectives"].dims == ("point", "objective") and root["objective"].values.tolist() == ["time", "height"]
+    assert root["objective_unit"].values.tolist() == ["s", "km"]
+    assert root["decision"].dims == ("point", "variable") and root["parameters"].dims == ("point", "parameter")
+    assert root.attrs["problem"] == "two legs" and root.attrs["fingerprint"] == compiled().fingerprint
+    assert json.loads(str(root["transcription"].values[0]))["method"] == "DFET"
+    assert (root.attrs["seed"], root.attrs["evaluations"], root.attrs["wall_time"], root.attrs["reproducible"]) == (7, 1000, 1.25, 1)
+    assert json.loads(root.attrs["versions"])["numpy"] == np.__version__
+    climb = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group="climb")
+    assert climb["h"].dims == climb["u"].dims == climb["load"].dims == ("point", "node") and climb["h"].shape == climb["time"].shape
+    assert {name: climb[name].attrs["units"] for name in ("time", "h", "v", "u")} == {"time": "s", "h": "km", "v": "km/s", "u": "km/s²"}
+    assert climb["state_coefficients"].sel(state="v").dims == ("point", "element", "state_function")
+
+
+@pytest.mark.parametrize("name", FRONTS)
+def test_every_array_has_a_name_and_a_unit_and_is_that_of_to_xarray(tmp_path, name):
+    front = FRONTS[name]()
+    front.save(tmp_path / "front.nc")
+    for phase in (None, *(("climb", "coast") if any(point.trajectory for point in front) else ())):
+        data = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group=phase)
+        assert data.equals(front.to_xarray(phase)) and set(data.variables) == set(front.to_xarray(phase).variables)
+        assert all(data[array].attrs["long_name"] and data[array].attrs["units"] for array in data.variables)
+
+
+def test_seeds_of_merged_fronts_are_numbers_too(tmp_path):
+    front = Front.merge([flights(3, 1), flights(4, 2, stats={"seed": 9})])
+    front.save(tmp_path / "front.nc")
+    assert xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf").attrs["seed"].tolist() == [7, 9]
+
+
+@pytest.mark.parametrize("seed", [None, 0, 2**63 - 1, 2**80, [7, None], [1, 2**70], [3, 4]])
+def test_any_seed_comes_back(seed):
+    back = files.from_bytes(files.to_bytes(black_box(stats={"seed": seed}))).stats["seed"]
+    assert back == seed and type(back) is type(seed)
+
+
+def test_names_that_netcdf_does_not_allow_are_changed():
+    names = legal_names(["h", "a/b", "time", "_x", "3", "", "a b", "é", "e\u0301", "x\0", "."], "state", {"time"})
+    assert list(names.values()) == ["h", "a_b", "state_time", "state__x", "state_3", "state_", "state_a_b", "é", "state_é", "x_", "state_."]
+    assert group_names(["ascent", "status", "_closest"]) == {"ascent": "ascent", "status": "phase_status", "_closest": "phase__closest"}
+
+
+def test_states_may_have_any_name(tmp_path):
+    names = ["element", "node", "a/b", "height [km]", "state_element", "_FillValue"]
+    problem = problems.Problem("names")
+    phase = problem.phase("a/b", t0=0, tf=(1, 2))
+    for i, name in enumerate(names):
+        phase.state(name, bounds=(-9, 9), initial=i, unit="km")
+    phase.control("state", bounds=(0, 1))
+    phase.dynamics(**dict.fromkeys(names, 1))
+    problem.minimize("time", phase.tf)
+    problem.maximize("end", phase.final(phase["node"]))
+    front = MACS().solve(problem, DFET(2, 1), evaluations=30, seed=1)
+    front.save(tmp_path / "front.nc")
+    assert_same(front, Front.load(tmp_path / "front.nc"))
+    data = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group="a_b")
+    found = {data[array].attrs["long_name"]: data[array].values for array in data.data_vars if data[array].attrs["units"] == "km"}
+    assert list(found) == names and all(same(found[name][0], front[0].trajectory["a/b"][name]) for name in names)
+
+
+def test_data_that_cannot_be_written_down_has_to_be_passed_again(tmp_path):
+    front = flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"table": np.arange(3.0)}))
+    front.save(tmp_path / "a.nc")
+    assert Front.load(tmp_path / "a.nc").source.data == {"table": [0, 1, 2]}
+    flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"f": print})).save(tmp_path / "a.nc")
+    assert Front.load(tmp_path / "a.nc").source.address == ""
+
+
+def test_large_data_fits(tmp_path):
+    flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"table": list(range(50_000))})).save(tmp_path / "a.nc")
+    assert len(Front.load(tmp_path / "a.nc").source.data["table"]) == 50_000
+
+
+# Writing
+
+
+def test_saving_replaces_a_front_while_another_is_read_from_it(tmp_path):
+    path = tmp_path / "front.nc"
+    flights(2).save(path)
+    front = Front.load(path)
+    flights(3).save(path)
+    assert len(front) == 2 and len(Front.load(path)) == 3
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"cannot write '.*front\.nc': there is no folder '.*nowhere'"):
+        flights(1).save(tmp_path / "nowhere" / "front.nc")
+    with pytest.raises(IsADirectoryError, match="it is a folder"):
+        flights(1).save(tmp_path)
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        flights(1).to_csv(tmp_path / "nowhere" / "front.csv")
+
+
+def test_a_folder_that_may_not_be_written_to_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(PermissionError, match="not writable"):
+        flights(1).save(tmp_path / "front.nc")
+
+
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
+    path = tmp_path / "front.nc"
+    flights(1).save(path)
+    path.chmod(0o640)
+    flights(2).save(path)
+    assert path.stat().st_mode & 0o777 == 0o640 and len(Front.load(path)) == 2
+
+
+def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path):
+    (tmp_path / "real").mkdir()
+    link = tmp_path / "front.nc"
+    link.symlink_to(tmp_path / "real" / "front.nc")
+    for n in (1, 2):
+        flights(n).save(link)
+        assert link.is_symlink() and len(Front.load(tmp_path / "real" / "front.nc")) == n
+    assert [path.name for path in (tmp_path / "real").iterdir()] == ["front.nc"]
+
+
+def test_a_name_that_cannot_be_written_is_found_before_any_work(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "to_bytes", lambda _: pytest.fail("the front was converted"))
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    (tmp_path / "file").write_text("")
+    cases = {
+        "x" * 300: "File name too long",
+        "a\0b": "embedded null byte",
+        "circle": "its symbolic links lead in a circle",
+        "file/front.nc": "Not a directory",
+        "pipe": "no ordinary file",
+        "": "it is a folder",
+    }
+    for name, why in cases.items():
+        with pytest.raises(OSError, match=f"(?s)cannot write '.*{why}"):
+            flights(1).save(f"{tmp_path}/{name}")
+    real = os.access
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path).name != "file" and real(path, mode))
+    with pytest.raises(PermissionError, match="the file is write-protected"):
+        flights(1).save(tmp_path / "file")
+
+
+def test_a_long_name_of_many_bytes_is_written(tmp_path):
+    flights(1).save(tmp_path / ("ü" * 120 + ".nc"))
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("step", ["write", "fsync", "replace"])
+def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, step):
+    path = tmp_path / "front.nc"
+    flights(2).save(path)
+    before = path.read_bytes()
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    if step == "write":
+        monkeypatch.setattr("os.fsync", full)
+        monkeypatch.setattr("pathlib.Path.open", _full_file)
+    else:
+        monkeypatch.setattr("os.fsync" if step == "fsync" else "pathlib.Path.replace", full)
+    with pytest.raises(OSError, match=r"cannot write '.*front\.nc': No space left on device") as caught:
+        flights(3).save(path)
+    assert caught.value.errno == errno.ENOSPC
+    monkeypatch.undo()
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["front.nc"]
+
+
+OPEN = Path.open
+
+
+class _FullFile:
+    def __init__(self, file):
+        self.file = file
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.file.close()
+
+    def write(self, content):
+        self.file.write(content[: len(content) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def _full_file(path, mode):
+    return _FullFile(OPEN(path, mode))
+
+
+# Reading
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"there is no file '.*nothing\.nc'"):
+        Front.load(tmp_path / "nothing.nc")
+
+
+def test_what_is_no_ordinary_file_is_not_a_front(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(2**40)
+    paths = {
+        tmp_path: "Is a directory",
+        tmp_path / "pipe": "no ordinary file",
+        "/dev/zero": "no ordinary file",
+        tmp_path / "circle": "Too many levels of symbolic links",
+        tmp_path / "large": "it has 1099511627776 bytes, more than",
+        tmp_path / ("x" * 300): "File name too long",
+        "a\0b": "embedded null byte",
+    }
+    for path, why in paths.items():
+        with pytest.raises(ValueError, match=rf"cannot be read: .*{why}"):
+            Front.load(path)
+
+
+def test_a_file_that_may_not_be_read_is_named(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    flights(1).save(tmp_path / "front.nc")
+    monkeypatch.setattr("os.open", refuse)
+    with pytest.raises(ValueError, match=r"front\.nc cannot be read: Permission denied"):
+        Front.load(tmp_path / "front.nc")
+
+
+def test_a_file_cut_anywhere_is_refused(tmp_path):
+    whole = files.to_bytes(flights(3))
+    path = tmp_path / "front.nc"
+    for length in sorted(
+        {0, 1, 4, 8, 9, 47, 48, 95, 96, 200, 511, 512, *range(1000, len(whole), len(whole) // 25), len(whole) - 8, len(whole) - 1}
+    ):
+        path.write_bytes(whole[:length])
+        with pytest.raises(
+            ValueError, match=r"front\.nc does not hold a front that can be read: it is (empty|not a netCDF-4 file|cut short)"
+        ):
+            Front.load(path)
+
+
+def damaged(whole: bytes, rng: np.random.Generator) -> bytes:
+    """A file's content with some of it changed, lost, repeated, swapped or added."""
+    content, n = bytearray(whole), len(whole)
+    start, length = int(rng.integers(n)), int(rng.integers(1, min(n, 5000)))
+    match int(rng.integers(6)):
+        case 0:
+            content[start] ^= int(rng.integers(1, 256))
+        case 1:
+            del content[start:]
+        case 2:
+            content[start : start + length] = bytes(len(content[start : start + length]))
+        case 3:
+            content[start:start] = content[start : start + length]
+        case 4:
+            other = int(rng.integers(n))
+            (first, second), length = sorted((start, other)), min(length, abs(start - other), n - max(start, other))
+            content[first : first + length], content[second : second + length] = (
+                content[second : second + length],
+                content[first : first + length],
+            )
+        case 5:
+            content += rng.bytes(length)
+    return bytes(content)
+
+
+def test_damage_is_refused_in_one_line(tmp_path):
+    rng = np.random.default_rng(1)
+    wholes = [files.to_bytes(front) for front in (flights(2), black_box(4), empty())]
+    path = tmp_path / "front.nc"
+    for i in range(200):
+        content = damaged(wholes[i % 3], rng)
+        path.write_bytes(content)
+        if content == wholes[i % 3]:
+            Front.load(path)
+            continue
+        with pytest.raises(ValueError, match="does not hold a front that can be read") as caught:
+            Front.load(path)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_older_formats_are_read_with_a_warning(tmp_path, version):
+    path = tmp_path / "front.nc"
+    path.write_bytes(gzip.decompress((Path(__file__).parent / "files" / f"format{version}.nc.gz").read_bytes()))
+    with pytest.warns(UserWarning, match=rf"front\.nc was written by an earlier MACS \(format {version}\) and has no checksum") as caught:
+        old = Front.load(path)
+    assert [Path(one.filename).name for one in caught] == ["test_files.py"]
+    new = flights(2, elements=[1, 2])
+    assert_same(old, new.replace(stats=new.stats | {"versions": old.stats["versions"]}))
+    old.save(path)
+    assert_same(Front.load(path), old)
+
+
+def test_an_older_format_is_not_believed_with_a_checksum_nor_this_one_without(tmp_path):
+    old = gzip.decompress((Path(__file__).parent / "files" / "format2.nc.gz").read_bytes())
+    for content, why in ((sealed(old), "a netCDF file of something else"), (unsealed(files.to_bytes(flights(1))), "it has no checksum")):
+        (tmp_path / "front.nc").write_bytes(content)
+        with pytest.raises(ValueError, match=why):
+            Front.load(tmp_path / "front.nc")
+
+
+def test_each_point_is_asked_once_for_its_parameters(monkeypatch):
+    """Otherwise, the time to save a front grows with the square of their number."""
+    asked = []
+    parameters = Point.parameters.fget
+    monkeypatch.setattr(Point, "parameters", property(lambda point: asked.append(point.index) or parameters(point)))
+    files.to_bytes(black_box(4))
+    assert asked == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("content", [b"hello\n", b"\x80\x04K\x01.", pickle.dumps({"F": 1}), b"CDF\x01\0\0\0\0", b"PK\3\4"])
+def test_files_of_other_kinds_are_refused(tmp_path, content):
+    (tmp_path / "front.nc").write_bytes(content)
+    with pytest.raises(ValueError, match="it is not a netCDF-4 file"):
+        Front.load(tmp_path / "front.nc")
+
+
+def test_foreign_netcdf_is_refused(tmp_path):
+    xarray.Dataset({"objectives": (("point",), [1.0])}).to_netcdf(tmp_path / "front.nc", engine="h5netcdf")
+    with pytest.raises(ValueError, match="a netCDF file of something else"):
+        Front.load(tmp_path / "front.nc")
+
+
+# Forged files: the checksum is right, the content is not
+
+
+def forged(front: Front, change) -> bytes:
+    """A front's file with a valid checksum, after `change` has had its h5py.File."""
+    buffer = io.BytesIO(unsealed(files.to_bytes(front)))
+    with h5py.File(buffer, "r+") as file:
+        change(file)
+    return sealed(buffer.getvalue())
+
+
+def put(name: str, value, **options):
+    """A change: another array, or another text or number as an attribute, in the place of one."""
+
+    def change(file: h5py.File) -> None:
+        place, _, last = name.rpartition("/")
+        group = file[place or "/"]
+        if last.startswith("@"):
+            fixed = h5py.string_dtype("utf-8", len(value)) if isinstance(value, str) else None
+            group.attrs.create(last[1:], value, dtype=fixed)
+            return
+        if last in group:
+            del group[last]
+        group.create_dataset(last, data=value, **options)
+
+    return change
+
+
+def edit(name: str, key, value):
+    """A change of some entries of an array."""
+
+    def change(file: h5py.File) -> None:
+        file[name][key] = value
+
+    return change
+
+
+def remove(name: str):
+    return lambda file: file.__delitem__(name)
+
+
+def link(name: str, target):
+    def change(file: h5py.File) -> None:
+        if name in file:
+            del file[name]
+        file[name] = target(file) if callable(target) else target
+
+    return change
+
+
+def claim(name: str, shape, **options):
+    """A change: an array that claims a shape, of which nothing is written."""
+
+    def change(file: h5py.File) -> None:
+        if name in file:
+            del file[name]
+        file.create_dataset(name, shape=shape, dtype=options.pop("dtype", "f8"), **options)
+
+    return change
+
+
+def virtual(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout(shape=(2,), dtype="f8")
+    layout[:] = h5py.VirtualSource("other.nc", "violation", shape=(2,))
+    del file["violation"]
+    file.create_virtual_dataset("violation", layout)
+
+
+def other_climb(file: h5py.File) -> h5py.Group:
+    with h5py.File(io.BytesIO(unsealed(files.to_bytes(flights(1))))) as other:
+        other.copy("climb", file, "/elsewhere")
+    group = file["elsewhere"]
+    del file["elsewhere"]
+    return group
+
+
+def long_texts(file: h5py.File) -> None:
+    """Many references to one long text."""
+    del file["note"]
+    texts = file.create_dataset("note", data=np.array(["x" * 100_000] + [""] * 4000, dtype=object), dtype=h5py.string_dtype())
+    file.flush()
+    content = bytearray(file.id.get_file_image())
+    offset = texts.id.get_offset()
+    content[offset : offset + 16 * 4001] = bytes(content[offset : offset + 16]) * 4001
+    raise Replaced(bytes(content))
+
+
+def claim_length(file: h5py.File) -> None:
+    """A reference to a text of 4 GB."""
+    file.flush()
+    content = bytearray(file.id.get_file_image())
+    offset = file["note"].id.get_offset()
+    content[offset : offset + 4] = b"\xff" * 4
+    raise Replaced(bytes(content))
+
+
+class Replaced(Exception):  # noqa: N818 - carries the content of the file
+    pass
+
+
+FORGERIES = {
+    "a later format": (put("@format_version", VERSION + 1), f"version {VERSION + 1}, this MACS reads up to version {VERSION}: update MACS"),
+    "no format": (put("@format_version", 0), "version 0"),
+    "an array that is not known": (put("climb/extra", [1.0]), "array 'extra', which is not known"),
+    "a group that is not known": (lambda file: file.create_group("extra"), "its groups are"),
+    "no violations": (remove("violation"), "'violation' is missing"),
+    "no phase": (remove("climb"), "its groups are"),
+    "no attribute": (lambda file: file.attrs.__delitem__("message"), "'message' is missing"),
+    "an attribute of another kind": (put("@message", 3), "'message' is of another kind"),
+    "no seed": (lambda file: file.attrs.__delitem__("seed"), "'seed' is missing"),
+    "a negative count": (put("@evaluations", -1), "'evaluations' is no number of at least 0"),
+    "no JSON": (put("@solver", "{"), "'solver' is no JSON"),
+    "JSON that never ends": (put("@solver", "[" * 100_000), "'solver' is no JSON"),
+    "JSON of another kind": (put("@solver", "[]"), "'solver' is not what it should be"),
+    "a transcription that is none": (edit("transcription", 0, "3"), "'transcription' is not what it should be"),
+    "another type": (put("violation", np.ones(2, dtype="f4")), "of type float32"),
+    "another kind": (put("violation", np.ones(2, dtype="i8")), "'violation' has whole numbers, not numbers"),
+    "another rank": (put("violation", np.ones((2, 1))), "'violation' has 2 dimensions"),
+    "texts of rank 2": (put("status", np.array([["a"], ["b"]], dtype=object), dtype=h5py.string_dtype()), "texts have 1"),
+    "another length": (put("violation", np.ones(3)), "along 'point'"),
+    "a compound": (put("violation", np.zeros(2, dtype=[("a", "f8"), ("b", "f8")])), "'violation' is of type"),
+    "a status that is none": (edit("status", 0, "perfect"), "'status' is 'perfect'"),
+    "a sense that is none": (edit("objective_sense", 0, "best"), "'objective_sense' is 'best'"),
+    "bounds that are NaN": (edit("variable_lower", 0, np.nan), r"'climb\.u\[0\]' has bounds that are no interval"),
+    "a scale that is NaN": (edit("climb/state_scale", 1, np.nan), "'v' has a scale that is not above 0"),
+    "a negative period": (edit("climb/control_period", 0, -1.0), "a period that is not above 0"),
+    "two objectives of a name": (edit("objective", 1, "time"), "two objectives have the same name"),
+    "two states of a name": (edit("climb/state", 1, "h"), "two entries of 'state'"),
+    "two constraints of a name": (edit("constraint", 1, "climb.load"), "two entries of 'constraint'"),
+    "places twice": (edit("place", (0, 1), 0), "'place' does not number"),
+    "places beyond": (edit("place", (0, 1), 2**31 - 1), "'place' does not number"),
+    "a negative number of nodes": (edit("climb/node_count", 0, -1), "'node_count' is not between"),
+    "more nodes than there are": (edit("climb/node_count", 0, 10**9), "'node_count' is not between"),
+    "no element": (edit("climb/element_count", 0, 0), "'element_count' is not between"),
+    "elements without ends": (edit("climb/element_count", 0, 1), "'edge_count' is not that of its elements"),
+    "a phase that a point lacks": (edit("climb/node_count", slice(None), 0), "in some phases only"),
+    "no count": (remove("climb/edge_count"), "'edge_count' is missing"),
+    "a basis that is none": (edit("climb/state_basis", 0, "fourier"), "there is no basis 'fourier'"),
+    "no state": (remove("climb/h"), "'h' is missing"),
+    "other points in a phase": (link("climb", other_climb), "phase 'climb' has 1 points, the front has 2"),
+    "compressed": (put("violation", np.zeros(2), compression="gzip"), "compressed, in pieces or elsewhere"),
+    "in chunks": (claim("violation", (10**9,), chunks=(10**6,)), "compressed, in pieces or elsewhere"),
+    "filled": (claim("violation", (10**9,)), "but 0 bytes are stored"),
+    "long without an entry": (claim("objectives", (10**12, 0), chunks=(1, 1), maxshape=(None, None)), "but 0 bytes are stored"),
+    "in another file": (claim("violation", (2,), external=[("/etc/hostname", 0, 16)]), "compressed, in pieces or elsewhere"),
+    "virtual": (virtual, "compressed, in pieces or elsewhere"),
+    "a soft link": (link("violation", h5py.SoftLink("/optimality")), "'violation' is a link to another place"),
+    "a link to another file": (link("violation", h5py.ExternalLink("other.nc", "/violation")), "'violation' is a link to another place"),
+    "a circle of groups": (link("_closest", lambda file: file["/"]), "groups at more than"),
+    "a text of variable length": (lambda file: file.attrs.create("message", "all is well"), "'message' is of another kind"),
+    "a text that is longer than the file": (lambda file: claim_length(file), "'note' refers to a text that is not there"),
+    "many references to one text": (long_texts, "has more content than the file has bytes"),
+    "two points closest": (lambda file: copy_root(file), "the closest point is one, not 2"),
+}
+
+
+def copy_root(file: h5py.File) -> None:
+    closest = file.create_group("_closest")
+    for name in list(file):
+        if name != "_closest":
+            file.copy(name, closest)
+    for key, value in file.attrs.items():
+        if not key.startswith("_"):
+            closest.attrs[key] = value
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_forged_files_are_refused_in_one_line(tmp_path, name):
+    change, why = FORGERIES[name]
+    try:
+        content = forged(flights(2, elements=[2, 3]), change)
+    except Replaced as replaced:
+        content = sealed(replaced.args[0])
+    (tmp_path / "front.nc").write_bytes(content)
+    with pytest.raises(ValueError, match=why) as caught:
+        Front.load(tmp_path / "front.nc")
+    assert "\n" not in str(caught.value) and "does not hold a front that can be read" in str(caught.value)
+
+
+def test_a_file_that_was_changed_by_another_program_is_refused(tmp_path):
+    flights(1).save(tmp_path / "front.nc")
+    with h5netcdf.File(tmp_path / "front.nc", "a") as file:
+        file.attrs["message"] = "all is well"
+    with pytest.raises(ValueError, match="checksum"):
+        Front.load(tmp_path / "front.nc")
+
+
+# The problem
+
+
+def test_opening_a_file_runs_no_code(tmp_path, monkeypatch):
+    monkeypatch.setattr("problems.load", lambda *_, **__: pytest.fail("the problem was loaded"))
+    flights(2, problem=Source("two legs", compiled().fingerprint, "two_legs")).save(tmp_path / "front.nc")
+    front = Front.load(tmp_path / "front.nc")
+    front.table()
+    assert front.problem is None
+
+
+def save_with(path: Path, address: str, **data) -> None:
+    flights(1, problem=Source("two legs", compiled().fingerprint, address, data)).save(path)
+
+
+def test_an_address_in_a_file_is_not_run_unasked(tmp_path, monkeypatch):
+    (tmp_path / "own.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nfrom synthetic_fronts import state_problem\n")
+    path, address = tmp_path / "front.nc", f"{tmp_path / 'own.py'}:state_problem"
+    save_with(path, address)
+    for act in (lambda front: front[0].simulate(), lambda front: front.simulate(), lambda front: front.compiled()):
+        with pytest.raises(ValueError, match=r"made by the code at '.*own\.py:state_problem', .*give problem=, or trust=True"):
+            act(Front.load(path))
+    assert not (tmp_path / "ran").exists()
+    Front.load(path, state_problem())[0].simulate()
+    assert not (tmp_path / "ran").exists()
+    monkeypatch.setattr("problems.load", lambda name: state_problem() if name == address else pytest.fail(name))
+    Front.load(path, trust=True)[0].simulate()
+
+
+def test_a_problem_of_the_catalogue_is_loaded_by_itself(tmp_path):
+    for address in ("goddard", "problems.cases.goddard:problem"):
+        save_with(tmp_path / "front.nc", address)
+        with pytest.raises(ValueError, match=r"the front belongs to problem 'two legs' \(.*\), not to 'goddard'"):
+            Front.load(tmp_path / "front.nc").compiled()
+
+
+@pytest.mark.parametrize("trust", [False, True])
+@pytest.mark.parametrize("address", ["os:system", "subprocess:getoutput", "posix:system", "os.path:os.system"])
+def test_a_forged_address_runs_nothing(tmp_path, address, trust):
+    marker = tmp_path / "marker"
+    argument = "cmd" if address == "subprocess:getoutput" else "command"
+    save_with(tmp_path / "front.nc", address, **{argument: f"touch {marker}"})
+    front = Front.load(tmp_path / "front.nc", trust=trust)
+    with pytest.raises(ValueError, match=r"does not load from|is not run unasked"):
+        front[0].simulate()
+    assert not marker.exists()
+
+
+def test_the_closest_point_has_the_problem_of_its_front(tmp_path):
+    empty().save(tmp_path / "front.nc")
+    assert Front.load(tmp_path / "front.nc", compiled()).closest.simulate().trajectory is not None
+
+
+def test_a_front_takes_its_own_problem_and_no_other(tmp_path):
+    path = tmp_path / "front.nc"
+    flights(2).save(path)
+    assert Front.load(path, problem=state_problem()).problem.name == "two legs"
+    assert Front.load(path, problem=compiled()).problem is compiled()
+    with pytest.raises(ValueError, match=r"front\.nc belongs to problem 'two legs'.*not to 'two legs'"):
+        Front.load(path, problem=state_problem(speed=4.0))
+    black_box().save(path)
+    with pytest.raises(ValueError, match="black box"):
+        Front.load(path, problem=compiled())
+
+
+# Tables of values
+
+
+def test_csv_names_units_and_keeps_every_bit(tmp_path):
+    front = flights(3)
+    front.to_csv(tmp_path / "front.csv")
+    lines = (tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "time [s],height [km],violation,status," + ",".join(f"climb.u[{i}] [km/s²]" for i in range(4))
+    cells = [line.split(",") for line in lines[1:]]
+    assert same(np.array([[float(c) for c in row[:2]] for row in cells]), front.objectives)
+    assert same(np.array([[float(c) for c in row[4:]] for row in cells]), front.decision)
+
+
+def test_a_phase_may_have_the_name_of_anything_in_the_file(tmp_path):
+    problem = problems.Problem("names")
+    phase = problem.phase("point", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(0, 3), initial=0)
+    phase.dynamics(x=phase.control("u", bounds=(0, 1)))
+    problem.minimize("time", phase.tf)
+    problem.maximize("end", phase.final(x))
+    front = MACS().solve(problem, DFET(2, 1), evaluations=30, seed=1)
+    front.save(tmp_path / "front.nc")
+    np.testing.assert_array_equal(Front.load(tmp_path / "front.nc")[0].trajectory["point"]["x"], front[0].trajectory["point"]["x"])
