@@ -63,10 +63,10 @@ def _target(path: str | PathLike[str]) -> tuple[Path, int | None]:
     try:
         target = Path(os.path.realpath(path))
         found = target.stat()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         pass
     except (OSError, ValueError) as error:
-        # A name that is too long or has a NUL character, symbolic links in a circle, a file where a folder should be.
+        # A name that is too long or has a NUL character, or symbolic links in a circle.
         number = getattr(error, "errno", errno.EINVAL)
         circle = "its symbolic links lead in a circle" if number == errno.ELOOP else ""
         raise OSError(number, f"cannot write '{path}': {circle or getattr(error, 'strerror', None) or error}") from error
