@@ -1,7 +1,7 @@
 """A front as one netCDF-4 file, whole or not at all; and as a table of comma-separated values.
 
 Root group: `dataset.root_dataset`. One group for each phase: `dataset.phase_dataset`. Group `_closest`, if there is one: the least
-infeasible point of an empty front, laid out like a root. At the end, a checksum (`io.seal`), without which nothing of the file is read.
+infeasible point of an empty front, laid out like a root. At the end, a checksum (`io.atomic`), without which nothing of the file is read.
 Nothing is pickled, and no code that a file names is run.
 
 A file is made in memory, written under a temporary name in the same folder, flushed to the disk and renamed: a full disk, a crash or a
@@ -22,9 +22,8 @@ from typing import Any
 import numpy as np
 
 from ..io import netcdf
-from ..io.atomic import check_target, read_whole, write_whole
+from ..io.atomic import check_target, read_whole, sealed, unsealed, write_whole
 from ..io.netcdf import Group, Labelled, words
-from ..io.seal import sealed, unsealed
 from .dataset import (
     CLOSEST,
     FORMAT,

@@ -25,7 +25,7 @@ from ..fronts.provenance import more_costs
 from ..fronts.verification import missed, objective_scales
 from ..io.console import working
 from ..pareto.dominance import extremes
-from .solves import GradientSolves
+from .multistart import GradientSolves
 
 OPTIMAL = 1e-6
 """A point with at most this optimality is not solved again on its first mesh."""

@@ -26,7 +26,7 @@ from macs.fronts.dataset import ARRAYS, VERSION, _arrays, group_names
 from macs.fronts.labelled import legal_names
 from macs.fronts.points import Point
 from macs.fronts.provenance import Source
-from macs.io.seal import sealed, unsealed
+from macs.io.atomic import sealed, unsealed
 from problems.compiled import Variable
 from transcription import DFET
 
