@@ -259,7 +259,7 @@ def test_a_name_that_cannot_be_written_is_found_before_any_work(tmp_path, monkey
         "x" * 300: "File name too long",
         "a\0b": "embedded null byte",
         "circle": "its symbolic links lead in a circle",
-        "file/front.nc": "Not a directory",
+        "file/front.nc": "there is no folder",
         "pipe": "no ordinary file",
         "": "it is a folder",
     }
