@@ -70,9 +70,9 @@ def load(name: str, **data: Any) -> Problem:
     place, _, function_name = address.rpartition(":")
     if not place or not function_name:
         near = difflib.get_close_matches(name, CASES, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
+        hint = f", did you mean '{near[0]}'?" if near else ";"
         known = ", ".join(CASES)
-        raise ValueError(f"there is no problem '{name}'{hint} There are {known}, or give 'file.py:function' or 'package.module:function'")
+        raise ValueError(f"there is no problem '{name}'{hint} there are {known}; or give 'file.py:function' or 'package.module:function'")
     function = _builder(_file_module(place) if place.endswith(".py") else _named_module(place, name), function_name, name)
     try:
         problem = function(**data)

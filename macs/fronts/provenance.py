@@ -39,15 +39,15 @@ class Source:
     def of(cls, problem: CompiledProblem) -> Source:
         return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True)
 
-    def check(self, problem: Problem | CompiledProblem, whose: str) -> CompiledProblem:
-        """`problem`, compiled.
+    def check(self, problem: Problem | CompiledProblem | str, whose: str) -> CompiledProblem:
+        """`problem`, or the one that `problems.load` makes of its name, compiled.
 
         Raises
         ------
         ValueError
             If it is another problem than this source's; `whose` begins the message.
         """
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        compiled = (problems.load(problem) if isinstance(problem, str) else problem).compile()
         if compiled.fingerprint != self.fingerprint:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
             raise ValueError(
@@ -70,7 +70,8 @@ class Source:
         if not (self.trusted or is_catalogued(self.address)):
             raise ValueError(
                 f"the file says that its problem '{self.name}' is made by the code at {self.address!r}, which is not run unasked: "
-                "give problem=, or trust=True (--problem or --trust)"
+                "to run it give --trust, or Front.load(path, trust=True); "
+                "to name the problem yourself give --problem, or Front.load(path, problem=...)"
             )
         try:
             problem = problems.load(self.address, **self.data)

@@ -660,7 +660,9 @@ def test_an_address_in_a_file_is_not_run_unasked(tmp_path, monkeypatch):
     path, address = tmp_path / "front.nc", f"{tmp_path / 'own.py'}:state_problem"
     save_with(path, address)
     for act in (lambda front: front[0].simulate(), lambda front: front.simulate(), lambda front: front.compiled()):
-        with pytest.raises(ValueError, match=r"made by the code at '.*own\.py:state_problem', .*give problem=, or trust=True"):
+        with pytest.raises(
+            ValueError, match=r"made by the code at '.*own\.py:state_problem', .*--trust, or Front.load\(path, trust=True\)"
+        ):
             act(Front.load(path))
     assert not (tmp_path / "ran").exists()
     Front.load(path, state_problem())[0].simulate()
