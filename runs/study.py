@@ -216,9 +216,12 @@ class Study:
         KeyboardInterrupt
             Ctrl-C; the same again goes on.
         """
-        from .batch.running import execute
+        from .batch.running import check_workers, execute
 
-        return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
+        check_workers(jobs, executor)
+        with Store.claim(out, self.definition()) as store:
+            execute(store, self.runs, self._task, jobs, executor, retry, progress)
+            return store.summary(self.runs)
 
     def status(self, out: str | PathLike[str]) -> Summary:
         """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""

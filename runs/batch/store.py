@@ -12,10 +12,12 @@ Every file is written whole, all but checkpoints and samples by the process that
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -38,10 +40,10 @@ from .cells import Cell
 from .lock import locked
 
 MISSING, UNREADABLE = "missing", "unreadable"
-
-
 FORMAT, VERSION = "macs study", 2
 """Of study.json."""
+LONGEST, MOST = 200, 20
+"""Characters of a reason why a run failed, and number of reasons that a summary lists."""
 
 
 class Definition(msgspec.Struct):
@@ -155,13 +157,23 @@ class Summary:
     @property
     def cells(self) -> dict[Cell, tuple[StoredRun, ...]]:
         """Runs by cell."""
-        found: dict[str, list[StoredRun]] = {}
-        for run in self.runs:
-            found.setdefault(run.cell.folder, []).append(run)
-        return {runs[0].cell: tuple(runs) for runs in found.values()}
+        return {cell: tuple(runs) for cell, runs in groupby(self.runs, key=lambda run: run.cell)}
 
     def __str__(self) -> str:
-        return summary_text(self)
+        """A table of the cells, and why runs failed."""
+        rows, reasons = [], []
+        for cell, runs in self.cells.items():
+            times = [run.wall_time for run in runs if run.finished and run.wall_time]
+            counts = Counter("finished" if run.finished else "missing" if run.status == MISSING else "failed" for run in runs)
+            median = duration(float(np.median(times))) if times else "-"
+            rows.append([*cell.labels, *(str(counts[kind]) for kind in ("finished", "failed", "missing")), median])
+            failed = (run for run in runs if not run.finished and run.status != MISSING)
+            reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LONGEST] for run in failed]
+        headers = [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]]
+        lines = [f"{self.name}: {self.finished} of {len(self.runs)} runs finished", "", text_table(headers, rows, [True] * 3 + [False] * 4)]
+        lines += ["", *reasons[:MOST]] if reasons else []
+        lines += [f"and {len(reasons) - MOST} more"] if len(reasons) > MOST else []
+        return "\n".join(lines)
 
 
 class Store:
@@ -309,10 +321,7 @@ class Store:
         """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
         cannot be written."""
         front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
-        content = {"status": outcome.status, "message": outcome.message, "traceback": outcome.traceback, "wall_time": outcome.wall_time}
-        content |= {"history": outcome.history, "simulated": outcome.simulated}
-        content |= {"front": crc32(outcome.front)} if outcome.status == FINISHED else {}
-        write_whole(record, records.to_bytes(content))
+        write_whole(record, records.to_bytes({**vars(outcome), "front": crc32(outcome.front) if outcome.status == FINISHED else None}))
         if outcome.status == FINISHED:
             if front.exists():
                 # It could not be read, but it is the user's to delete.
@@ -352,35 +361,6 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "
         elif first != second:
             return f"{name} is {json.dumps(first)} there and {json.dumps(second)} here"
     return ""
-
-
-LINE = 200
-"""Longest reason, in characters."""
-
-
-WORTH = 20
-"""Most failures listed one by one."""
-
-
-def summary_text(summary: Summary) -> str:
-    """A table of the cells, and why runs failed."""
-    rows, reasons = [], []
-    for cell, runs in summary.cells.items():
-        finished = [run for run in runs if run.finished]
-        times = [run.wall_time for run in finished if run.wall_time]
-        missing = sum(run.status == "missing" for run in runs)
-        failed = len(runs) - len(finished) - missing
-        rows.append([*cell.labels, str(len(finished)), str(failed), str(missing), duration(float(np.median(times))) if times else "-"])
-        for run in runs:
-            if not run.finished and run.status != "missing":
-                reasons.append(f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LINE])
-    more = [f"and {len(reasons) - WORTH} more"] if len(reasons) > WORTH else []
-    table = text_table(
-        [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]], rows, [True] * 3 + [False] * 4
-    )
-    headline = f"{summary.name}: {summary.finished} of {len(summary.runs)} runs finished"
-    failures = ["", *reasons[:WORTH], *more] if reasons else []
-    return "\n".join([headline, "", table, *failures])
 
 
 def reason(status: str, message: str) -> str:

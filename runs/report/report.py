@@ -17,7 +17,7 @@ from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
 
-from ..batch.store import Store, summary_text
+from ..batch.store import Store
 from ..data.addresses import check_trusted
 from ..data.schema import Flag, Text, checked, errors_begin_with
 from ..measures.attainment import attainment
@@ -102,7 +102,7 @@ def report(
     store = Store.open(out, trust)
     summary, study = store.summary(), store.definition
     if not summary.finished:
-        raise ValueError(f"there is nothing to report on yet\n{summary_text(summary)}")
+        raise ValueError(f"there is nothing to report on yet\n{summary}")
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         published = papers(study.get("paper") or [])
@@ -115,7 +115,7 @@ def report(
     if others:
         found = comparisons(store, others)
     writer = _Writer(Path(out) / FOLDER)
-    sections = [summary_text(summary), *([keys.note] if keys.note else [])]
+    sections = [str(summary), *([keys.note] if keys.note else [])]
     for comparison in _shown(found) if progress else found:
         sections += _section(comparison, study, writer, figures)
     across: list[GoalAttainment | ChangedData] = [*goal_attainments(found, study), *changed_data(found, study)]
