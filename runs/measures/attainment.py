@@ -43,16 +43,6 @@ class Attainment:
             raise ValueError(f"surfaces are of 1 to {self.runs} runs, not of {k}")
         return self.levels[k] * self.signs
 
-    def percent(self, share: float) -> np.ndarray:
-        """Corners (p, m) of the surface that at least `share` per cent of the runs attain, 0 < share <= 100."""
-        return self.of(self.count(share))
-
-    def count(self, share: float) -> int:
-        """The number of runs that `share` per cent are, rounded up."""
-        if not 0 < share <= 100:
-            raise ValueError(f"a share of the runs is more than 0 and at most 100 per cent, not {share}")
-        return max(1, int(np.ceil(share * self.runs / 100 - 1e-9)))
-
     @property
     def best(self) -> np.ndarray:
         """Corners of the surface that any run attains."""
@@ -61,7 +51,7 @@ class Attainment:
     @property
     def median(self) -> np.ndarray:
         """Corners of the surface that half of the runs attain."""
-        return self.percent(50)
+        return self.of(-(-self.runs // 2))
 
     @property
     def worst(self) -> np.ndarray:

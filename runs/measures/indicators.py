@@ -24,6 +24,8 @@ JOINED = 0.02
 """Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
 SAMPLES = 2001
 """Number of points, evenly along its length, that represent such a reference."""
+POINT = 1.1
+"""Corner of the hypervolume in each objective, in ranges of the reference from its ideal."""
 
 Points = Front | np.ndarray
 
@@ -59,7 +61,7 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
     return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
 
-def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normalise: bool = True) -> float:
+def hypervolume(front: Points, reference: Points, *, point: float = POINT, normalise: bool = True) -> float:
     """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
 
     With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for

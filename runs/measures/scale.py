@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from macs.front import Front
 
-from .indicators import Points, extent, pieces, truth
+from .indicators import POINT, Points, extent, pieces, truth
 
 
 @dataclass(frozen=True)
@@ -22,8 +21,6 @@ class Scale:
         Best and worst value of each objective on the reference, dominated points left out.
     corner : tuple of m floats
         The reference point of the hypervolume.
-    point : float
-        The same in ranges of the reference from its ideal, as `hypervolume` has it.
     names, units : tuples of m str
     what : str
         Name of the reference: "the closed form", "the union of 60 runs".
@@ -36,7 +33,6 @@ class Scale:
     ideal: tuple[float, ...]
     nadir: tuple[float, ...]
     corner: tuple[float, ...]
-    point: float
     names: tuple[str, ...]
     units: tuple[str, ...]
     what: str
@@ -44,14 +40,7 @@ class Scale:
     curve: bool = False
 
     @staticmethod
-    def of(
-        reference: Points,
-        *,
-        like: Front | None = None,
-        what: str = "the reference",
-        point: float = 1.1,
-        curve: bool = True,
-    ) -> Scale:
+    def of(reference: Points, *, like: Front | None = None, what: str = "the reference", curve: bool = True) -> Scale:
         """The normalisation by a reference that the indicators of `runs.measures.indicators` use.
 
         Parameters
@@ -62,8 +51,8 @@ class Scale:
             columns are minimised.
         what : str
             Name of the reference, for captions.
-        point, curve
-            As the indicators were given them.
+        curve : bool
+            As the indicators were given it.
         """
         known = reference if isinstance(reference, Front) else like
         R = truth(reference, known)
@@ -77,8 +66,7 @@ class Scale:
         return Scale(
             ideal=shown(ideal),
             nadir=shown(R.max(axis=0)),
-            corner=shown(ideal + point * unit),
-            point=point,
+            corner=shown(ideal + POINT * unit),
             names=known.names if known is not None else tuple(f"objective {i + 1}" for i in range(m)),
             units=known.units if known is not None else ("",) * m,
             what=what,
@@ -91,12 +79,8 @@ class Scale:
         how = ", the curve through them" if self.curve else ""
         points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
         ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
-        volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
+        volume = f"Hypervolume up to {POINT:g} in each objective ({self._all(self.corner)})."
         return f"Objectives normalised to {ends} of {points}. {volume}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, for a file beside the numbers."""
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
 
     def _all(self, values: tuple[float, ...]) -> str:
         cells = zip(self.names, values, self.units, strict=True)
