@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from transcription import Smooth
 
-from .batch import cells as combining
 from .batch import file as studyfile
-from .batch.cells import Cell
+from .batch.cells import Cell, combine
 from .batch.store import Store, StoredRun, Summary
 from .batch.terms import INNER, check_inner, sampling, written
 from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
@@ -140,13 +139,10 @@ class Study:
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with errors_begin_with(f"study '{self.name}'"):
             self._check_values()
-            combined = combining.combine(
+            combined, stated, solvers = combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
             )
-            asked = (self.goal, self.nominal, self.reference)
-            stated = combining.problems(combined) if self.paper or any(one is not None for one in asked) else {}
-            if self.paper:
-                check_against(self.paper, stated, combining.solvers(combined))
+            check_against(self.paper, stated, solvers)
             if self.reference is not None:
                 check_reference(self.reference, stated)
             if self.goal is not None:

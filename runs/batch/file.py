@@ -11,7 +11,7 @@ from typing import Any
 from problems.checks import unknown
 
 from ..data.addresses import check_trusted
-from ..data.schema import errors_begin_with
+from ..data.schema import check_known, errors_begin_with
 from ..measures.references import reference_addresses
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -54,9 +54,7 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
             raise ValueError("it is not a text file") from error
         except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise ValueError(f"it is not TOML: {error}") from error
-        for key in data:
-            if key not in keys:
-                raise ValueError(unknown("key", key, keys))
+        check_known("key", data, keys)
         for key, required in keys.items():
             if required and key not in data:
                 raise ValueError(f"{key} is missing")

@@ -19,9 +19,9 @@ from macs.front import Front
 from macs.fronts.style import label
 from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
-from problems.checks import unknown
 from problems.compiled import Objective
 
+from ..data.schema import check_known, errors_begin_with
 from .indicators import Points, minimised
 
 if TYPE_CHECKING:
@@ -261,9 +261,8 @@ def reference_addresses(given: Any) -> list[str]:
 
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
-    for name in given if isinstance(given, Mapping) else stated:
-        if name not in stated:
-            raise ValueError(f"reference: {unknown('problem', name, stated)}")
+    with errors_begin_with("reference"):
+        check_known("problem", given if isinstance(given, Mapping) else (), stated)
     for name, problem in stated.items():
         try:
             look_up(given, name, problem.address, problem.data, problem.goals)

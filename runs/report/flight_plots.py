@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 Law = Mapping[str, np.ndarray]
 """A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 
-Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
+Track = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
+"""(values of a flight by name) -> {label: values across, label: values up}."""
 
 Laws = Mapping[str, Sequence[Law | None]]
 """{name of a law: its flight for each point, None where it has none}."""
@@ -43,12 +44,7 @@ def representatives(front: Front, count: int = 4) -> list[int]:
     return sorted(good[spread(normalised(F, F)[0], count)].tolist())
 
 
-def flights_figure(
-    points: Sequence[Point],
-    *,
-    laws: Laws = MappingProxyType({}),
-    solver: str = "",
-) -> Figure:
+def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({}), solver: str = "") -> Figure:
     """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
 
     Parameters
@@ -71,7 +67,7 @@ def flights_figure(
     # `_check` has made sure that all have trajectories.
     flights = [point.trajectory for point in points if point.trajectory is not None]
     rows = [name for name, kind in quantities(flights[0]) if kind != "path"]
-    units = _units(points[0])
+    units = {v.name: v.unit for phase in flights[0].phases for v in (*phase.state_variables, *phase.control_variables)}
     with style():
         figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
         grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
@@ -97,27 +93,15 @@ def flights_figure(
     return figure
 
 
-def paths_figure(
-    points: Sequence[Point],
-    across: Quantity,
-    up: Quantity,
-    *,
-    xlabel: str = "",
-    ylabel: str = "",
-    laws: Laws = MappingProxyType({}),
-    equal: bool = False,
-) -> Figure:
+def paths_figure(points: Sequence[Point], track: Track, *, laws: Laws = MappingProxyType({}), equal: bool = False) -> Figure:
     """The paths of a few points in one picture: a quantity of the flight over another, a colour each.
 
     Parameters
     ----------
     points, laws
-        As of `flights_figure`.
-    across, up : name of a state or control, or a function of all of them
-        The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. A law that lacks
-        one of them is not drawn.
-    xlabel, ylabel : str
-        Needed for functions; of a state or control, its name and unit by default.
+        As of `flights_figure`. A law that lacks a state or control of the track is not drawn.
+    track : callable
+        {name of a state or control: values} -> {label: values across, label: values up}.
     equal : bool
         Whether both axes have the same scale.
     """
@@ -129,7 +113,7 @@ def paths_figure(
             phases = point.trajectory.phases if point.trajectory is not None else ()
             for k, phase in enumerate(phases):
                 values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
-                x, y = _of(values, across), _of(values, up)
+                (across, x), (up, y) = track(values).items()
                 name = f"point {i + 1}" if k == 0 else None
                 # Where paths coincide the first are on top, and a dot marks the end of each.
                 look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
@@ -137,43 +121,24 @@ def paths_figure(
                 if k == len(phases) - 1:
                     end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
                     ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
-        units = _units(points[0])
-        ax.set_xlabel(xlabel or label(str(across), units.get(str(across), "")))
-        ax.set_ylabel(ylabel or label(str(up), units.get(str(up), "")))
+        ax.set_xlabel(across)
+        ax.set_ylabel(up)
         if equal:
             ax.set_aspect("equal", adjustable="datalim")
         for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
-            drawn = [law for law in beside if law is not None and _has(law, across) and _has(law, up)]
-            for i, law in enumerate(drawn):
-                line = _of(law, across), _of(law, up)
-                ax.plot(*line, color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
+            lines = [line for law in beside if law is not None and (line := _track(track, law))]
+            for i, line in enumerate(lines):
+                ax.plot(*line.values(), color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
         ax.legend(frameon=False, loc="best")
     return figure
 
 
-def _of(values: Mapping[str, np.ndarray], quantity: Quantity) -> np.ndarray:
-    if callable(quantity):
-        return quantity(values)
-    if quantity not in values:
-        raise ValueError(f"there is no '{quantity}' to draw; there are {', '.join(values)}")
-    return values[quantity]
-
-
-def _has(values: Mapping[str, np.ndarray], quantity: Quantity) -> bool:
-    """Whether a law has all that a quantity needs."""
-    if not callable(quantity):
-        return quantity in values
+def _track(track: Track, law: Law) -> Mapping[str, np.ndarray]:
+    """The track of a law; empty if the law lacks a state or control that it needs."""
     try:
-        quantity(values)
+        return track(law)
     except KeyError:
-        return False
-    return True
-
-
-def _units(point: Point) -> dict[str, str]:
-    """Units of the states and controls, by name."""
-    phases = point.trajectory.phases if point.trajectory is not None else ()
-    return {v.name: v.unit for phase in phases for v in (*phase.state_variables, *phase.control_variables)}
+        return {}
 
 
 def _check(points: Sequence[Point], laws: Laws) -> None:

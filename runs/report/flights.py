@@ -130,17 +130,9 @@ class Flights:
                 found |= plot(self.many)
         track = getattr(self.case, "track", None)
         if track is not None:
-            tracks = [track(time_histories(point)) for point in self.points]
-            across, up = tracks[0]
-            found["paths"] = paths_figure(
-                self.points,
-                lambda v: track(v)[across],
-                lambda v: track(v)[up],
-                xlabel=across,
-                ylabel=up,
-                laws={name: flights for name, flights in self.laws.items() if name != ALONE},
-                equal=_alike(tracks),
-            )
+            laws = {name: flights for name, flights in self.laws.items() if name != ALONE}
+            alike = _alike([track(time_histories(point)) for point in self.points])
+            found["paths"] = paths_figure(self.points, track, laws=laws, equal=alike)
         return found
 
     @property

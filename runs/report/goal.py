@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Meta
 
 from macs.front import Front
-from problems.checks import unknown
 
 from ..batch.store import StoredRun
-from ..data.schema import Number, Section, checked, errors_begin_with
+from ..data.schema import Number, Section, check_known, checked, errors_begin_with
 from ..measures.convergence import Band, History, band
 from .comparison import Comparison
 from .plots import convergence_figure
@@ -68,8 +67,8 @@ class Goal(Section):
             goal: Goal = checked(given, cls)
             for name, problem in problems.items():
                 known = {one.name: one for one in problem.goals}
-                if goal.objective not in known:
-                    raise ValueError(f"problem '{name}': {unknown('objective', goal.objective, known)}")
+                with errors_begin_with(f"problem '{name}'"):
+                    check_known("objective", [goal.objective], known)
                 sense = known[goal.objective].sense
                 if (goal.best < goal.worst) != (sense == "minimize"):
                     better = "less" if sense == "minimize" else "more"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from msgspec import Meta
 from macs.front import Front
 from problems.checks import unknown
 
-from ..data.schema import Number, Section, Text, errors_begin_with, is_number
+from ..data.schema import Number, Section, Text, check_known, errors_begin_with, is_number
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.simulation_record import Ends as FinalStates
@@ -103,19 +103,12 @@ class Published(Section, tag_field="of", kw_only=True):
             raise ValueError(f"{STATISTIC}: this kind of table has none")
         keys = figures_of(row)
         if self.columns is not None:
-            check_keys(keys, "key", self.columns)
+            check_known("key", keys, self.columns)
         for key in keys:
             if not is_number(row[key]):
                 raise ValueError(f"{key} must be a finite number, not {row[key]!r}")
         if not keys:
             raise ValueError(f"it has no figure: {', '.join(self.columns) if self.columns else 'of some objective'}")
-
-
-def check_keys(keys: Iterable[str], kind: str, known: Iterable[str]) -> None:
-    """Raise ValueError that names a key which is not known."""
-    for key in keys:
-        if key not in known:
-            raise ValueError(unknown(kind, key, known))
 
 
 class Indicators(Published, tag="indicators"):
