@@ -252,8 +252,7 @@ class Cell:
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data, for the study's record."""
-        names = {"problem": self.problem, "transcription": self.transcription, "solver": self.solver, "folder": self.folder}
-        return names | {"evaluations": self.evaluations, "details": dict(self.details)}
+        return {**vars(self), "folder": self.folder, "details": dict(self.details)}
 
     def _digest(self) -> bytes:
         return hashlib.sha256(json.dumps(self.labels).encode()).digest()

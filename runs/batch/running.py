@@ -58,12 +58,12 @@ def execute(
     with StudyDisplay(store.definition["name"], every, todo, shown=progress) as display:
 
         def keep(run: StoredRun, outcome: Outcome) -> None:
-            store.keep(run.cell, run.number, outcome)
+            store.keep(run, outcome)
             display.ended(run, outcome)
 
         try:
             for run in todo:
-                future = workers.submit(task_of(run, store.checkpoint_path(run.cell, run.number)), display.reporter(run))
+                future = workers.submit(task_of(run, store.checkpoint_path(run)), display.reporter(run))
                 runs[future] = run
                 future.add_done_callback(done.put)
             while runs:

@@ -275,11 +275,11 @@ class Store:
 
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        path, record, status, message = self.front_path(cell, number), RunRecord(), UNREADABLE, ""
+        path, record, status, message = self.path / cell.folder / f"{number:04d}.nc", RunRecord(), UNREADABLE, ""
         try:
-            record = self._record(cell, number)
+            record = _record(path.with_suffix(".json"))
             if path.exists():
-                self._check_front(path, record)
+                _check_front(path, record)
         except (ValueError, OSError) as error:
             message = str(error)
         else:
@@ -303,25 +303,18 @@ class Store:
         """The state of the study, with the runs that were asked for or `count` of each cell."""
         return Summary(self.definition["name"], self.path, tuple(self.runs(count)))
 
-    def front_path(self, cell: Cell, number: int) -> Path:
-        """Path of the front of a run."""
-        return self.path / cell.folder / f"{number:04d}.nc"
-
-    def record_path(self, cell: Cell, number: int) -> Path:
-        """Path of the record of a run."""
-        return self.path / cell.folder / f"{number:04d}.json"
-
-    def checkpoint_path(self, cell: Cell, number: int) -> Path:
-        """Where a run is kept while it lasts, in a folder that is there. It has the study's own path, wherever the process may be."""
-        path = self.front_path(cell, number).with_suffix(".checkpoint").absolute()
+    def checkpoint_path(self, run: StoredRun) -> Path:
+        """Where a run is kept while it lasts, in a folder that is made. The path is absolute, as its process may be in another folder."""
+        path = run.path.with_suffix(".checkpoint").absolute()
         path.parent.mkdir(exist_ok=True)
         return path
 
-    def keep(self, cell: Cell, number: int, outcome: Outcome) -> None:
+    def keep(self, run: StoredRun, outcome: Outcome) -> None:
         """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
         cannot be written."""
-        front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
-        write_whole(record, records.to_bytes({**vars(outcome), "front": crc32(outcome.front) if outcome.status == FINISHED else None}))
+        front, checkpoint = run.path, self.checkpoint_path(run)
+        checksum = crc32(outcome.front) if outcome.status == FINISHED else None
+        write_whole(front.with_suffix(".json"), records.to_bytes({**vars(outcome), "front": checksum}))
         if outcome.status == FINISHED:
             if front.exists():
                 # It could not be read, but it is the user's to delete.
@@ -330,23 +323,22 @@ class Store:
             for path in (checkpoint, samples_path(checkpoint)):
                 path.unlink(missing_ok=True)
 
-    def _record(self, cell: Cell, number: int) -> RunRecord:
-        """The record of a run. Raises ValueError or OSError if it cannot be read."""
-        path = self.record_path(cell, number)
-        try:
-            with errors_begin_with(f"its record '{path}' is damaged"):
-                found: RunRecord = checked(records.from_bytes(path.read_bytes()), RunRecord)
-                return found
-        except FileNotFoundError:
-            return RunRecord()
 
-    def _check_front(self, path: Path, record: RunRecord) -> None:
-        """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
-        loaded."""
-        if record.status == MISSING:
-            Front.load(path)
-        elif crc32(path.read_bytes()) != record.front:
-            raise ValueError(f"'{path}' is damaged: its content is not what was written")
+def _record(path: Path) -> RunRecord:
+    """The record of a run. Raises ValueError or OSError if it cannot be read."""
+    if not path.exists():
+        return RunRecord()
+    with errors_begin_with(f"its record '{path}' is damaged"):
+        return checked(records.from_bytes(path.read_bytes()), RunRecord)
+
+
+def _check_front(path: Path, record: RunRecord) -> None:
+    """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
+    loaded."""
+    if record.status == MISSING:
+        Front.load(path)
+    elif crc32(path.read_bytes()) != record.front:
+        raise ValueError(f"'{path}' is damaged: its content is not what was written")
 
 
 def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "") -> str:

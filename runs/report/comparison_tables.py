@@ -62,10 +62,6 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
         for solver, values in solvers.items()
         for summary in [summarise(values)]
     ]
-    heads: list[Column | str] = [
-        Column("cost", grouped=True),
-        "solver",
-        "runs",
-        *(Column(name, digits=4) for name in ("mean", "median", "least", "most")),
-    ]
+    heads: list[Column | str] = [Column("cost", grouped=True), "solver", "runs"]
+    heads += [Column(name, digits=4) for name in ("mean", "median", "least", "most")]
     return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.")}

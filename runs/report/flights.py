@@ -92,16 +92,12 @@ class Flights:
         goals = self.comparison.known.goals
         curve = self._curve()
         heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
-        heads += (
-            [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
-            if curve is not None
-            else []
-        )
-        rows: list[list[Cell]] = []
-        for number, point in enumerate(self.points, 1):
-            rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
-        for goal, end in zip(goals, self.ends, strict=False):
-            rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
+        if curve is not None:
+            heads += [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
+        names = [*(f"point {number}" for number in range(1, len(self.points) + 1)), *(f"{goal.name} alone" for goal in goals)]
+        # There may be no ends.
+        named = zip(names, (*self.points, *self.ends), strict=False)
+        rows: list[list[Cell]] = [[name, *point.objectives.values(), *self._beside(point, curve)] for name, point in named]
         notes = [f"Of {self.solver}, all runs together."]
         if len(self.ends):
             notes[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
@@ -109,9 +105,8 @@ class Flights:
             notes.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; see macs verify."
             )
-        return table(
-            heads, rows, f"{self.comparison.name}: representative solutions of the front.", [*notes, *([self.note] if self.note else [])]
-        )
+        notes += [self.note] if self.note else []
+        return table(heads, rows, f"{self.comparison.name}: representative solutions of the front.", notes)
 
     def figures(self) -> dict[str, Figure]:
         """Name of a file -> figure."""

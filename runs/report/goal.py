@@ -116,9 +116,9 @@ class GoalAttainment:
     problem: str
     goal: Goal
     objective: Objective
-    histories: Mapping[tuple[str, str], Sequence[History]]
-    simulated: Mapping[tuple[str, str], Sequence[float]]
-    seconds: Mapping[tuple[str, str], Sequence[float]]
+    histories: dict[tuple[str, str], list[History]]
+    simulated: dict[tuple[str, str], list[float]]
+    seconds: dict[tuple[str, str], list[float]]
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
@@ -166,24 +166,19 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
     for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
         here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
-        cells = {
-            (comparison.place(solver), solver): (runs, comparison.fronts[solver], comparison.failures.get(solver, 0))
-            for comparison in here
-            for solver, runs in comparison.runs.items()
-            if len(runs) + comparison.failures.get(solver, 0)
-        }
-        histories = {
-            cell: [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
-            for cell, (runs, _, failed) in cells.items()
-        }
-        simulated = {
-            cell: [*map(goal.of_front, fronts), *[np.nan] * failed] for cell, (_, fronts, failed) in cells.items() if verify is not None
-        }
-        seconds = {cell: [run.wall_time for run in runs] for cell, (runs, _, _) in cells.items()}
         objective = next(one for one in goals if one.name == goal.objective)
-        known = {cell: runs for cell, runs in histories.items() if runs}
-        if known:
-            found.append(GoalAttainment(problem, goal, objective, known, simulated, seconds))
+        attained = GoalAttainment(problem, goal, objective, {}, {}, {})
+        for comparison in here:
+            for solver, runs in comparison.runs.items():
+                cell, failed = (comparison.place(solver), solver), comparison.failures.get(solver, 0)
+                histories = [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
+                if histories:
+                    attained.histories[cell] = histories
+                    attained.seconds[cell] = [run.wall_time for run in runs]
+                if histories and verify is not None:
+                    attained.simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
+        if attained.histories:
+            found.append(attained)
     return found
 
 

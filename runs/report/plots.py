@@ -50,7 +50,7 @@ def front_figure(
         Name of the reference in the legend.
     """
     known = _known([*(front for runs in fronts.values() for front in runs), reference], goals)
-    m = len(known.goals)
+    m, signs = len(known.goals), _signs(known)
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
@@ -59,28 +59,24 @@ def front_figure(
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for ax, (i, j) in zip(grid, pairs, strict=True):
             if reference is not None:
-                _draw_truth(ax, truth(reference, known) * _signs(known), _signs(known), (i, j), truth_name)
+                _draw_truth(ax, truth(reference, known), signs, (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
                 if not runs:  # none is finished; other solvers keep their colours of all figures
                     continue
-                points = [minimised(front, known) * _signs(known) for front in runs]
+                points = [minimised(front, known) * signs for front in runs]
                 name = _runs(solver, len(runs), sum(not len(part) for part in points))
                 every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])
                 points_style = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
             if marked is not None:
-                _mark(ax, minimised(marked, known) * _signs(known), _signs(known), (i, j))
+                _mark(ax, minimised(marked, known) * signs, signs, (i, j))
             _label(ax, known, i, j)
         legend(figure, grid[0], "best" if len(pairs) == 1 else None)
     return figure
 
 
 def attainment_figure(
-    surfaces: Mapping[str, Attainment],
-    *,
-    goals: Sequence[Objective] = (),
-    reference: Points | None = None,
-    truth_name: str = "truth",
+    surfaces: Mapping[str, Attainment], *, goals: Sequence[Objective] = (), reference: Points | None = None, truth_name: str = "truth"
 ) -> Figure:
     """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
 
@@ -112,7 +108,7 @@ def attainment_figure(
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
-                _draw_truth(ax, truth(reference, known) * signs, signs, (0, 1), truth_name)
+                _draw_truth(ax, truth(reference, known), signs, (0, 1), truth_name)
             _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
             ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
@@ -165,15 +161,8 @@ def convergence_figure(
             x = np.append(b.x, last)
             lower, median, upper = (np.append(part, part[-1]) for part in (b.lower, b.median, b.upper))
             outside = (low / 10, high * 10) if log else (2 * low - high - 1, 2 * high - low + 1)
-            ax.fill_between(
-                x,
-                np.nan_to_num(lower, neginf=outside[0], posinf=outside[1]),
-                np.nan_to_num(upper, neginf=outside[0], posinf=outside[1]),
-                step="post",
-                color=color,
-                alpha=0.2,
-                lw=0,
-            )
+            edges = (np.nan_to_num(part, neginf=outside[0], posinf=outside[1]) for part in (lower, upper))
+            ax.fill_between(x, *edges, step="post", color=color, alpha=0.2, lw=0)
             drawn = np.where(np.isfinite(median), median, np.nan)
             ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
         if log:
@@ -227,15 +216,13 @@ def _label(ax: Any, known: Front, i: int, j: int) -> None:
     ax.set_ylabel(better(known.goals[j]))
 
 
-def _draw_truth(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
-    """A line for each piece of a dense reference of two objectives, else small points; beneath all else."""
-    i, j = pair
-    curves = pieces(values * signs)
+def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
+    """A line for each piece of a dense reference of two objectives, minimised, else small points; beneath all else."""
+    curves = pieces(R)
     for k, curve in enumerate(curves):
-        line = curve * signs
-        ax.plot(line[:, 0], line[:, 1], color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
+        ax.plot(*(curve * signs).T, color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
     if not curves:
-        ax.plot(values[:, i], values[:, j], ".", color=GREY, ms=2.0, zorder=1, label=name)
+        ax.plot(*(R * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
 
 
 def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int]) -> None:

@@ -96,11 +96,8 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
             notes += [f"{problem}, {place}: {note}" for place, note in remarks.items()]
     if not rows:
         return None
-    heads: list[Column | str] = [
-        Column("problem", grouped=True),
-        Column("by", grouped=paper.statistics),
-        Column("runs", grouped=paper.statistics),
-    ]
+    heads: list[Column | str] = [Column("problem", grouped=True)]
+    heads += [Column(name, grouped=paper.statistics) for name in ("by", "runs")]
     heads += [STATISTIC] if paper.statistics else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]

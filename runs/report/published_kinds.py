@@ -114,15 +114,13 @@ class Published(Section, tag_field="of", kw_only=True):
 class Indicators(Published, tag="indicators"):
     """GD and IGD to the points of the union of all runs, and the time of a run."""
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {
-            "gd_mean": Column("mean GD", digits=4),
-            "gd_variance": Column("variance", digits=4),
-            "igd_mean": Column("mean IGD", digits=4),
-            "igd_variance": Column("variance", digits=4),
-            "seconds": Column("time", "s", digits=4),
-        }
+    columns: ClassVar[Mapping[str, Column]] = {
+        "gd_mean": Column("mean GD", digits=4),
+        "gd_variance": Column("variance", digits=4),
+        "igd_mean": Column("mean IGD", digits=4),
+        "igd_variance": Column("variance", digits=4),
+        "seconds": Column("time", "s", digits=4),
+    }
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         union, times = comparison.union(), spent(comparison)["time [s]"]
@@ -131,9 +129,8 @@ class Indicators(Published, tag="indicators"):
         for solver in comparison.runs:
             if solver in found["GD"]:
                 gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
-                figures = {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
-                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
-                rows[solver] = [figures | seconds]
+                seconds = float(np.mean(times[solver])) if solver in times else None
+                rows[solver] = [dict(zip(self.columns, (gd.mean, gd.variance, igd.mean, igd.variance, seconds), strict=True))]
         return rows
 
     def remark(self, comparison: Comparison) -> str:
@@ -149,9 +146,7 @@ class Hypervolume(Published, tag="hypervolume", kw_only=True):
 
     point: Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {key: Column(key, digits=5) for key in ("best", "median", "worst")}
+    columns: ClassVar[Mapping[str, Column]] = {key: Column(key, digits=5) for key in ("best", "median", "worst")}
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         rows: dict[str, list[Figures]] = {}
@@ -240,18 +235,16 @@ class Feasibility(Published, tag="feasibility"):
 
     population: ClassVar[bool] = True
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {
-            "first_feasible": Column("first feasible, mean", digits=4),
-            "first_feasible_median": Column("median", digits=4),
-            "first_feasible_never": Column("never"),
-            "all_feasible": Column("all feasible, mean", digits=4),
-            "all_feasible_median": Column("median", digits=4),
-            "all_feasible_never": Column("never"),
-            "points": Column("not dominated, claimed", digits=4),
-            "counted": Column("points of a front that count", digits=4),
-        }
+    columns: ClassVar[Mapping[str, Column]] = {
+        "first_feasible": Column("first feasible, mean", digits=4),
+        "first_feasible_median": Column("median", digits=4),
+        "first_feasible_never": Column("never"),
+        "all_feasible": Column("all feasible, mean", digits=4),
+        "all_feasible_median": Column("median", digits=4),
+        "all_feasible_never": Column("never"),
+        "points": Column("not dominated, claimed", digits=4),
+        "counted": Column("points of a front that count", digits=4),
+    }
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         rows: dict[str, list[Figures]] = {}

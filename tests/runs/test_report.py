@@ -43,9 +43,10 @@ def folder(tmp_path_factory) -> Path:
     study().run(out)
     store = Store.open(out)
     one, other, _ = store.cells
-    store.front_path(one, 2).unlink()
-    store.record_path(one, 2).unlink()
-    store.front_path(other, 3).write_bytes(b"no front")
+    lost = store.run(one, 2).path
+    lost.unlink()
+    lost.with_suffix(".json").unlink()
+    store.run(other, 3).path.write_bytes(b"no front")
     return out
 
 
@@ -153,7 +154,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
     assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
-        store.keep(store.cells[0], 1, Outcome("crashed", "it broke"))
+        store.keep(store.run(store.cells[0], 1), Outcome("crashed", "it broke"))
     with pytest.raises(ValueError, match="nothing to report on yet"):
         report(tmp_path / "out")
     with pytest.raises(ValueError, match="another study"):
