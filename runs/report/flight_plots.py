@@ -156,9 +156,8 @@ def _check(points: Sequence[Point], laws: Laws) -> None:
 
 def _title(number: int, point: Point, width: int) -> str:
     """The point's number and objectives, in lines of at most `width` characters."""
-    goals = point.goals
     values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
-    lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
+    lines = [f"{goal.name} {values[goal.name]} {goal.unit}".rstrip() for goal in point.goals]
     return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
 
 

@@ -113,6 +113,7 @@ class Flights:
         found = {
             "representatives": front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
+                goals=self.comparison.known.goals,
                 reference=self.reference.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
@@ -136,7 +137,7 @@ class Flights:
 
     def _curve(self) -> np.ndarray | None:
         """The reference, minimised, where it is one curve of two objectives."""
-        R = truth(self.reference.front, self.comparison.known)
+        R = truth(self.reference.front)
         return R if len(pieces(R)) == 1 else None
 
     def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:

@@ -137,7 +137,7 @@ class Indicators(Published, tag="indicators"):
         union = comparison.union()
         if not len(union.front):
             return "no run found a point."
-        scale = Scale.of(union.front, like=comparison.known, what=union.what, curve=False).describe().split(". Hypervolume")[0]
+        scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
         return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
 
 
@@ -157,10 +157,8 @@ class Hypervolume(Published, tag="hypervolume", kw_only=True):
         return rows
 
     def remark(self, comparison: Comparison) -> str:
-        goals = comparison.known.goals
-        words = ", ".join(
-            f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, self.point, strict=True)
-        )
+        goals = zip(comparison.known.goals, self.point, strict=True)
+        words = ", ".join(f"{goal.name} {value:g} {goal.unit}".rstrip() for goal, value in goals)
         best = comparison.reference(None)
         return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
 

@@ -19,7 +19,7 @@ from runs.execution.task import Outcome
 from runs.measures.references import look_up
 from runs.report.comparison import comparisons
 from runs.report.published import papers, published_tables
-from runs.report.report import _plain, _Writer, report
+from runs.report.report import _Writer, report
 from runs.report.tables import table
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
@@ -247,6 +247,6 @@ def test_problems_without_finished_runs_are_left_out_of_published_tables(folder)
 def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):
     writer = _Writer(tmp_path / "report")
     for value in (5, -5):
-        writer.table(_plain(f"mass {value:+d} %"), table(["shift"], [[value]], "of the mass"))
+        writer.table(f"mass {value:+d} %", table(["shift"], [[value]], "of the mass"))
     assert len(set(writer.files)) == len(writer.files) == 6 and all(path.exists() for path in writer.files)
     assert [path.name for path in writer.files if path.suffix == ".csv"] == ["mass-5.csv", "mass-5-2.csv"]
