@@ -67,10 +67,10 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
 
 def _addresses(data: Mapping[str, Any]) -> list[str]:
     """The addresses of code that a study file states: of its problems, and of references."""
-    problems, reference = data.get("problems"), data.get("reference")
+    problems = data["problems"]
     stated = problems.values() if isinstance(problems, Mapping) else problems if isinstance(problems, list) else [problems]
     addresses = [one.get("problem") if isinstance(one, Mapping) else one for one in stated]
-    return [one for one in addresses if isinstance(one, str)] + reference_addresses(reference)
+    return [one for one in addresses if isinstance(one, str)] + reference_addresses(data.get("reference"))
 
 
 def _find(source: str | PathLike[str]) -> Path:

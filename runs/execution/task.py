@@ -143,8 +143,5 @@ def _simulated(task: Task, front: Front) -> SimulationRecord:
         return {}
 
 
-@lru_cache(maxsize=8)
-def _unpacked(payload: bytes) -> tuple[Any, Any]:
-    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
-    problem, scheme = pickle.loads(payload)
-    return problem, scheme
+_unpacked = lru_cache(maxsize=8)(pickle.loads)
+"""Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""

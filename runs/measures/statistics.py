@@ -121,13 +121,18 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: boo
     -----
     p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties.
     """
+    from scipy.stats import mannwhitneyu, rankdata
+
     costs = _all_costs(samples, larger)
     found = []
     for one, other in combinations(costs, 2):
         a, b = costs[one], costs[other]
-        statistic, p, least = _mann_whitney(a, b)
+        # Of ranks, because infinities have no differences.
+        ranks = rankdata(np.concatenate([a, b]))
+        result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
+        least = min(1.0, 2.0 / comb(len(ranks), len(a)))
         note = f"Too few runs: p cannot be below {least:.2g}." if least > ALPHA else ""
-        size = a12(a, b)
+        statistic, p, size = float(result.statistic), float(result.pvalue), a12(a, b)
         found.append(PairTest(one, other, statistic, p, p, size, effect(size), note))
     return [replace(pair, p_holm=float(p)) for pair, p in zip(found, holm([pair.p for pair in found]), strict=True)]
 
@@ -143,12 +148,8 @@ def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool
     names, columns = list(costs), list(costs.values())
     ends = np.cumsum([len(column) for column in columns])[:-1]
     ranks = np.split(rankdata(np.concatenate(columns)), ends)
-    result = None if np.ptp(np.concatenate(ranks)) == 0 else kruskal(*ranks)
-    return Overall(
-        statistic=0.0 if result is None else float(result.statistic),
-        p=1.0 if result is None else float(result.pvalue),
-        ranks={name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)},
-    )
+    statistic, p = (0.0, 1.0) if np.ptp(np.concatenate(ranks)) == 0 else kruskal(*ranks)
+    return Overall(float(statistic), float(p), {name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)})
 
 
 def a12(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, *, larger: bool = False) -> float:
@@ -199,12 +200,3 @@ def _quantile(costs: np.ndarray, share: float) -> float:
     if part == 0:
         return float(ordered[low])
     return float(ordered[low] + part * (ordered[low + 1] - ordered[low])) if np.isfinite(ordered[low + 1]) else np.inf
-
-
-def _mann_whitney(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """U of the first, p, and the least p that this number of runs can have. Of ranks, because infinities have no differences."""
-    from scipy.stats import mannwhitneyu, rankdata
-
-    ranks = rankdata(np.concatenate([a, b]))
-    result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
-    return float(result.statistic), float(result.pvalue), min(1.0, 2.0 / comb(len(a) + len(b), len(a)))

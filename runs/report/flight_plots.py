@@ -22,6 +22,8 @@ from .style import COLUMN, PAGE, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from transcription.trajectories.trajectory import Trajectory
+
 Law = Mapping[str, np.ndarray]
 """A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 
@@ -63,9 +65,7 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
     """
     from matplotlib.ticker import MaxNLocator
 
-    _check(points, laws)
-    # `_check` has made sure that all have trajectories.
-    flights = [point.trajectory for point in points if point.trajectory is not None]
+    flights = _flights(points, laws)
     rows = [name for name, kind in quantities(flights[0]) if kind != "path"]
     units = {v.name: v.unit for phase in flights[0].phases for v in (*phase.state_variables, *phase.control_variables)}
     with style():
@@ -105,24 +105,22 @@ def paths_figure(points: Sequence[Point], track: Track, *, laws: Laws = MappingP
     equal : bool
         Whether both axes have the same scale.
     """
-    _check(points, laws)
+    flights = _flights(points, laws)
     with style():
         figure = new_figure(COLUMN, 2.7)
         ax = figure.subplots()
-        for i, point in enumerate(points):
-            phases = point.trajectory.phases if point.trajectory is not None else ()
-            for k, phase in enumerate(phases):
+        for i, flight in enumerate(flights):
+            for k, phase in enumerate(flight.phases):
                 values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
                 (across, x), (up, y) = track(values).items()
                 name = f"point {i + 1}" if k == 0 else None
                 # Where paths coincide the first are on top, and a dot marks the end of each.
                 look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
                 ax.plot(x, y, lw=1.3, label=name, **look)
-                if k == len(phases) - 1:
+                if k == len(flight.phases) - 1:
                     end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
                     ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
-        ax.set_xlabel(across)
-        ax.set_ylabel(up)
+        ax.set(xlabel=across, ylabel=up)
         if equal:
             ax.set_aspect("equal", adjustable="datalim")
         for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
@@ -141,17 +139,20 @@ def _track(track: Track, law: Law) -> Mapping[str, np.ndarray]:
         return {}
 
 
-def _check(points: Sequence[Point], laws: Laws) -> None:
+def _flights(points: Sequence[Point], laws: Laws) -> list[Trajectory]:
+    """The trajectories of points. Raises ValueError if there is one without, or laws that do not fit."""
     if not 1 <= len(points) <= 6:
         raise ValueError(f"flights are drawn side by side of one to six points, not of {len(points)}")
-    for number, point in enumerate(points, 1):
-        if point.trajectory is None:
-            raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
+    flights = [point.trajectory for point in points if point.trajectory is not None]
+    if len(flights) < len(points):
+        number = next(number for number, point in enumerate(points, 1) if point.trajectory is None)
+        raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
     if len(laws) > len(DASHES):
         raise ValueError(f"at most {len(DASHES)} laws are drawn beside points, not {len(laws)}")
     for name, beside in laws.items():
         if len(beside) != len(points):
             raise ValueError(f"{name}: {len(beside)} laws do not stand beside {len(points)} points; give None where there is none")
+    return flights
 
 
 def _title(number: int, point: Point, width: int) -> str:

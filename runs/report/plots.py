@@ -70,7 +70,7 @@ def front_figure(
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
             if marked is not None:
                 _mark(ax, minimised(marked, goals) * signs, signs, (i, j))
-            _label(ax, goals, i, j)
+            ax.set(xlabel=better(goals[i]), ylabel=better(goals[j]))
         legend(figure, grid[0], "best" if len(pairs) == 1 else None)
     return figure
 
@@ -111,7 +111,7 @@ def attainment_figure(
             _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
             ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-            _label(ax, goals, 0, 1)
+            ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
             ax.set_title(_runs(solver, surface.runs, 0), loc="left")
             ax.legend(frameon=False, loc=_inside(signs))
@@ -170,9 +170,7 @@ def convergence_figure(
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
-        ax.set_xlim(0, last)
-        ax.set_xlabel(xlabel)
-        ax.set_ylabel(ylabel)
+        ax.set(xlim=(0, last), xlabel=xlabel, ylabel=ylabel)
         corner = "lower right" if larger else "upper right"
         legend(figure, ax, corner if inside else None, "median, quartiles")
     return figure
@@ -191,11 +189,6 @@ def _log_ticks(ax: Any, ratio: float) -> None:
 def _runs(solver: str, runs: int, empty: int) -> str:
     """MACS, 30 runs (2 empty)."""
     return f"{solver}, {runs} run{'' if runs == 1 else 's'}{f' ({empty} empty)' if empty else ''}"
-
-
-def _label(ax: Any, goals: Sequence[Objective], i: int, j: int) -> None:
-    ax.set_xlabel(better(goals[i]))
-    ax.set_ylabel(better(goals[j]))
 
 
 def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:

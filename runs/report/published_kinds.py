@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from macs.front import Front
 from problems.checks import unknown
 
 from ..data.schema import Number, Section, Text, check_known, errors_begin_with, is_number
@@ -174,11 +173,9 @@ class Objectives(Published, tag="objectives"):
     statistics: ClassVar[bool] = True
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        return {
-            solver: _statistics({goal.name: column for goal, column in zip(comparison.known.goals, values.T, strict=True)})
-            for solver, fronts in comparison.fronts.items()
-            if len(values := _together(fronts))
-        }
+        found = {solver: [front.objectives for front in fronts if len(front)] for solver, fronts in comparison.fronts.items()}
+        names = comparison.known.names
+        return {solver: _statistics(dict(zip(names, np.vstack(each).T, strict=True))) for solver, each in found.items() if each}
 
     def remark(self, comparison: Comparison) -> str:
         without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
@@ -269,11 +266,6 @@ class Feasibility(Published, tag="feasibility"):
 
 
 KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility
-
-
-def _together(fronts: Sequence[Front]) -> np.ndarray:
-    """Objectives (n, m) of all points, in the users' units and senses."""
-    return np.concatenate([front.objectives for front in fronts if len(front)] or [np.empty((0, 0))])
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
