@@ -120,11 +120,10 @@ def _problem(label: str, given: Any) -> Problem | CompiledProblem:
 
 def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, dict[str, Transcription]]:
     """Transcriptions by label, for each problem."""
-    if isinstance(given, Mapping) and set(given) & set(problems):
-        return {label: _named_schemes(one) for label, one in _by_problem("transcriptions", given, problems).items()}
-    if given is not None:
+    if isinstance(given, Mapping) and not set(given) & set(problems):
         return dict.fromkeys(problems, _named_schemes(given))
-    return {label: _named_schemes(_own("transcriptions", label, one, "default_transcription")) for label, one in problems.items()}
+    by_problem = _by_problem("transcriptions", given, problems, "default_transcription")
+    return {label: _named_schemes(one) for label, one in by_problem.items()}
 
 
 def _named_schemes(given: Any) -> dict[str, Transcription]:
@@ -152,17 +151,21 @@ def _solver(label: str, given: Any) -> Solver:
 
 
 def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, int]:
-    if given is None:
-        found = {label: _own("evaluations", label, one, "default_evaluations") for label, one in problems.items()}
-    else:
-        found = _by_problem("evaluations", given, problems) if isinstance(given, Mapping) else dict.fromkeys(problems, given)
+    found = _by_problem("evaluations", given, problems, "default_evaluations")
     for label, budget in found.items():
         check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
     return {label: int(budget) for label, budget in found.items()}
 
 
-def _by_problem(key: str, given: Mapping[str, Any], problems: Mapping[str, Any]) -> dict[str, Any]:
-    """A value for each problem, by labels."""
+def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledProblem], default: str) -> dict[str, Any]:
+    """A value for each problem: one for all, by labels, or if none is given the problem's attribute `default`."""
+    if given is None:
+        for label, problem in problems.items():
+            if isinstance(problem, CompiledProblem):
+                raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
+        return {label: getattr(problem, default) for label, problem in problems.items()}
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(problems, given)
     for label in given:
         if label not in problems:
             raise ValueError(f"{key}: there is no problem '{label}'; there are {', '.join(problems)}")
@@ -170,12 +173,6 @@ def _by_problem(key: str, given: Mapping[str, Any], problems: Mapping[str, Any])
         if label not in given:
             raise ValueError(f"{key}: none for problem '{label}'")
     return {label: given[label] for label in problems}
-
-
-def _own(key: str, label: str, problem: Problem | CompiledProblem, name: str) -> Any:
-    if isinstance(problem, CompiledProblem):
-        raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
-    return getattr(problem, name)
 
 
 def _pickled(place: str, *parts: Any) -> bytes:

@@ -79,9 +79,8 @@ class Flights:
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
-                source = front.source
-                named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
-                place = module_of(source.address) if source is not None and named else None
+                address = front.source.address if front.source is not None else ""
+                place = module_of(address) if address and not address.rpartition(":")[0].endswith(".py") else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(comparison, comparison.against, solver, points, many, place, laws, ends, note)

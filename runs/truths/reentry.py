@@ -202,11 +202,6 @@ def with_commands(flight: Trajectory, commands: np.ndarray) -> Trajectory:
     return replace(flight, phases=(replace(phase, control=control),))
 
 
-def volume(front: np.ndarray) -> float:
-    """Hypervolume in the paper's units, from the paper's corner, of objectives (k, 4) as the user sees them."""
-    return float(moocore.hypervolume(np.ascontiguousarray(front[:, :4] * SIGNS), ref=CORNER))
-
-
 def made(case: str, points: int) -> np.ndarray:
     """The table of a case; see the module."""
     truth = Truth(case)
@@ -264,13 +259,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Make the table of a re-entry case's true front again.")
     parser.add_argument("case", choices=CASES)
     parser.add_argument("--points", type=int, default=120)
-    parser.add_argument("--out", default=None)
+    parser.add_argument("--out")
     given = parser.parse_args()
     try:
         rows = made(given.case, given.points)
     except Unsolved as error:
         raise SystemExit(f"{given.case}: {error}; no table was written") from error
     write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
-    print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
+    volume = moocore.hypervolume(np.ascontiguousarray(rows[:, :4] * SIGNS), ref=CORNER)
+    print(f"{given.case}: {len(rows)} points, hypervolume {volume:.1f} in the paper's units, from the paper's corner")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
         print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")
