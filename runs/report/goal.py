@@ -116,9 +116,9 @@ class GoalAttainment:
     problem: str
     goal: Goal
     objective: Objective
-    histories: dict[tuple[str, str], list[History]]
-    simulated: dict[tuple[str, str], list[float]]
-    seconds: dict[tuple[str, str], list[float]]
+    histories: Mapping[tuple[str, str], Sequence[History]]
+    simulated: Mapping[tuple[str, str], Sequence[float]]
+    seconds: Mapping[tuple[str, str], Sequence[float]]
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
@@ -166,19 +166,20 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
     for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
         here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
-        objective = next(one for one in goals if one.name == goal.objective)
-        attained = GoalAttainment(problem, goal, objective, {}, {}, {})
+        histories: dict[tuple[str, str], list[History]] = {}
+        simulated: dict[tuple[str, str], list[float]] = {}
+        seconds: dict[tuple[str, str], list[float]] = {}
         for comparison in here:
             for solver, runs in comparison.runs.items():
                 cell, failed = (comparison.place(solver), solver), comparison.failures.get(solver, 0)
-                histories = [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
-                if histories:
-                    attained.histories[cell] = histories
-                    attained.seconds[cell] = [run.wall_time for run in runs]
-                if histories and verify is not None:
-                    attained.simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
-        if attained.histories:
-            found.append(attained)
+                known = [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
+                if known:
+                    histories[cell], seconds[cell] = known, [run.wall_time for run in runs]
+                if known and verify is not None:
+                    simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
+        if histories:
+            objective = next(one for one in goals if one.name == goal.objective)
+            found.append(GoalAttainment(problem, goal, objective, histories, simulated, seconds))
     return found
 
 

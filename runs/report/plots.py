@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from macs.fronts.style import COLORS, GREY, better
+from macs.io.text import counted
 from problems.compiled import Objective
 
 from ..measures.attainment import Attainment, staircase
@@ -188,7 +189,7 @@ def _log_ticks(ax: Any, ratio: float) -> None:
 
 def _runs(solver: str, runs: int, empty: int) -> str:
     """MACS, 30 runs (2 empty)."""
-    return f"{solver}, {runs} run{'' if runs == 1 else 's'}{f' ({empty} empty)' if empty else ''}"
+    return f"{solver}, {counted(runs, 'run')}{f' ({empty} empty)' if empty else ''}"
 
 
 def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:

@@ -272,7 +272,7 @@ def test_a_run_goes_on_where_it_was(tmp_path, damaged):
 
 SCRIPT = """
 import signal, sys
-# A shell that starts the tests in the background has it ignored, also here.
+# A shell that starts the tests in the background makes all its children ignore SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, {here!r})
 from test_study import slow
