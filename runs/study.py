@@ -20,7 +20,7 @@ from .execution.task import Payload, Task
 from .measures.references import ReferenceKey, check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
-from .report.published import check_against, papers
+from .report.published import check_against
 
 if TYPE_CHECKING:
     from .report.report import Report
@@ -138,7 +138,12 @@ class Study:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with errors_begin_with(f"study '{self.name}'"):
-            self._check_values()
+            for key in _KEYS:
+                if key.metadata["kind"] is not None:
+                    checked(getattr(self, key.name), key.metadata["kind"], key.name)
+            sampling(self.start)
+            if self.inner is not None:
+                check_inner(self.inner)
             combined, stated, solvers = combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
             )
@@ -291,15 +296,6 @@ class Study:
     def _terms(self, cell: Cell) -> dict[str, Any]:
         """The terms of a cell's runs: the problem's inner level and start where the study states none, and the solver's own."""
         return {**cell.terms, **self.terms.get(cell.solver, {})}
-
-    def _check_values(self) -> None:
-        for key in _KEYS:
-            if key.metadata["kind"] is not None:
-                checked(getattr(self, key.name), key.metadata["kind"], key.name)
-        sampling(self.start)
-        if self.inner is not None:
-            check_inner(self.inner)
-        papers(self.paper)
 
 
 _KEYS = tuple(one for one in fields(Study) if one.metadata)
