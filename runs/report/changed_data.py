@@ -126,7 +126,8 @@ class ChangedData:
             f"independent integrator; feasible: no limit is violated by more than {self.tolerance:g} of its scale. A shift is against "
             "the same point under the nominal data."
         ]
-        return table(heads, rows, f"The front of {self.nominal} under changed data.", [*notes, *self._notes()])
+        notes += [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
+        return table(heads, rows, f"The front of {self.nominal} under changed data.", notes)
 
     def _points(self) -> Table:
         heads: list[Column | str] = [*_WHOSE, Column("point", grouped=True), "data", "feasible", *_columns(self._goals)]
@@ -147,9 +148,6 @@ class ChangedData:
                 best = (front.F.min(axis=0) * signs).tolist() if len(front) else [None] * len(signs)
                 rows.append([one.transcription, one.solver, problem, len(front), *best])
         return table(heads, rows, "The best of each objective that was found under each data, all runs together.")
-
-    def _notes(self) -> list[str]:
-        return [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
 
 
 _WHOSE = (Column("transcription", grouped=True), Column("solver", grouped=True))

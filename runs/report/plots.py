@@ -101,6 +101,8 @@ def attainment_figure(
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
     margin = 0.04 * np.where(high > low, high - low, 1.0)
     ends = np.where(signs > 0, high + margin, low - margin)
+    # A front leaves the corner free where everything is worst.
+    corner = f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"
     columns = min(3, len(surfaces))
     rows = -(-len(surfaces) // columns)
     with style():
@@ -115,7 +117,7 @@ def attainment_figure(
             ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
             ax.set_title(_runs(solver, surface.runs, 0), loc="left")
-            ax.legend(frameon=False, loc=_inside(signs))
+            ax.legend(frameon=False, loc=corner)
         for ax in grid[len(surfaces) :]:
             ax.remove()
     return figure
@@ -226,8 +228,3 @@ def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -
     if "best" in drawn and "worst" in drawn:
         border = np.vstack([drawn["best"], drawn["worst"][::-1]])
         ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)
-
-
-def _inside(signs: np.ndarray) -> str:
-    """The corner that a front leaves free: where everything is worst."""
-    return f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"
