@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from transcription import Smooth
 
-from .batch import cells as combining
 from .batch import file as studyfile
-from .batch.cells import Cell
+from .batch.cells import Cell, combine
 from .batch.store import Store, StoredRun, Summary
 from .batch.terms import INNER, check_inner, sampling, written
 from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
@@ -21,7 +20,7 @@ from .execution.task import Payload, Task
 from .measures.references import ReferenceKey, check_reference
 from .report.changed_data import check as check_nominal
 from .report.goal import Goal
-from .report.published import check_against, papers
+from .report.published import check_against
 
 if TYPE_CHECKING:
     from .report.report import Report
@@ -139,14 +138,16 @@ class Study:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(f"study: name must be a word, not {self.name!r}")
         with errors_begin_with(f"study '{self.name}'"):
-            self._check_values()
-            combined = combining.combine(
+            for key in _KEYS:
+                if key.metadata["kind"] is not None:
+                    checked(getattr(self, key.name), key.metadata["kind"], key.name)
+            sampling(self.start)
+            if self.inner is not None:
+                check_inner(self.inner)
+            combined, stated, solvers = combine(
                 self.problems, self.transcriptions, self.solvers, self.evaluations, self.terms, self.inner, self.start
             )
-            asked = (self.goal, self.nominal, self.reference)
-            stated = combining.problems(combined) if self.paper or any(one is not None for one in asked) else {}
-            if self.paper:
-                check_against(self.paper, stated, combining.solvers(combined))
+            check_against(self.paper, stated, solvers)
             if self.reference is not None:
                 check_reference(self.reference, stated)
             if self.goal is not None:
@@ -216,9 +217,12 @@ class Study:
         KeyboardInterrupt
             Ctrl-C; the same again goes on.
         """
-        from .batch.running import execute
+        from .batch.running import check_workers, execute
 
-        return execute(out, self.definition(), self.runs, self._task, jobs=jobs, executor=executor, retry=retry, progress=progress)
+        check_workers(jobs, executor)
+        with Store.claim(out, self.definition()) as store:
+            execute(store, self.runs, self._task, jobs, executor, retry, progress)
+            return store.summary(self.runs)
 
     def status(self, out: str | PathLike[str]) -> Summary:
         """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""
@@ -292,15 +296,6 @@ class Study:
     def _terms(self, cell: Cell) -> dict[str, Any]:
         """The terms of a cell's runs: the problem's inner level and start where the study states none, and the solver's own."""
         return {**cell.terms, **self.terms.get(cell.solver, {})}
-
-    def _check_values(self) -> None:
-        for key in _KEYS:
-            if key.metadata["kind"] is not None:
-                checked(getattr(self, key.name), key.metadata["kind"], key.name)
-        sampling(self.start)
-        if self.inner is not None:
-            check_inner(self.inner)
-        papers(self.paper)
 
 
 _KEYS = tuple(one for one in fields(Study) if one.metadata)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import pickle
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,13 +33,14 @@ def combine(
     terms: Mapping[str, Mapping[str, Any]],
     inner: str | None,
     start: Any,
-) -> list[tuple[Cell, Payload]]:
-    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them.
+) -> tuple[list[tuple[Cell, Payload]], dict[str, CompiledProblem], dict[str, Solver]]:
+    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them; and the problems
+    and solvers by label.
 
     Parameters are those of `Study`. Raises ValueError that names the problem, transcription, solver or term that is wrong.
     """
-    stated = {label: _problem(label, given) for label, given in _labelled("problems", problems, _name_of_problem).items()}
-    methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers, _name_of_solver).items()}
+    stated = {label: _problem(label, given) for label, given in _labelled("problems", problems).items()}
+    methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers).items()}
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
@@ -49,54 +50,44 @@ def combine(
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
     combined = []
-    for label, problem in stated.items():
-        compiled = _compiled(label, problem)
+    compiled: dict[str, CompiledProblem] = {}
+    common = [one for one in methods if "transcription" not in terms.get(one, {})]
+    for label, statement in stated.items():
+        with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
+            problem = compiled[label] = statement.compile() if isinstance(statement, Problem) else statement
         with errors_begin_with(f"problems: '{label}'"):
-            theirs = terms_of_problem(problem, inner, start)
-        common = [one for one in methods if "transcription" not in terms.get(one, {})]
+            theirs = terms_of_problem(statement, inner, start)
+        # The place of its file is not part of what identifies a problem: a study may move.
+        identity = {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
-        offered += [
-            (name, scheme, [method_label])
-            for method_label in methods
-            if method_label not in common
-            for name, scheme in _named_schemes(terms[method_label]["transcription"]).items()
-        ]
+        for one in methods:
+            if one not in common:
+                offered += [(name, scheme, [one]) for name, scheme in _named_schemes(terms[one]["transcription"]).items()]
         for scheme_label, scheme, method_labels in offered:
-            stated_so = _pickled(f"{label}, {scheme_label}", compiled, scheme)
+            stated_so = _pickled(f"{label}, {scheme_label}", problem, scheme)
             for method_label in method_labels:
                 method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
                 budget = own_budgets.get(method_label, budgets)[label]
                 own |= {"evaluations": budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
                 with errors_begin_with(place):
-                    method.check_objectives(len(compiled.goals))
-                    method.check_transcription(scheme, compiled)
-                details = {"problem": _identity(compiled), "transcription": scheme.to_dict(), "solver": method.about()}
+                    method.check_objectives(len(problem.goals))
+                    method.check_transcription(scheme, problem)
+                details = {"problem": identity, "transcription": scheme.to_dict(), "solver": method.about()}
                 details |= {"terms": own} if own else {}
                 cell = Cell(label, scheme_label, method_label, budget, plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
-    return combined
+    return combined, compiled, methods
 
 
-def problems(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, CompiledProblem]:
-    """The problems of combined cells, by label."""
-    stated = {cell.problem: payload[0] for cell, payload in combined}
-    return {label: pickle.loads(payload)[0] for label, payload in stated.items()}
-
-
-def solvers(combined: Sequence[tuple[Cell, Payload]]) -> dict[str, Solver]:
-    """The solvers of combined cells, by label."""
-    return {label: pickle.loads(payload) for label, payload in {cell.solver: payload[1] for cell, payload in combined}.items()}
-
-
-def _labelled(key: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, Any]:
+def _labelled(key: str, given: Any) -> dict[str, Any]:
     """{label: one} for one, several, or a mapping of them."""
     if isinstance(given, Mapping):
         found = dict(given)
     else:
         found = {}
         for one in given if isinstance(given, list | tuple) else [given]:
-            label = name_of(one)
+            label = _label(one)
             if label in found:
                 raise ValueError(f"{key}: '{label}' is there twice; give each a label, {{label: ...}}")
             found[label] = one
@@ -108,25 +99,17 @@ def _labelled(key: str, given: Any, name_of: Callable[[Any], str]) -> dict[str, 
     return found
 
 
-def _name_of_problem(one: Any) -> str:
-    return one.name if isinstance(one, Problem | CompiledProblem) else str(one)
-
-
-def _name_of_solver(one: Any) -> str:
-    return type(one).__name__.lower() if isinstance(one, Solver) else str(one)
-
-
-def _name_of_scheme(one: Any) -> str:
-    """The label of a transcription: its word on the command line if it has one, so the same method always has the same label."""
-    if not isinstance(one, Transcription):
-        return str(one)
-    about = one.to_dict()
-    return word(one) or call(about["method"], about["settings"])
+def _label(one: Any) -> str:
+    """The label of a problem, solver or transcription. The latter's word, if it has one, so the same method always has the same label."""
+    if isinstance(one, Transcription):
+        about = one.to_dict()
+        return word(one) or call(about["method"], about["settings"])
+    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, Problem | CompiledProblem) else str(one)
 
 
 def _problem(label: str, given: Any) -> Problem | CompiledProblem:
-    data = dict(given) if isinstance(given, Mapping) else {}
-    name = data.pop("problem", None) if isinstance(given, Mapping) else given
+    data = dict(given) if isinstance(given, Mapping) else {"problem": given}
+    name = data.pop("problem", None)
     if isinstance(name, Problem | CompiledProblem) and not data:
         return name
     if not isinstance(name, str):
@@ -135,28 +118,16 @@ def _problem(label: str, given: Any) -> Problem | CompiledProblem:
         return load(name, **data)
 
 
-def _compiled(label: str, problem: Problem | CompiledProblem) -> CompiledProblem:
-    with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
-        return problem.compile() if isinstance(problem, Problem) else problem
-
-
-def _identity(problem: CompiledProblem) -> dict[str, Any]:
-    """The data that identify a problem. The place of its file is not among them: a study may move."""
-    return {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
-
-
 def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, dict[str, Transcription]]:
     """Transcriptions by label, for each problem."""
-    if isinstance(given, Mapping) and set(given) & set(problems):
-        return {label: _named_schemes(one) for label, one in _by_problem("transcriptions", given, problems).items()}
-    if given is not None:
-        common = _named_schemes(given)
-        return dict.fromkeys(problems, common)
-    return {label: _named_schemes(_own("transcriptions", label, one, "default_transcription")) for label, one in problems.items()}
+    if isinstance(given, Mapping) and not set(given) & set(problems):
+        return dict.fromkeys(problems, _named_schemes(given))
+    by_problem = _by_problem("transcriptions", given, problems, "default_transcription")
+    return {label: _named_schemes(one) for label, one in by_problem.items()}
 
 
 def _named_schemes(given: Any) -> dict[str, Transcription]:
-    return {label: _scheme(label, one) for label, one in _labelled("transcriptions", given, _name_of_scheme).items()}
+    return {label: _scheme(label, one) for label, one in _labelled("transcriptions", given).items()}
 
 
 def _scheme(label: str, given: Any) -> Transcription:
@@ -180,17 +151,21 @@ def _solver(label: str, given: Any) -> Solver:
 
 
 def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, int]:
-    if given is None:
-        found = {label: _own("evaluations", label, one, "default_evaluations") for label, one in problems.items()}
-    else:
-        found = _by_problem("evaluations", given, problems) if isinstance(given, Mapping) else dict.fromkeys(problems, given)
+    found = _by_problem("evaluations", given, problems, "default_evaluations")
     for label, budget in found.items():
         check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
     return {label: int(budget) for label, budget in found.items()}
 
 
-def _by_problem(key: str, given: Mapping[str, Any], problems: Mapping[str, Any]) -> dict[str, Any]:
-    """A value for each problem, by labels."""
+def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledProblem], default: str) -> dict[str, Any]:
+    """A value for each problem: one for all, by labels, or if none is given the problem's attribute `default`."""
+    if given is None:
+        for label, problem in problems.items():
+            if isinstance(problem, CompiledProblem):
+                raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
+        return {label: getattr(problem, default) for label, problem in problems.items()}
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(problems, given)
     for label in given:
         if label not in problems:
             raise ValueError(f"{key}: there is no problem '{label}'; there are {', '.join(problems)}")
@@ -198,12 +173,6 @@ def _by_problem(key: str, given: Mapping[str, Any], problems: Mapping[str, Any])
         if label not in given:
             raise ValueError(f"{key}: none for problem '{label}'")
     return {label: given[label] for label in problems}
-
-
-def _own(key: str, label: str, problem: Problem | CompiledProblem, name: str) -> Any:
-    if isinstance(problem, CompiledProblem):
-        raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
-    return getattr(problem, name)
 
 
 def _pickled(place: str, *parts: Any) -> bytes:
@@ -280,8 +249,7 @@ class Cell:
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data, for the study's record."""
-        names = {"problem": self.problem, "transcription": self.transcription, "solver": self.solver, "folder": self.folder}
-        return names | {"evaluations": self.evaluations, "details": dict(self.details)}
+        return {**vars(self), "folder": self.folder, "details": dict(self.details)}
 
     def _digest(self) -> bytes:
         return hashlib.sha256(json.dumps(self.labels).encode()).digest()

@@ -11,7 +11,7 @@ from typing import Any
 from problems.checks import unknown
 
 from ..data.addresses import check_trusted
-from ..data.schema import errors_begin_with
+from ..data.schema import check_known, errors_begin_with
 from ..measures.references import reference_addresses
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -54,9 +54,7 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
             raise ValueError("it is not a text file") from error
         except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise ValueError(f"it is not TOML: {error}") from error
-        for key in data:
-            if key not in keys:
-                raise ValueError(unknown("key", key, keys))
+        check_known("key", data, keys)
         for key, required in keys.items():
             if required and key not in data:
                 raise ValueError(f"{key} is missing")
@@ -69,10 +67,10 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
 
 def _addresses(data: Mapping[str, Any]) -> list[str]:
     """The addresses of code that a study file states: of its problems, and of references."""
-    problems, reference = data.get("problems"), data.get("reference")
+    problems = data["problems"]
     stated = problems.values() if isinstance(problems, Mapping) else problems if isinstance(problems, list) else [problems]
     addresses = [one.get("problem") if isinstance(one, Mapping) else one for one in stated]
-    return [one for one in addresses if isinstance(one, str)] + reference_addresses(reference)
+    return [one for one in addresses if isinstance(one, str)] + reference_addresses(data.get("reference"))
 
 
 def _find(source: str | PathLike[str]) -> Path:

@@ -12,10 +12,12 @@ Every file is written whole, all but checkpoints and samples by the process that
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -38,10 +40,10 @@ from .cells import Cell
 from .lock import locked
 
 MISSING, UNREADABLE = "missing", "unreadable"
-
-
 FORMAT, VERSION = "macs study", 2
 """Of study.json."""
+LONGEST, MOST = 200, 20
+"""Characters of a reason why a run failed, and number of reasons that a summary lists."""
 
 
 class Definition(msgspec.Struct):
@@ -155,13 +157,23 @@ class Summary:
     @property
     def cells(self) -> dict[Cell, tuple[StoredRun, ...]]:
         """Runs by cell."""
-        found: dict[str, list[StoredRun]] = {}
-        for run in self.runs:
-            found.setdefault(run.cell.folder, []).append(run)
-        return {runs[0].cell: tuple(runs) for runs in found.values()}
+        return {cell: tuple(runs) for cell, runs in groupby(self.runs, key=lambda run: run.cell)}
 
     def __str__(self) -> str:
-        return summary_text(self)
+        """A table of the cells, and why runs failed."""
+        rows, reasons = [], []
+        for cell, runs in self.cells.items():
+            times = [run.wall_time for run in runs if run.finished and run.wall_time]
+            counts = Counter("finished" if run.finished else "missing" if run.status == MISSING else "failed" for run in runs)
+            median = duration(float(np.median(times))) if times else "-"
+            rows.append([*cell.labels, *(str(counts[kind]) for kind in ("finished", "failed", "missing")), median])
+            failed = (run for run in runs if not run.finished and run.status != MISSING)
+            reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LONGEST] for run in failed]
+        headers = [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]]
+        lines = [f"{self.name}: {self.finished} of {len(self.runs)} runs finished", "", text_table(headers, rows, [True] * 3 + [False] * 4)]
+        lines += ["", *reasons[:MOST]] if reasons else []
+        lines += [f"and {len(reasons) - MOST} more"] if len(reasons) > MOST else []
+        return "\n".join(lines)
 
 
 class Store:
@@ -263,11 +275,11 @@ class Store:
 
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        path, record, status, message = self.front_path(cell, number), RunRecord(), UNREADABLE, ""
+        path, record, status, message = self.path / cell.folder / f"{number:04d}.nc", RunRecord(), UNREADABLE, ""
         try:
-            record = self._record(cell, number)
+            record = _record(path.with_suffix(".json"))
             if path.exists():
-                self._check_front(path, record)
+                _check_front(path, record)
         except (ValueError, OSError) as error:
             message = str(error)
         else:
@@ -291,28 +303,18 @@ class Store:
         """The state of the study, with the runs that were asked for or `count` of each cell."""
         return Summary(self.definition["name"], self.path, tuple(self.runs(count)))
 
-    def front_path(self, cell: Cell, number: int) -> Path:
-        """Path of the front of a run."""
-        return self.path / cell.folder / f"{number:04d}.nc"
-
-    def record_path(self, cell: Cell, number: int) -> Path:
-        """Path of the record of a run."""
-        return self.path / cell.folder / f"{number:04d}.json"
-
-    def checkpoint_path(self, cell: Cell, number: int) -> Path:
-        """Where a run is kept while it lasts, in a folder that is there. It has the study's own path, wherever the process may be."""
-        path = self.front_path(cell, number).with_suffix(".checkpoint").absolute()
+    def checkpoint_path(self, run: StoredRun) -> Path:
+        """Where a run is kept while it lasts, in a folder that is made. The path is absolute, as its process may be in another folder."""
+        path = run.path.with_suffix(".checkpoint").absolute()
         path.parent.mkdir(exist_ok=True)
         return path
 
-    def keep(self, cell: Cell, number: int, outcome: Outcome) -> None:
+    def keep(self, run: StoredRun, outcome: Outcome) -> None:
         """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
         cannot be written."""
-        front, record, checkpoint = self.front_path(cell, number), self.record_path(cell, number), self.checkpoint_path(cell, number)
-        content = {"status": outcome.status, "message": outcome.message, "traceback": outcome.traceback, "wall_time": outcome.wall_time}
-        content |= {"history": outcome.history, "simulated": outcome.simulated}
-        content |= {"front": crc32(outcome.front)} if outcome.status == FINISHED else {}
-        write_whole(record, records.to_bytes(content))
+        front, checkpoint = run.path, self.checkpoint_path(run)
+        checksum = crc32(outcome.front) if outcome.status == FINISHED else None
+        write_whole(front.with_suffix(".json"), records.to_bytes({**vars(outcome), "front": checksum}))
         if outcome.status == FINISHED:
             if front.exists():
                 # It could not be read, but it is the user's to delete.
@@ -321,23 +323,22 @@ class Store:
             for path in (checkpoint, samples_path(checkpoint)):
                 path.unlink(missing_ok=True)
 
-    def _record(self, cell: Cell, number: int) -> RunRecord:
-        """The record of a run. Raises ValueError or OSError if it cannot be read."""
-        path = self.record_path(cell, number)
-        try:
-            with errors_begin_with(f"its record '{path}' is damaged"):
-                found: RunRecord = checked(records.from_bytes(path.read_bytes()), RunRecord)
-                return found
-        except FileNotFoundError:
-            return RunRecord()
 
-    def _check_front(self, path: Path, record: RunRecord) -> None:
-        """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
-        loaded."""
-        if record.status == MISSING:
-            Front.load(path)
-        elif crc32(path.read_bytes()) != record.front:
-            raise ValueError(f"'{path}' is damaged: its content is not what was written")
+def _record(path: Path) -> RunRecord:
+    """The record of a run. Raises ValueError or OSError if it cannot be read."""
+    if not path.exists():
+        return RunRecord()
+    with errors_begin_with(f"its record '{path}' is damaged"):
+        return checked(records.from_bytes(path.read_bytes()), RunRecord)
+
+
+def _check_front(path: Path, record: RunRecord) -> None:
+    """Raise ValueError or OSError unless a front is the one of its record; without a record, unless it can be read. Its problem is not
+    loaded."""
+    if record.status == MISSING:
+        Front.load(path)
+    elif crc32(path.read_bytes()) != record.front:
+        raise ValueError(f"'{path}' is damaged: its content is not what was written")
 
 
 def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "") -> str:
@@ -352,35 +353,6 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "
         elif first != second:
             return f"{name} is {json.dumps(first)} there and {json.dumps(second)} here"
     return ""
-
-
-LINE = 200
-"""Longest reason, in characters."""
-
-
-WORTH = 20
-"""Most failures listed one by one."""
-
-
-def summary_text(summary: Summary) -> str:
-    """A table of the cells, and why runs failed."""
-    rows, reasons = [], []
-    for cell, runs in summary.cells.items():
-        finished = [run for run in runs if run.finished]
-        times = [run.wall_time for run in finished if run.wall_time]
-        missing = sum(run.status == "missing" for run in runs)
-        failed = len(runs) - len(finished) - missing
-        rows.append([*cell.labels, str(len(finished)), str(failed), str(missing), duration(float(np.median(times))) if times else "-"])
-        for run in runs:
-            if not run.finished and run.status != "missing":
-                reasons.append(f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LINE])
-    more = [f"and {len(reasons) - WORTH} more"] if len(reasons) > WORTH else []
-    table = text_table(
-        [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]], rows, [True] * 3 + [False] * 4
-    )
-    headline = f"{summary.name}: {summary.finished} of {len(summary.runs)} runs finished"
-    failures = ["", *reasons[:WORTH], *more] if reasons else []
-    return "\n".join([headline, "", table, *failures])
 
 
 def reason(status: str, message: str) -> str:

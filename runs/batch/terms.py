@@ -8,12 +8,11 @@ from typing import Any
 
 from macs.solvers.start import drawing
 from problems import Problem
-from problems.checks import unknown
 from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED
 
-from ..data.schema import Section, checked, errors_begin_with
+from ..data.schema import Section, check_known, checked, errors_begin_with
 
 INNER = "auto"
 """The inner level where none is stated."""
@@ -64,16 +63,13 @@ def terms_of_problem(problem: Problem | CompiledProblem, inner: str | None, star
 
 def check_inner(inner: Any) -> None:
     """Raise ValueError unless there is an inner level of this name."""
-    if inner not in NAMED:
-        raise ValueError(unknown("inner level", inner, NAMED))
+    check_known("inner level", [inner], NAMED)
 
 
 def sampling(start: Any) -> Smooth | str | None:
     """The argument `start` of `solve`. Raises ValueError if there is no such start."""
     if isinstance(start, Mapping):
-        for key in start:
-            if key not in Smooth.__dataclass_fields__:
-                raise ValueError(unknown("setting of start", key, Smooth.__dataclass_fields__))
+        check_known("setting of start", start, Smooth.__dataclass_fields__)
         return Smooth(**start)
     found = drawing(start)
     if found is None and start is not None:

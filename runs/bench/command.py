@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
 from . import inner, population, search, study
 from .measured import Row, save
 
-KINDS = ("inner", "population", "search", "study")
-REPORTS: Mapping[str, Callable[[Sequence[Row]], str]] = {
-    "inner": inner.report,
-    "population": population.report,
-    "search": search.report,
-    "study": study.report,
-}
+BENCHMARKS = {"inner": inner, "population": population, "search": search, "study": study}
+KINDS = tuple(BENCHMARKS)
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
@@ -28,7 +23,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
         ended = _run(kind, rows, quick)
         measured += [(kind, row) for row in rows]
         if rows:
-            print(REPORTS[kind](rows), end="\n\n", flush=True)
+            print(BENCHMARKS[kind].report(rows), end="\n\n", flush=True)
         if ended:
             print("interrupted: these are the values measured until then", file=sys.stderr)
             break

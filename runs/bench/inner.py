@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -148,24 +150,15 @@ def _quality(result: InnerResult, exact: InnerResult | None, ranges: np.ndarray)
         "iterations": float(result.iterations.mean()),
         "fallbacks": result.fallbacks / len(good),
     }
-    both = good & (exact.status == CONVERGED) if exact is not None else np.zeros(len(good), dtype=bool)
-    if exact is not None and both.any():
+    if exact is not None and (both := good & (exact.status == CONVERGED)).any():
         off = np.abs((result.F - exact.F)[both] / ranges).max(axis=1)
         values |= {"off, median": float(np.median(off)), "off, largest": float(off.max())}
     return values
 
 
-@contextmanager
-def compiling(when: str) -> Iterator[None]:
-    """Within, Functions that are made are compiled at once ("always"), or never ("0")."""
-    before = os.environ.get("MACS_COMPILE")
-    os.environ["MACS_COMPILE"] = when
-    try:
-        yield
-    finally:
-        os.environ.pop("MACS_COMPILE")
-        if before is not None:
-            os.environ["MACS_COMPILE"] = before
+def compiling(when: str) -> AbstractContextManager[Any]:
+    """A context in which Functions that are made are compiled at once ("always"), or never ("0")."""
+    return patch.dict(os.environ, MACS_COMPILE=when)
 
 
 def report(rows: Sequence[Row]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import timeit
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -41,10 +41,10 @@ def bench_population(rows: list[Row], effort: Effort) -> None:
     problem, method = load(CASE), parse(effort.method)
     X = Smooth().draw(problem, method, effort.candidates, np.random.default_rng(0))
     case = f"{CASE}, {effort.method}, {effort.candidates} candidates"
-    plain = _flier(method, "0")
+    plain = _propagator(method, "0")
     contenders: dict[str, Callable[[], None]] = {SINGLY: lambda: [plain(x[None]) for x in X][-1], TOGETHER: lambda: plain(X)}
     if compiler():
-        quick = _flier(method, "always")
+        quick = _propagator(method, "always")
         contenders[COMPILED] = lambda: quick(X)
     found = {who: Row(case, who) for who in contenders}
     with Steps("populations", effort.rounds + 1) as steps:
@@ -53,14 +53,14 @@ def bench_population(rows: list[Row], effort: Effort) -> None:
             work()  # functions are made
         for i in range(effort.rounds):
             steps.begin(f"round {i + 1}")
-            seconds = {who: min(_timed(work) for _ in range(effort.calls)) for who, work in contenders.items()}
+            seconds = {who: min(timeit.repeat(work, number=1, repeat=effort.calls)) for who, work in contenders.items()}
             for who, taken in seconds.items():
                 found[who].add(speed=seconds[SINGLY] / taken, candidates=effort.candidates / taken)
             if i == 0:
                 rows += found.values()
 
 
-def _flier(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
+def _propagator(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
     """The function that propagates candidates (k, d), compiled or not, see `compiling`."""
     with compiling(when):
         nlp = method.transcribe(load(CASE))
@@ -70,12 +70,6 @@ def _flier(method: Transcription, when: str) -> Callable[[np.ndarray], None]:
             Propagate().solve(nlp, candidates)
 
     return propagate
-
-
-def _timed(work: Callable[[], None]) -> float:
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
 
 
 def report(rows: Sequence[Row]) -> str:

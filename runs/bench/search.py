@@ -70,16 +70,8 @@ def _measure(case: Search, seed: int, evaluations: int, reference: np.ndarray, p
     union = np.vstack([ours.F, theirs.F])
     volumes = [hypervolume(front.F, union) for front in (ours, theirs)]
     for row, front, ratio in zip(pair, (ours, theirs), (volumes[0] / volumes[1], 1.0), strict=True):
-        stats = front.stats
-        row.add(
-            ratio=ratio,
-            gd=gd(front, reference),
-            igd=igd(front, reference),
-            points=len(front),
-            evaluations=stats["evaluations"],
-            gradient_solves=stats["gradient_solves"],
-            seconds=stats["wall_time"],
-        )
+        row.add(ratio=ratio, gd=gd(front, reference), igd=igd(front, reference), points=len(front))
+        row.add(**{key: front.stats[key] for key in ("evaluations", "gradient_solves")}, seconds=front.stats["wall_time"])
 
 
 def _sweeps(problem: Problem, method: Transcription, seconds: float, seed: int, steps: Steps) -> Front:

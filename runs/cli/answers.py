@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 """Exit codes: done; failed (nothing feasible, a check not passed, runs missing); the call was wrong; Ctrl-C."""
@@ -12,12 +13,10 @@ class WrongCall(Exception):  # noqa: N818 - a message to the user in one line
     """The user's call is wrong. The text is the reason, in the user's words."""
 
 
-class wrong_call_on_value_error:  # noqa: N801 - reads as a statement
+@contextmanager
+def wrong_call_on_value_error() -> Iterator[None]:
     """A context in which a ValueError becomes a `WrongCall`."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, ValueError):
-            raise WrongCall(str(error)) from error
+    try:
+        yield
+    except ValueError as error:
+        raise WrongCall(str(error)) from error

@@ -12,6 +12,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NoReturn
 
 from .answers import DONE, INTERRUPTED, WRONG, WrongCall
@@ -232,19 +233,7 @@ def _unknown_option(word: str, parser: Parser) -> str:
     return f"unknown argument '{word}'; there are {', '.join(options)}"
 
 
-def _positive(text: str) -> int:
-    return _number(text, int, "a whole number above 0", lambda value: value > 0)
-
-
-def _natural(text: str) -> int:
-    return _number(text, int, "a whole number, 0 or above", lambda value: value >= 0)
-
-
-def _tolerance(text: str) -> float:
-    return _number(text, float, "a number above 0", lambda value: 0 < value < float("inf"))
-
-
-def _number(text: str, kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool]) -> Any:
+def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], text: str) -> Any:
     try:
         value = kind(text)
     except ValueError:
@@ -252,3 +241,8 @@ def _number(text: str, kind: Callable[[str], Any], name: str, fits: Callable[[An
     if value is None or not fits(value):
         raise argparse.ArgumentTypeError(f"'{text}' is not {name}")
     return value
+
+
+_positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
+_natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
+_tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))

@@ -7,7 +7,7 @@ import math
 import re
 import sys
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -126,6 +126,13 @@ def plain(data: Any) -> Any:
         return one.tolist() if hasattr(one, "tolist") else dict(one) if isinstance(one, Mapping) else repr(one)
 
     return json.loads(json.dumps(data, default=converted))
+
+
+def check_known(kind: str, words: Iterable[Any], known: Collection[str]) -> None:
+    """Raise ValueError that names the first of some words which is not known."""
+    for word in words:
+        if word not in known:
+            raise ValueError(unknown(kind, word, known))
 
 
 def is_number(value: Any) -> bool:

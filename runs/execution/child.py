@@ -108,7 +108,8 @@ class Child:
         code = self._reap()
         reason = f"its process ended with exit code {code}"
         if code < 0:
-            reason = f"its process was killed by {_signal(-code)}{', perhaps for want of memory' if code == -signal.SIGKILL else ''}"
+            name = next((one.name for one in signal.Signals if one == -code), f"signal {-code}")
+            reason = f"its process was killed by {name}{', perhaps for want of memory' if code == -signal.SIGKILL else ''}"
         return Outcome(KILLED, reason, self._text(), wall_time=seconds)
 
     def _reap(self) -> int:
@@ -151,13 +152,6 @@ def _listen(channel: Any, inbox: queue.SimpleQueue[Any]) -> None:
             inbox.put(pickle.load(channel))
     except Exception:  # whatever a process's last, half word provokes: it is gone
         inbox.put(None)
-
-
-def _signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
 
 
 _own = threading.local()

@@ -80,11 +80,6 @@ class Samples:
         self.columns["elapsed"].append(float(elapsed))
         self.columns["F"].append(F.tolist())
 
-    @property
-    def history(self) -> History:
-        """The columns."""
-        return History(**self.columns)  # type: ignore[typeddict-item]
-
     def _take_up(self, evaluations: int) -> None:
         """Take over, at the first call, the stored samples before this count."""
         if self._before is None:

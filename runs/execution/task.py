@@ -7,6 +7,7 @@ import os
 import pickle
 import time
 import traceback
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from macs.solvers.checkpoint import Unreadable, keeps
 
 from ..measures.simulation_record import SimulationRecord, record
-from .samples import History, Report, Samples
+from .samples import Report, Samples
 
 if TYPE_CHECKING:
     from macs.front import Front
@@ -74,7 +75,7 @@ class Outcome:
     traceback: str = field(default="", repr=False)
     front: bytes = field(default=b"", repr=False)
     wall_time: float = 0.0
-    history: History = field(default_factory=History, repr=False)
+    history: Mapping[str, Any] = field(default_factory=dict, repr=False)
     simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 
@@ -95,7 +96,7 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         # The front alone knows the time before the run was resumed.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
         found = _simulated(task, front)
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.history, simulated=found)
+        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, simulated=found)
     except Exception as error:
         status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
@@ -142,8 +143,5 @@ def _simulated(task: Task, front: Front) -> SimulationRecord:
         return {}
 
 
-@lru_cache(maxsize=8)
-def _unpacked(payload: bytes) -> tuple[Any, Any]:
-    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
-    problem, scheme = pickle.loads(payload)
-    return problem, scheme
+_unpacked = lru_cache(maxsize=8)(pickle.loads)
+"""Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""

@@ -7,20 +7,10 @@ import queue
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 from .child import Child, perform_apart
 from .task import Outcome, Report, Task
-
-
-class Workers(Protocol):
-    """The interface that `runs.batch.running` uses."""
-
-    def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """The outcome of a run, in the future; `report` is called with its progress, where that is known."""
-
-    def stop(self) -> None:
-        """End all work now, as far as possible."""
 
 
 class LocalWorkers:
@@ -34,11 +24,11 @@ class LocalWorkers:
         self._threads = ThreadPoolExecutor(jobs, thread_name_prefix="run")
 
     def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """See `Workers`."""
+        """The outcome of a run, in the future; `report` is called with its progress."""
         return self._threads.submit(self._perform, task, report)
 
     def stop(self) -> None:
-        """See `Workers`."""
+        """End all work now."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         for child in self._children:
             child.close()
@@ -61,7 +51,7 @@ class ExecutorWorkers:
         self._futures: list[Any] = []
 
     def submit(self, task: Task, report: Report) -> Future[Outcome]:
-        """See `Workers`; `report` is not called."""
+        """The outcome of a run, in the future; `report` is not called."""
         future = self._submit(perform_apart, task)
         self._futures.append(future)
         return future

@@ -15,7 +15,7 @@ import numpy as np
 
 from macs.front import Front
 
-from .indicators import Points, minimised
+from .indicators import Points, goals_of, minimised
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +43,6 @@ class Attainment:
             raise ValueError(f"surfaces are of 1 to {self.runs} runs, not of {k}")
         return self.levels[k] * self.signs
 
-    def percent(self, share: float) -> np.ndarray:
-        """Corners (p, m) of the surface that at least `share` per cent of the runs attain, 0 < share <= 100."""
-        return self.of(self.count(share))
-
-    def count(self, share: float) -> int:
-        """The number of runs that `share` per cent are, rounded up."""
-        if not 0 < share <= 100:
-            raise ValueError(f"a share of the runs is more than 0 and at most 100 per cent, not {share}")
-        return max(1, int(np.ceil(share * self.runs / 100 - 1e-9)))
-
     @property
     def best(self) -> np.ndarray:
         """Corners of the surface that any run attains."""
@@ -61,7 +51,7 @@ class Attainment:
     @property
     def median(self) -> np.ndarray:
         """Corners of the surface that half of the runs attain."""
-        return self.percent(50)
+        return self.of(-(-self.runs // 2))
 
     @property
     def worst(self) -> np.ndarray:
@@ -83,15 +73,16 @@ def attainment(fronts: Sequence[Points]) -> Attainment:
     ValueError
         If there is no run, none with a point, or they differ in objectives or have other than two or three.
     """
-    known = next((front for front in fronts if isinstance(front, Front)), None)
-    rows = [minimised(front, known, f"front {i}") for i, front in enumerate(fronts)]
+    goals = goals_of(fronts)
+    rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
     filled = [part for part in rows if part.size]
     if not rows:
         raise ValueError("there is no run to take attainment surfaces of")
     for i, front in enumerate(fronts):
-        if isinstance(front, Front) and known is not None and front.goals != known.goals:
-            raise ValueError(f"front {i} has other objectives ({', '.join(front.names)}) than the first ({', '.join(known.names)})")
-    widths = {part.shape[1] for part in filled} | ({len(known.goals)} if known is not None else set())
+        if isinstance(front, Front) and goals and front.goals != goals:
+            names = ", ".join(goal.name for goal in goals)
+            raise ValueError(f"front {i} has other objectives ({', '.join(front.names)}) than the first ({names})")
+    widths = {part.shape[1] for part in filled} | ({len(goals)} if goals else set())
     if not widths:
         raise ValueError("no run has a point: without one, the number of objectives is not known")
     if len(widths) > 1 or not widths <= {2, 3}:
@@ -100,7 +91,7 @@ def attainment(fronts: Sequence[Points]) -> Attainment:
     return Attainment(
         runs=len(rows),
         levels=_surfaces(filled, len(rows), m),
-        signs=np.array([goal.sign for goal in known.goals]) if known is not None else np.ones(m),
+        signs=np.array([goal.sign for goal in goals]) if goals else np.ones(m),
     )
 
 

@@ -11,7 +11,7 @@ the points, and `igd` and `igd_plus` weigh each piece of the curve by its length
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import moocore
 import numpy as np
@@ -19,11 +19,14 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.pareto.dominance import nondominated
+from problems.compiled import Objective
 
 JOINED = 0.02
 """Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
 SAMPLES = 2001
 """Number of points, evenly along its length, that represent such a reference."""
+POINT = 1.1
+"""Corner of the hypervolume in each objective, in ranges of the reference from its ideal."""
 
 Points = Front | np.ndarray
 
@@ -59,7 +62,7 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
     return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
 
-def hypervolume(front: Points, reference: Points, *, point: float = 1.1, normalise: bool = True) -> float:
+def hypervolume(front: Points, reference: Points, *, point: float = POINT, normalise: bool = True) -> float:
     """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
 
     With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
@@ -99,13 +102,13 @@ def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.nda
     return (F - lower) / unit, (reference - lower) / unit
 
 
-def minimised(points: Points, known: Front | None, name: str = "the front") -> np.ndarray:
-    """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of the front `known`, if any.
+def minimised(points: Points, goals: Sequence[Objective] | None, name: str = "the front") -> np.ndarray:
+    """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of `goals`, if any.
 
     Raises
     ------
     ValueError
-        For an array that is not (n, m), has another number of objectives than `known`, or has NaN or infinite values.
+        For an array that is not (n, m), has another number of objectives than `goals`, or has NaN or infinite values.
     """
     if isinstance(points, Front):
         return points.F[points.status == CONVERGED]
@@ -116,17 +119,22 @@ def minimised(points: Points, known: Front | None, name: str = "the front") -> n
     if len(bad):
         raise ValueError(f"row {bad[0]} of {name} is not finite: {rows[bad[0]].tolist()}; a failed point is no point of a front")
     if not rows.size:
-        return rows if known is None else np.empty((0, len(known.goals)))
-    if known is None:
+        return rows if goals is None else np.empty((0, len(goals)))
+    if goals is None:
         return rows
-    if rows.shape[1] != len(known.goals):
-        raise ValueError(f"{name} has {rows.shape[1]} objectives, the other {len(known.goals)}: {', '.join(known.names)}")
-    return rows * [goal.sign for goal in known.goals]
+    if rows.shape[1] != len(goals):
+        raise ValueError(f"{name} has {rows.shape[1]} objectives, the other {len(goals)}: {', '.join(goal.name for goal in goals)}")
+    return rows * [goal.sign for goal in goals]
 
 
-def truth(reference: Points, known: Front | None = None) -> np.ndarray:
+def goals_of(points: Iterable[Points]) -> tuple[Objective, ...] | None:
+    """The objectives of the first Front; None if all are arrays."""
+    return next((one.goals for one in points if isinstance(one, Front)), None)
+
+
+def truth(reference: Points, goals: Sequence[Objective] | None = None) -> np.ndarray:
     """Minimised objectives (k, m) of a reference, without dominated points, in the order of the first objective."""
-    R = minimised(reference, known, "the reference")
+    R = minimised(reference, goals, "the reference")
     if not len(R):
         raise ValueError("the reference has no points")
     R = R[nondominated(R)]
@@ -135,8 +143,8 @@ def truth(reference: Points, known: Front | None = None) -> np.ndarray:
 
 def _pair(front: Points, reference: Points, normalise: bool) -> tuple[np.ndarray, np.ndarray]:
     """Minimised objectives of both, (n, m) and (k, m)."""
-    known = next((points for points in (front, reference) if isinstance(points, Front)), None)
-    F, R = minimised(front, known), truth(reference, known)
+    goals = goals_of((front, reference))
+    F, R = minimised(front, goals), truth(reference, goals)
     if len(F) and F.shape[1] != R.shape[1]:
         raise ValueError(f"the front has {F.shape[1]} objectives, the reference {R.shape[1]}")
     return normalised(F, R) if normalise and len(F) else (F, R)

@@ -19,10 +19,10 @@ from macs.front import Front
 from macs.fronts.style import label
 from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
-from problems.checks import unknown
 from problems.compiled import Objective
 
-from .indicators import Points, minimised
+from ..data.schema import check_known, errors_begin_with
+from .indicators import Points, goals_of, minimised
 
 if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
@@ -54,17 +54,17 @@ def union(fronts: Sequence[Points]) -> Points:
     """
     if not len(fronts):
         raise ValueError("there is no front to take the union of")
-    known = next((front for front in fronts if isinstance(front, Front)), None)
+    goals = goals_of(fronts)
     own = [front for front in fronts if isinstance(front, Front)]
     if len(own) == len(fronts):
         return Front.merge(own)
-    rows = [minimised(front, known, f"front {i}") for i, front in enumerate(fronts)]
+    rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
     widths = {part.shape[1] for part in rows if part.size}
     if len(widths) > 1:
         raise ValueError(f"the fronts differ in the number of their objectives: {sorted(widths)}")
     F = np.vstack([part for part in rows if part.size] or [rows[0]])
     F = F[nondominated(F)]
-    return F if known is None else foreign(F * [goal.sign for goal in known.goals], known.goals)
+    return F if goals is None else foreign(F * [goal.sign for goal in goals], goals)
 
 
 def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "foreign") -> Front:
@@ -261,9 +261,8 @@ def reference_addresses(given: Any) -> list[str]:
 
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
-    for name in given if isinstance(given, Mapping) else stated:
-        if name not in stated:
-            raise ValueError(f"reference: {unknown('problem', name, stated)}")
+    with errors_begin_with("reference"):
+        check_known("problem", given if isinstance(given, Mapping) else (), stated)
     for name, problem in stated.items():
         try:
             look_up(given, name, problem.address, problem.data, problem.goals)

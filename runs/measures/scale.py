@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from macs.front import Front
+from problems.compiled import Objective
 
-from .indicators import Points, extent, pieces, truth
+from .indicators import POINT, Points, extent, goals_of, pieces, truth
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,7 @@ class Scale:
         Best and worst value of each objective on the reference, dominated points left out.
     corner : tuple of m floats
         The reference point of the hypervolume.
-    point : float
-        The same in ranges of the reference from its ideal, as `hypervolume` has it.
-    names, units : tuples of m str
+    goals : tuple of m Objectives
     what : str
         Name of the reference: "the closed form", "the union of 60 runs".
     count : int
@@ -36,39 +34,29 @@ class Scale:
     ideal: tuple[float, ...]
     nadir: tuple[float, ...]
     corner: tuple[float, ...]
-    point: float
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    goals: tuple[Objective, ...]
     what: str
     count: int
     curve: bool = False
 
     @staticmethod
-    def of(
-        reference: Points,
-        *,
-        like: Front | None = None,
-        what: str = "the reference",
-        point: float = 1.1,
-        curve: bool = True,
-    ) -> Scale:
+    def of(reference: Points, *, goals: Sequence[Objective] | None = None, what: str = "the reference", curve: bool = True) -> Scale:
         """The normalisation by a reference that the indicators of `runs.measures.indicators` use.
 
         Parameters
         ----------
         reference : Front or array (k, m)
-        like : Front, optional
-            One of the fronts that are measured against it: it has names, units and senses where the reference is an array. Without it all
-            columns are minimised.
+        goals : m Objectives, optional
+            Names, units and senses where the reference is an array. Without them all columns are minimised.
         what : str
             Name of the reference, for captions.
-        point, curve
-            As the indicators were given them.
+        curve : bool
+            As the indicators were given it.
         """
-        known = reference if isinstance(reference, Front) else like
-        R = truth(reference, known)
-        m = R.shape[1]
-        sign = np.array([goal.sign for goal in known.goals]) if known is not None else np.ones(m)
+        goals = goals_of([reference]) or goals
+        R = truth(reference, goals)
+        goals = goals or [Objective(f"objective {i + 1}") for i in range(R.shape[1])]
+        sign = np.array([goal.sign for goal in goals])
         ideal, unit = extent(R)
 
         def shown(values: np.ndarray) -> tuple[float, ...]:
@@ -77,10 +65,8 @@ class Scale:
         return Scale(
             ideal=shown(ideal),
             nadir=shown(R.max(axis=0)),
-            corner=shown(ideal + point * unit),
-            point=point,
-            names=known.names if known is not None else tuple(f"objective {i + 1}" for i in range(m)),
-            units=known.units if known is not None else ("",) * m,
+            corner=shown(ideal + POINT * unit),
+            goals=tuple(goals),
             what=what,
             count=len(R),
             curve=curve and bool(pieces(R)),
@@ -91,13 +77,8 @@ class Scale:
         how = ", the curve through them" if self.curve else ""
         points = f"{self.what} ({self.count} point{'' if self.count == 1 else 's'}{how})"
         ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
-        volume = f"Hypervolume up to {self.point:g} in each objective ({self._all(self.corner)})."
+        volume = f"Hypervolume up to {POINT:g} in each objective ({self._all(self.corner)})."
         return f"Objectives normalised to {ends} of {points}. {volume}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, for a file beside the numbers."""
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
-
     def _all(self, values: tuple[float, ...]) -> str:
-        cells = zip(self.names, values, self.units, strict=True)
-        return ", ".join(f"{name} {value:.6g}{f' {unit}' if unit else ''}" for name, value, unit in cells)
+        return ", ".join(f"{goal.name} {value:.6g} {goal.unit}".rstrip() for goal, value in zip(self.goals, values, strict=True))

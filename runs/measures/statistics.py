@@ -8,7 +8,7 @@ Every test is of ranks, two-sided. Smaller values are better, unless `larger` is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import comb
 
@@ -29,12 +29,11 @@ class Summary:
     count, failures : int
         Runs, and how many of them failed.
     mean, variance : float
-        Of the runs that did not fail; variance with divisor n - `ddof`. NaN where there are too few.
+        Of the runs that did not fail; variance with divisor n - 1. NaN where there are too few.
     median, lower, upper : float
         Median and quartiles (linear between values) of all runs, failed ones last: infinite where a failed one stands there.
     best, worst : float
         The worst is infinite if any run failed.
-    ddof : int
     """
 
     count: int
@@ -46,7 +45,6 @@ class Summary:
     upper: float
     best: float
     worst: float
-    ddof: int
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class PairTest:
 
     Attributes
     ----------
-    first, second, test : str
+    first, second : str
     statistic, p, p_holm : float
         Of the test, and p after Holm's correction for all pairs that were compared.
     a12 : float
@@ -68,7 +66,6 @@ class PairTest:
 
     first: str
     second: str
-    test: str
     statistic: float
     p: float
     p_holm: float
@@ -81,30 +78,27 @@ class PairTest:
 class Overall:
     """Several solvers on one indicator: whether any differs, and their average ranks, 1 being the best."""
 
-    test: str
     statistic: float
     p: float
     ranks: Mapping[str, float]
 
 
-def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False, ddof: int = 1) -> Summary:
-    """The numbers of a sample (n,), n >= 1; see `Summary`. One run has a mean, but no variance with `ddof=1`."""
+def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False) -> Summary:
+    """The numbers of a sample (n,), n >= 1; see `Summary`. One run has a mean, but no variance."""
     costs = _costs(values, larger, "the sample")
     sign = -1.0 if larger else 1.0
     good = sign * costs[np.isfinite(costs)]
-    variance = float(good.var(ddof=ddof)) if len(good) > ddof else np.nan
-    quartiles = sorted(sign * _quantile(costs, share) for share in (0.25, 0.75))
+    lower, upper = sorted(sign * _quantile(costs, share) for share in (0.25, 0.75))
     return Summary(
         count=len(costs),
         failures=len(costs) - len(good),
         mean=float(good.mean()) if len(good) else np.nan,
-        variance=variance,
+        variance=float(good.var(ddof=1)) if len(good) > 1 else np.nan,
         median=sign * _quantile(costs, 0.5),
-        lower=quartiles[0],
-        upper=quartiles[1],
+        lower=lower,
+        upper=upper,
         best=sign * float(costs.min()),
         worst=sign * float(costs.max()),
-        ddof=ddof,
     )
 
 
@@ -127,18 +121,20 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: boo
     -----
     p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties.
     """
+    from scipy.stats import mannwhitneyu, rankdata
+
     costs = _all_costs(samples, larger)
     found = []
     for one, other in combinations(costs, 2):
         a, b = costs[one], costs[other]
-        statistic, p, least = _mann_whitney(a, b)
-        note = f"too few runs: p cannot be below {least:.2g}" if least > ALPHA else ""
-        found.append((one, other, statistic, p, _a12(a, b), note))
-    corrected = holm([p for _, _, _, p, _, _ in found])
-    return [
-        PairTest(one, other, "Mann-Whitney U", statistic, p, float(p_holm), a, effect(a), note)
-        for (one, other, statistic, p, a, note), p_holm in zip(found, corrected, strict=True)
-    ]
+        # Of ranks, because infinities have no differences.
+        ranks = rankdata(np.concatenate([a, b]))
+        result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
+        least = min(1.0, 2.0 / comb(len(ranks), len(a)))
+        note = f"Too few runs: p cannot be below {least:.2g}." if least > ALPHA else ""
+        statistic, p, size = float(result.statistic), float(result.pvalue), a12(a, b)
+        found.append(PairTest(one, other, statistic, p, p, size, effect(size), note))
+    return [replace(pair, p_holm=float(p)) for pair, p in zip(found, holm([pair.p for pair in found]), strict=True)]
 
 
 def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool = False) -> Overall:
@@ -152,18 +148,15 @@ def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool
     names, columns = list(costs), list(costs.values())
     ends = np.cumsum([len(column) for column in columns])[:-1]
     ranks = np.split(rankdata(np.concatenate(columns)), ends)
-    result = None if np.ptp(np.concatenate(ranks)) == 0 else kruskal(*ranks)
-    return Overall(
-        test="Kruskal-Wallis",
-        statistic=0.0 if result is None else float(result.statistic),
-        p=1.0 if result is None else float(result.pvalue),
-        ranks={name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)},
-    )
+    statistic, p = (0.0, 1.0) if np.ptp(np.concatenate(ranks)) == 0 else kruskal(*ranks)
+    return Overall(float(statistic), float(p), {name: float(np.mean(column)) for name, column in zip(names, ranks, strict=True)})
 
 
 def a12(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, *, larger: bool = False) -> float:
     """Probability that a value of `a` is better than one of `b`, a tie being half (Vargha and Delaney 2000)."""
-    return _a12(_costs(a, larger, "the first sample"), _costs(b, larger, "the second sample"))
+    first, second = _costs(a, larger, "the first sample")[:, None], _costs(b, larger, "the second sample")
+    better, worse = int((first < second).sum()), int((first > second).sum())
+    return 0.5 + 0.5 * (better - worse) / (len(first) * len(second))
 
 
 def effect(a12: float) -> str:
@@ -207,17 +200,3 @@ def _quantile(costs: np.ndarray, share: float) -> float:
     if part == 0:
         return float(ordered[low])
     return float(ordered[low] + part * (ordered[low + 1] - ordered[low])) if np.isfinite(ordered[low + 1]) else np.inf
-
-
-def _mann_whitney(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """U of the first, p, and the least p that this number of runs can have. Of ranks, because infinities have no differences."""
-    from scipy.stats import mannwhitneyu, rankdata
-
-    ranks = rankdata(np.concatenate([a, b]))
-    result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
-    return float(result.statistic), float(result.pvalue), min(1.0, 2.0 / comb(len(a) + len(b), len(a)))
-
-
-def _a12(a: np.ndarray, b: np.ndarray) -> float:
-    better, worse = (a[:, None] < b).sum(), (a[:, None] > b).sum()
-    return float(0.5 + 0.5 * (int(better) - int(worse)) / (len(a) * len(b)))

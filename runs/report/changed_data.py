@@ -126,7 +126,8 @@ class ChangedData:
             f"independent integrator; feasible: no limit is violated by more than {self.tolerance:g} of its scale. A shift is against "
             "the same point under the nominal data."
         ]
-        return table(heads, rows, f"The front of {self.nominal} under changed data.", [*notes, *self._notes()])
+        notes += [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
+        return table(heads, rows, f"The front of {self.nominal} under changed data.", notes)
 
     def _points(self) -> Table:
         heads: list[Column | str] = [*_WHOSE, Column("point", grouped=True), "data", "feasible", *_columns(self._goals)]
@@ -148,9 +149,6 @@ class ChangedData:
                 rows.append([one.transcription, one.solver, problem, len(front), *best])
         return table(heads, rows, "The best of each objective that was found under each data, all runs together.")
 
-    def _notes(self) -> list[str]:
-        return [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
-
 
 _WHOSE = (Column("transcription", grouped=True), Column("solver", grouped=True))
 
@@ -162,10 +160,9 @@ def _columns(goals: Sequence[Any]) -> list[Column]:
 def changed_data(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[ChangedData]:
     """The nominal front of each solver and transcription, simulated under the data of all other problems of a study. Empty without a
     nominal problem."""
-    nominal, verify = study.get("nominal"), study.get("verify")
+    nominal, tolerance = study.get("nominal"), study.get("verify") or TOLERANCE
     if nominal is None:
         return []
-    tolerance = TOLERANCE if verify is None else verify
     labels = [nominal, *dict.fromkeys(comparison.problem for comparison in comparisons if comparison.problem != nominal)]
     cells = {
         (comparison.place(solver), solver): None
@@ -187,27 +184,15 @@ def _change(comparisons: Sequence[Comparison], transcription: str, solver: str, 
     union = {label: Front.merge(here[label]) for label in labels if label in here}
     own = union[labels[0]]
     if not len(own):
-        return Change(
-            transcription, solver, union, note="nothing feasible was found under the nominal data, so there is nothing to simulate"
-        )
+        note = "nothing feasible was found under the nominal data, so there is nothing to simulate"
+        return Change(transcription, solver, union, note=note)
     some = own[representatives(own, MANY)]
     try:
-        problems = {label: _problem(comparisons, label) for label in labels}
+        # A problem that a script stated cannot be loaded.
+        problems = {label: next(one for one in comparisons if one.problem == label).known.compiled() for label in labels}
     except ValueError as error:
         return Change(transcription, solver, union, note=f"nothing was simulated: {error}")
     return Change(transcription, solver, union, {label: some.simulate(problem, tolerance=tolerance) for label, problem in problems.items()})
-
-
-def _problem(comparisons: Sequence[Comparison], label: str) -> CompiledProblem:
-    """A problem of the study, from the first front of it. Raises ValueError if it was stated in a script."""
-    fronts = (
-        front
-        for comparison in comparisons
-        if comparison.problem == label
-        for solver in comparison.runs
-        for front in comparison.fronts[solver]
-    )
-    return next(fronts).compiled()
 
 
 def changed_figure(change: Change) -> Figure:

@@ -12,6 +12,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.simulated import best, judged
+from macs.io.text import counted
 
 from ..batch.store import Store, StoredRun
 from ..data.schema import errors_begin_with
@@ -126,7 +127,7 @@ class Comparison:
         fronts = self.every
         together = union([front if front.source is not None else front.objectives for front in fronts])  # others have no trajectories
         assert isinstance(together, Front)  # as all of them are
-        return Reference(together, f"the union of {len(fronts)} run{'' if len(fronts) == 1 else 's'}", False)
+        return Reference(together, f"the union of {counted(len(fronts), 'run')}", False)
 
     def reference(self, given: Any) -> Reference:
         """The reference that the study states for this problem; see `look_up`."""

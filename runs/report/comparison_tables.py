@@ -44,7 +44,7 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
         if not len(against.front) or (name != "indicators" and not reference.true):
             continue
         measured = samples(comparison, against)
-        scale = Scale.of(against.front, like=comparison.known, what=against.what).describe()
+        scale = Scale.of(against.front, what=against.what).describe()
         title = f"{comparison.name}: against {against.what}"
         found[name] = summary_table(measured, caption=f"{title}.", notes=[scale])
         if against is reference and len(measured["GD"]) > 1:
@@ -62,10 +62,6 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
         for solver, values in solvers.items()
         for summary in [summarise(values)]
     ]
-    heads: list[Column | str] = [
-        Column("cost", grouped=True),
-        "solver",
-        "runs",
-        *(Column(name, digits=4) for name in ("mean", "median", "least", "most")),
-    ]
+    heads: list[Column | str] = [Column("cost", grouped=True), "solver", "runs"]
+    heads += [Column(name, digits=4) for name in ("mean", "median", "least", "most")]
     return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.")}

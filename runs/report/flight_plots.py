@@ -22,10 +22,13 @@ from .style import COLUMN, PAGE, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from transcription.trajectories.trajectory import Trajectory
+
 Law = Mapping[str, np.ndarray]
 """A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 
-Quantity = str | Callable[[Mapping[str, np.ndarray]], np.ndarray]
+Track = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
+"""(values of a flight by name) -> {label: values across, label: values up}."""
 
 Laws = Mapping[str, Sequence[Law | None]]
 """{name of a law: its flight for each point, None where it has none}."""
@@ -43,12 +46,7 @@ def representatives(front: Front, count: int = 4) -> list[int]:
     return sorted(good[spread(normalised(F, F)[0], count)].tolist())
 
 
-def flights_figure(
-    points: Sequence[Point],
-    *,
-    laws: Laws = MappingProxyType({}),
-    solver: str = "",
-) -> Figure:
+def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({}), solver: str = "") -> Figure:
     """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
 
     Parameters
@@ -67,11 +65,9 @@ def flights_figure(
     """
     from matplotlib.ticker import MaxNLocator
 
-    _check(points, laws)
-    # `_check` has made sure that all have trajectories.
-    flights = [point.trajectory for point in points if point.trajectory is not None]
+    flights = _flights(points, laws)
     rows = [name for name, kind in quantities(flights[0]) if kind != "path"]
-    units = _units(points[0])
+    units = {v.name: v.unit for phase in flights[0].phases for v in (*phase.state_variables, *phase.control_variables)}
     with style():
         figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
         grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
@@ -97,103 +93,72 @@ def flights_figure(
     return figure
 
 
-def paths_figure(
-    points: Sequence[Point],
-    across: Quantity,
-    up: Quantity,
-    *,
-    xlabel: str = "",
-    ylabel: str = "",
-    laws: Laws = MappingProxyType({}),
-    equal: bool = False,
-) -> Figure:
+def paths_figure(points: Sequence[Point], track: Track, *, laws: Laws = MappingProxyType({}), equal: bool = False) -> Figure:
     """The paths of a few points in one picture: a quantity of the flight over another, a colour each.
 
     Parameters
     ----------
     points, laws
-        As of `flights_figure`.
-    across, up : name of a state or control, or a function of all of them
-        The function gets {name: values} and returns values: `lambda v: v["r"] * np.cos(v["theta"])`. A law that lacks
-        one of them is not drawn.
-    xlabel, ylabel : str
-        Needed for functions; of a state or control, its name and unit by default.
+        As of `flights_figure`. A law that lacks a state or control of the track is not drawn.
+    track : callable
+        {name of a state or control: values} -> {label: values across, label: values up}.
     equal : bool
         Whether both axes have the same scale.
     """
-    _check(points, laws)
+    flights = _flights(points, laws)
     with style():
         figure = new_figure(COLUMN, 2.7)
         ax = figure.subplots()
-        for i, point in enumerate(points):
-            phases = point.trajectory.phases if point.trajectory is not None else ()
-            for k, phase in enumerate(phases):
+        for i, flight in enumerate(flights):
+            for k, phase in enumerate(flight.phases):
                 values = {v.name: along(phase, v.name)[1] for v in (*phase.state_variables, *phase.control_variables)}
-                x, y = _of(values, across), _of(values, up)
+                (across, x), (up, y) = track(values).items()
                 name = f"point {i + 1}" if k == 0 else None
                 # Where paths coincide the first are on top, and a dot marks the end of each.
                 look = {"color": COLORS[i % len(COLORS)], "zorder": 3 - 0.1 * i}
                 ax.plot(x, y, lw=1.3, label=name, **look)
-                if k == len(phases) - 1:
+                if k == len(flight.phases) - 1:
                     end = np.flatnonzero(np.isfinite(x) & np.isfinite(y))[-1]
                     ax.plot(x[end], y[end], "o", ms=4, mec="white", mew=0.4, **look)
-        units = _units(points[0])
-        ax.set_xlabel(xlabel or label(str(across), units.get(str(across), "")))
-        ax.set_ylabel(ylabel or label(str(up), units.get(str(up), "")))
+        ax.set(xlabel=across, ylabel=up)
         if equal:
             ax.set_aspect("equal", adjustable="datalim")
         for dashes, (name, beside) in zip(DASHES, laws.items(), strict=False):
-            drawn = [law for law in beside if law is not None and _has(law, across) and _has(law, up)]
-            for i, law in enumerate(drawn):
-                line = _of(law, across), _of(law, up)
-                ax.plot(*line, color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
+            lines = [line for law in beside if law is not None and (line := _track(track, law))]
+            for i, line in enumerate(lines):
+                ax.plot(*line.values(), color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
         ax.legend(frameon=False, loc="best")
     return figure
 
 
-def _of(values: Mapping[str, np.ndarray], quantity: Quantity) -> np.ndarray:
-    if callable(quantity):
-        return quantity(values)
-    if quantity not in values:
-        raise ValueError(f"there is no '{quantity}' to draw; there are {', '.join(values)}")
-    return values[quantity]
-
-
-def _has(values: Mapping[str, np.ndarray], quantity: Quantity) -> bool:
-    """Whether a law has all that a quantity needs."""
-    if not callable(quantity):
-        return quantity in values
+def _track(track: Track, law: Law) -> Mapping[str, np.ndarray]:
+    """The track of a law; empty if the law lacks a state or control that it needs."""
     try:
-        quantity(values)
+        return track(law)
     except KeyError:
-        return False
-    return True
+        return {}
 
 
-def _units(point: Point) -> dict[str, str]:
-    """Units of the states and controls, by name."""
-    phases = point.trajectory.phases if point.trajectory is not None else ()
-    return {v.name: v.unit for phase in phases for v in (*phase.state_variables, *phase.control_variables)}
-
-
-def _check(points: Sequence[Point], laws: Laws) -> None:
+def _flights(points: Sequence[Point], laws: Laws) -> list[Trajectory]:
+    """The trajectories of points. Raises ValueError if there is one without, or laws that do not fit."""
     if not 1 <= len(points) <= 6:
         raise ValueError(f"flights are drawn side by side of one to six points, not of {len(points)}")
-    for number, point in enumerate(points, 1):
-        if point.trajectory is None:
-            raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
+    flights = [point.trajectory for point in points if point.trajectory is not None]
+    if len(flights) < len(points):
+        number = next(number for number, point in enumerate(points, 1) if point.trajectory is None)
+        raise ValueError(f"point {number} of those to draw has no trajectory: it is of a black box or another program, or failed")
     if len(laws) > len(DASHES):
         raise ValueError(f"at most {len(DASHES)} laws are drawn beside points, not {len(laws)}")
     for name, beside in laws.items():
         if len(beside) != len(points):
             raise ValueError(f"{name}: {len(beside)} laws do not stand beside {len(points)} points; give None where there is none")
+    return flights
 
 
 def _title(number: int, point: Point, width: int) -> str:
     """The point's number and objectives, in lines of at most `width` characters."""
-    goals = point.goals
     values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
-    lines = [f"{goal.name} {values[goal.name]}{f' {goal.unit}' if goal.unit else ''}" for goal in goals]
+    lines = [f"{goal.name} {values[goal.name]} {goal.unit}".rstrip() for goal in point.goals]
     return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
 
 

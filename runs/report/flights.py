@@ -79,9 +79,8 @@ class Flights:
             if fronts and fronts[0][0].trajectory is not None:
                 front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
-                source = front.source
-                named = source is not None and source.address and not source.address.rpartition(":")[0].endswith(".py")
-                place = module_of(source.address) if source is not None and named else None
+                address = front.source.address if front.source is not None else ""
+                place = module_of(address) if address and not address.rpartition(":")[0].endswith(".py") else None
                 ends, note = _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(comparison, comparison.against, solver, points, many, place, laws, ends, note)
@@ -92,16 +91,12 @@ class Flights:
         goals = self.comparison.known.goals
         curve = self._curve()
         heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
-        heads += (
-            [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
-            if curve is not None
-            else []
-        )
-        rows: list[list[Cell]] = []
-        for number, point in enumerate(self.points, 1):
-            rows.append([f"point {number}", *point.objectives.values(), *self._beside(point, curve)])
-        for goal, end in zip(goals, self.ends, strict=False):
-            rows.append([f"{goal.name} alone", *end.objectives.values(), *self._beside(end, curve)])
+        if curve is not None:
+            heads += [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
+        names = [*(f"point {number}" for number in range(1, len(self.points) + 1)), *(f"{goal.name} alone" for goal in goals)]
+        # There may be no ends.
+        named = zip(names, (*self.points, *self.ends), strict=False)
+        rows: list[list[Cell]] = [[name, *point.objectives.values(), *self._beside(point, curve)] for name, point in named]
         notes = [f"Of {self.solver}, all runs together."]
         if len(self.ends):
             notes[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
@@ -109,15 +104,15 @@ class Flights:
             notes.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; see macs verify."
             )
-        return table(
-            heads, rows, f"{self.comparison.name}: representative solutions of the front.", [*notes, *([self.note] if self.note else [])]
-        )
+        notes += [self.note] if self.note else []
+        return table(heads, rows, f"{self.comparison.name}: representative solutions of the front.", notes)
 
     def figures(self) -> dict[str, Figure]:
         """Name of a file -> figure."""
         found = {
             "representatives": front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
+                goals=self.comparison.known.goals,
                 reference=self.reference.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
@@ -130,17 +125,9 @@ class Flights:
                 found |= plot(self.many)
         track = getattr(self.case, "track", None)
         if track is not None:
-            tracks = [track(time_histories(point)) for point in self.points]
-            across, up = tracks[0]
-            found["paths"] = paths_figure(
-                self.points,
-                lambda v: track(v)[across],
-                lambda v: track(v)[up],
-                xlabel=across,
-                ylabel=up,
-                laws={name: flights for name, flights in self.laws.items() if name != ALONE},
-                equal=_alike(tracks),
-            )
+            laws = {name: flights for name, flights in self.laws.items() if name != ALONE}
+            alike = _alike([track(time_histories(point)) for point in self.points])
+            found["paths"] = paths_figure(self.points, track, laws=laws, equal=alike)
         return found
 
     @property
@@ -149,7 +136,7 @@ class Flights:
 
     def _curve(self) -> np.ndarray | None:
         """The reference, minimised, where it is one curve of two objectives."""
-        R = truth(self.reference.front, self.comparison.known)
+        R = truth(self.reference.front)
         return R if len(pieces(R)) == 1 else None
 
     def _beside(self, point: Point, curve: np.ndarray | None) -> list[Cell]:

@@ -14,10 +14,9 @@ import numpy as np
 from msgspec import Meta
 
 from macs.front import Front
-from problems.checks import unknown
 
 from ..batch.store import StoredRun
-from ..data.schema import Number, Section, checked, errors_begin_with
+from ..data.schema import Number, Section, check_known, checked, errors_begin_with
 from ..measures.convergence import Band, History, band
 from .comparison import Comparison
 from .plots import convergence_figure
@@ -68,8 +67,8 @@ class Goal(Section):
             goal: Goal = checked(given, cls)
             for name, problem in problems.items():
                 known = {one.name: one for one in problem.goals}
-                if goal.objective not in known:
-                    raise ValueError(f"problem '{name}': {unknown('objective', goal.objective, known)}")
+                with errors_begin_with(f"problem '{name}'"):
+                    check_known("objective", [goal.objective], known)
                 sense = known[goal.objective].sense
                 if (goal.best < goal.worst) != (sense == "minimize"):
                     better = "less" if sense == "minimize" else "more"
@@ -167,24 +166,20 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
     for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
         here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
-        cells = {
-            (comparison.place(solver), solver): (runs, comparison.fronts[solver], comparison.failures.get(solver, 0))
-            for comparison in here
-            for solver, runs in comparison.runs.items()
-            if len(runs) + comparison.failures.get(solver, 0)
-        }
-        histories = {
-            cell: [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
-            for cell, (runs, _, failed) in cells.items()
-        }
-        simulated = {
-            cell: [*map(goal.of_front, fronts), *[np.nan] * failed] for cell, (_, fronts, failed) in cells.items() if verify is not None
-        }
-        seconds = {cell: [run.wall_time for run in runs] for cell, (runs, _, _) in cells.items()}
-        objective = next(one for one in goals if one.name == goal.objective)
-        known = {cell: runs for cell, runs in histories.items() if runs}
-        if known:
-            found.append(GoalAttainment(problem, goal, objective, known, simulated, seconds))
+        histories: dict[tuple[str, str], list[History]] = {}
+        simulated: dict[tuple[str, str], list[float]] = {}
+        seconds: dict[tuple[str, str], list[float]] = {}
+        for comparison in here:
+            for solver, runs in comparison.runs.items():
+                cell, failed = (comparison.place(solver), solver), comparison.failures.get(solver, 0)
+                known = [*(goal.history(run, goals) for run in runs if run.history.get("F")), *[NEVER] * failed]
+                if known:
+                    histories[cell], seconds[cell] = known, [run.wall_time for run in runs]
+                if known and verify is not None:
+                    simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
+        if histories:
+            objective = next(one for one in goals if one.name == goal.objective)
+            found.append(GoalAttainment(problem, goal, objective, histories, simulated, seconds))
     return found
 
 

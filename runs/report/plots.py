@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.front import Front
 from macs.fronts.style import COLORS, GREY, better
+from macs.io.text import counted
 from problems.compiled import Objective
 
 from ..measures.attainment import Attainment, staircase
@@ -30,8 +30,8 @@ MARKERS = "o^sDvPX*"
 def front_figure(
     fronts: Mapping[str, Sequence[Points]],
     *,
+    goals: Sequence[Objective],
     reference: Points | None = None,
-    goals: Sequence[Objective] = (),
     marked: Points | None = None,
     truth_name: str = "truth",
 ) -> Figure:
@@ -41,16 +41,17 @@ def front_figure(
     ----------
     fronts : solver -> a front for each run
         Fronts, or arrays (n, m) in the user's units and senses, m >= 2. Of more than two objectives, there is a panel for each two of them.
+    goals : m Objectives
+        Names, units and senses.
     reference : Front or array, optional
-    goals : m Objectives, optional
-        Names, units and senses; needed if no front is a `Front`, else all columns are minimised and have no names.
     marked : Front or array, optional
         Points to mark by crosses and numbers from 1: those that another figure shows the flights of.
     truth_name : str
         Name of the reference in the legend.
     """
-    known = _known([*(front for runs in fronts.values() for front in runs), reference], goals)
-    m = len(known.goals)
+    m, signs = len(goals), np.array([goal.sign for goal in goals])
+    if m < 2:
+        raise ValueError("there are no fronts of two or more objectives to draw")
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
@@ -59,28 +60,24 @@ def front_figure(
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for ax, (i, j) in zip(grid, pairs, strict=True):
             if reference is not None:
-                _draw_truth(ax, truth(reference, known) * _signs(known), _signs(known), (i, j), truth_name)
+                _draw_truth(ax, truth(reference, goals), signs, (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
                 if not runs:  # none is finished; other solvers keep their colours of all figures
                     continue
-                points = [minimised(front, known) * _signs(known) for front in runs]
+                points = [minimised(front, goals) * signs for front in runs]
                 name = _runs(solver, len(runs), sum(not len(part) for part in points))
                 every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])
                 points_style = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
             if marked is not None:
-                _mark(ax, minimised(marked, known) * _signs(known), _signs(known), (i, j))
-            _label(ax, known, i, j)
+                _mark(ax, minimised(marked, goals) * signs, signs, (i, j))
+            ax.set(xlabel=better(goals[i]), ylabel=better(goals[j]))
         legend(figure, grid[0], "best" if len(pairs) == 1 else None)
     return figure
 
 
 def attainment_figure(
-    surfaces: Mapping[str, Attainment],
-    *,
-    goals: Sequence[Objective] = (),
-    reference: Points | None = None,
-    truth_name: str = "truth",
+    surfaces: Mapping[str, Attainment], *, goals: Sequence[Objective], reference: Points | None = None, truth_name: str = "truth"
 ) -> Figure:
     """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
 
@@ -89,22 +86,23 @@ def attainment_figure(
     Parameters
     ----------
     surfaces : solver -> Attainment
-    goals : 2 Objectives, optional
+    goals : 2 Objectives
         Names, units and senses.
     reference : Front or array, optional
         In the user's units and senses.
     """
-    signs = next(iter(surfaces.values())).signs
-    if len(signs) != 2:
-        raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(signs)}")
-    known = _known([], goals or [Objective(f"objective {i + 1}", sense="minimize" if s > 0 else "maximize") for i, s in enumerate(signs)])
+    if len(goals) != 2:
+        raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(goals)}")
+    signs = np.array([goal.sign for goal in goals])
     corners = [surface.of(k) for surface in surfaces.values() for k in range(1, surface.runs + 1)]
     if reference is not None:
-        corners.append(truth(reference, known) * signs)
+        corners.append(truth(reference, goals) * signs)
     every = np.vstack([*corners, np.zeros((0, 2))])
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
     margin = 0.04 * np.where(high > low, high - low, 1.0)
     ends = np.where(signs > 0, high + margin, low - margin)
+    # A front leaves the corner free where everything is worst.
+    corner = f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"
     columns = min(3, len(surfaces))
     rows = -(-len(surfaces) // columns)
     with style():
@@ -112,14 +110,14 @@ def attainment_figure(
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
-                _draw_truth(ax, truth(reference, known) * signs, signs, (0, 1), truth_name)
+                _draw_truth(ax, truth(reference, goals), signs, (0, 1), truth_name)
             _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
             ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-            _label(ax, known, 0, 1)
+            ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
             ax.set_title(_runs(solver, surface.runs, 0), loc="left")
-            ax.legend(frameon=False, loc=_inside(signs))
+            ax.legend(frameon=False, loc=corner)
         for ax in grid[len(surfaces) :]:
             ax.remove()
     return figure
@@ -165,15 +163,8 @@ def convergence_figure(
             x = np.append(b.x, last)
             lower, median, upper = (np.append(part, part[-1]) for part in (b.lower, b.median, b.upper))
             outside = (low / 10, high * 10) if log else (2 * low - high - 1, 2 * high - low + 1)
-            ax.fill_between(
-                x,
-                np.nan_to_num(lower, neginf=outside[0], posinf=outside[1]),
-                np.nan_to_num(upper, neginf=outside[0], posinf=outside[1]),
-                step="post",
-                color=color,
-                alpha=0.2,
-                lw=0,
-            )
+            edges = (np.nan_to_num(part, neginf=outside[0], posinf=outside[1]) for part in (lower, upper))
+            ax.fill_between(x, *edges, step="post", color=color, alpha=0.2, lw=0)
             drawn = np.where(np.isfinite(median), median, np.nan)
             ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
         if log:
@@ -182,9 +173,7 @@ def convergence_figure(
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
-        ax.set_xlim(0, last)
-        ax.set_xlabel(xlabel)
-        ax.set_ylabel(ylabel)
+        ax.set(xlim=(0, last), xlabel=xlabel, ylabel=ylabel)
         corner = "lower right" if larger else "upper right"
         legend(figure, ax, corner if inside else None, "median, quartiles")
     return figure
@@ -200,42 +189,18 @@ def _log_ticks(ax: Any, ratio: float) -> None:
     ax.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _known(points: Sequence[Points | None], goals: Sequence[Objective]) -> Front:
-    """A front with the objectives that are drawn; it may have no points."""
-    found = next((one for one in points if isinstance(one, Front)), None)
-    if found is not None:
-        return found
-    if not goals:
-        m = next((one.shape[1] for one in points if isinstance(one, np.ndarray) and one.ndim == 2), 0)
-        goals = [Objective(f"objective {i + 1}") for i in range(m)]
-    if len(goals) < 2:
-        raise ValueError("there are no fronts of two or more objectives to draw")
-    return Front(F=[], decision=[], violation=[], status=[], goals=goals)
-
-
-def _signs(known: Front) -> np.ndarray:
-    return np.array([goal.sign for goal in known.goals])
-
-
 def _runs(solver: str, runs: int, empty: int) -> str:
     """MACS, 30 runs (2 empty)."""
-    return f"{solver}, {runs} run{'' if runs == 1 else 's'}{f' ({empty} empty)' if empty else ''}"
+    return f"{solver}, {counted(runs, 'run')}{f' ({empty} empty)' if empty else ''}"
 
 
-def _label(ax: Any, known: Front, i: int, j: int) -> None:
-    ax.set_xlabel(better(known.goals[i]))
-    ax.set_ylabel(better(known.goals[j]))
-
-
-def _draw_truth(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
-    """A line for each piece of a dense reference of two objectives, else small points; beneath all else."""
-    i, j = pair
-    curves = pieces(values * signs)
+def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
+    """A line for each piece of a dense reference of two objectives, minimised, else small points; beneath all else."""
+    curves = pieces(R)
     for k, curve in enumerate(curves):
-        line = curve * signs
-        ax.plot(line[:, 0], line[:, 1], color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
+        ax.plot(*(curve * signs).T, color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
     if not curves:
-        ax.plot(values[:, i], values[:, j], ".", color=GREY, ms=2.0, zorder=1, label=name)
+        ax.plot(*(R * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
 
 
 def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int]) -> None:
@@ -263,8 +228,3 @@ def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -
     if "best" in drawn and "worst" in drawn:
         border = np.vstack([drawn["best"], drawn["worst"][::-1]])
         ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)
-
-
-def _inside(signs: np.ndarray) -> str:
-    """The corner that a front leaves free: where everything is worst."""
-    return f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from macs.baselines.population import PopulationSolver
-from problems.checks import unknown
 
-from ..data.schema import checked, errors_begin_with
+from ..data.schema import check_known, checked, errors_begin_with
 from .comparison import Comparison
-from .published_kinds import KINDS, STATISTIC, Published, check_keys, figures_of
+from .published_kinds import KINDS, STATISTIC, Published, figures_of
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
@@ -45,10 +44,9 @@ def check_against(given: Any, problems: Mapping[str, CompiledProblem], solvers: 
                 raise ValueError(f"it is of solvers with a population, and none of the study's has one: {', '.join(solvers)}")
             for place, row in enumerate(paper.rows, 1):
                 with errors_begin_with(f"row {place}"):
-                    if row["problem"] not in problems:
-                        raise ValueError(unknown("problem", row["problem"], problems))
+                    check_known("problem", [row["problem"]], problems)
                     if paper.columns is None:
-                        check_keys(figures_of(row), "objective", [goal.name for goal in problems[row["problem"]].goals])
+                        check_known("objective", figures_of(row), [goal.name for goal in problems[row["problem"]].goals])
             for label in dict.fromkeys(row["problem"] for row in paper.rows):
                 with errors_begin_with(f"problem '{label}'"):
                     paper.check_problem(problems[label])
@@ -98,11 +96,8 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
             notes += [f"{problem}, {place}: {note}" for place, note in remarks.items()]
     if not rows:
         return None
-    heads: list[Column | str] = [
-        Column("problem", grouped=True),
-        Column("by", grouped=paper.statistics),
-        Column("runs", grouped=paper.statistics),
-    ]
+    heads: list[Column | str] = [Column("problem", grouped=True)]
+    heads += [Column(name, grouped=paper.statistics) for name in ("by", "runs")]
     heads += [STATISTIC] if paper.statistics else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
 
-from macs.front import Front
 from problems.checks import unknown
 
-from ..data.schema import Number, Section, Text, errors_begin_with, is_number
+from ..data.schema import Number, Section, Text, check_known, errors_begin_with, is_number
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.simulation_record import Ends as FinalStates
@@ -103,7 +102,7 @@ class Published(Section, tag_field="of", kw_only=True):
             raise ValueError(f"{STATISTIC}: this kind of table has none")
         keys = figures_of(row)
         if self.columns is not None:
-            check_keys(keys, "key", self.columns)
+            check_known("key", keys, self.columns)
         for key in keys:
             if not is_number(row[key]):
                 raise ValueError(f"{key} must be a finite number, not {row[key]!r}")
@@ -111,25 +110,16 @@ class Published(Section, tag_field="of", kw_only=True):
             raise ValueError(f"it has no figure: {', '.join(self.columns) if self.columns else 'of some objective'}")
 
 
-def check_keys(keys: Iterable[str], kind: str, known: Iterable[str]) -> None:
-    """Raise ValueError that names a key which is not known."""
-    for key in keys:
-        if key not in known:
-            raise ValueError(unknown(kind, key, known))
-
-
 class Indicators(Published, tag="indicators"):
     """GD and IGD to the points of the union of all runs, and the time of a run."""
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {
-            "gd_mean": Column("mean GD", digits=4),
-            "gd_variance": Column("variance", digits=4),
-            "igd_mean": Column("mean IGD", digits=4),
-            "igd_variance": Column("variance", digits=4),
-            "seconds": Column("time", "s", digits=4),
-        }
+    columns: ClassVar[Mapping[str, Column]] = {
+        "gd_mean": Column("mean GD", digits=4),
+        "gd_variance": Column("variance", digits=4),
+        "igd_mean": Column("mean IGD", digits=4),
+        "igd_variance": Column("variance", digits=4),
+        "seconds": Column("time", "s", digits=4),
+    }
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         union, times = comparison.union(), spent(comparison)["time [s]"]
@@ -138,16 +128,15 @@ class Indicators(Published, tag="indicators"):
         for solver in comparison.runs:
             if solver in found["GD"]:
                 gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
-                figures = {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
-                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
-                rows[solver] = [figures | seconds]
+                seconds = float(np.mean(times[solver])) if solver in times else None
+                rows[solver] = [dict(zip(self.columns, (gd.mean, gd.variance, igd.mean, igd.variance, seconds), strict=True))]
         return rows
 
     def remark(self, comparison: Comparison) -> str:
         union = comparison.union()
         if not len(union.front):
             return "no run found a point."
-        scale = Scale.of(union.front, like=comparison.known, what=union.what, curve=False).describe().split(". Hypervolume")[0]
+        scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
         return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
 
 
@@ -156,9 +145,7 @@ class Hypervolume(Published, tag="hypervolume", kw_only=True):
 
     point: Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {key: Column(key, digits=5) for key in ("best", "median", "worst")}
+    columns: ClassVar[Mapping[str, Column]] = {key: Column(key, digits=5) for key in ("best", "median", "worst")}
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         rows: dict[str, list[Figures]] = {}
@@ -169,10 +156,8 @@ class Hypervolume(Published, tag="hypervolume", kw_only=True):
         return rows
 
     def remark(self, comparison: Comparison) -> str:
-        goals = comparison.known.goals
-        words = ", ".join(
-            f"{goal.name} {value:g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, self.point, strict=True)
-        )
+        goals = zip(comparison.known.goals, self.point, strict=True)
+        words = ", ".join(f"{goal.name} {value:g} {goal.unit}".rstrip() for goal, value in goals)
         best = comparison.reference(None)
         return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
 
@@ -188,11 +173,9 @@ class Objectives(Published, tag="objectives"):
     statistics: ClassVar[bool] = True
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        return {
-            solver: _statistics({goal.name: column for goal, column in zip(comparison.known.goals, values.T, strict=True)})
-            for solver, fronts in comparison.fronts.items()
-            if len(values := _together(fronts))
-        }
+        found = {solver: [front.objectives for front in fronts if len(front)] for solver, fronts in comparison.fronts.items()}
+        names = comparison.known.names
+        return {solver: _statistics(dict(zip(names, np.vstack(each).T, strict=True))) for solver, each in found.items() if each}
 
     def remark(self, comparison: Comparison) -> str:
         without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
@@ -247,18 +230,16 @@ class Feasibility(Published, tag="feasibility"):
 
     population: ClassVar[bool] = True
 
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        return {
-            "first_feasible": Column("first feasible, mean", digits=4),
-            "first_feasible_median": Column("median", digits=4),
-            "first_feasible_never": Column("never"),
-            "all_feasible": Column("all feasible, mean", digits=4),
-            "all_feasible_median": Column("median", digits=4),
-            "all_feasible_never": Column("never"),
-            "points": Column("not dominated, claimed", digits=4),
-            "counted": Column("points of a front that count", digits=4),
-        }
+    columns: ClassVar[Mapping[str, Column]] = {
+        "first_feasible": Column("first feasible, mean", digits=4),
+        "first_feasible_median": Column("median", digits=4),
+        "first_feasible_never": Column("never"),
+        "all_feasible": Column("all feasible, mean", digits=4),
+        "all_feasible_median": Column("median", digits=4),
+        "all_feasible_never": Column("never"),
+        "points": Column("not dominated, claimed", digits=4),
+        "counted": Column("points of a front that count", digits=4),
+    }
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         rows: dict[str, list[Figures]] = {}
@@ -285,11 +266,6 @@ class Feasibility(Published, tag="feasibility"):
 
 
 KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility
-
-
-def _together(fronts: Sequence[Front]) -> np.ndarray:
-    """Objectives (n, m) of all points, in the users' units and senses."""
-    return np.concatenate([front.objectives for front in fronts if len(front)] or [np.empty((0, 0))])
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:

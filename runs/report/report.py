@@ -17,7 +17,7 @@ from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
 
-from ..batch.store import Store, summary_text
+from ..batch.store import Store
 from ..data.addresses import check_trusted
 from ..data.schema import Flag, Text, checked, errors_begin_with
 from ..measures.attainment import attainment
@@ -102,7 +102,7 @@ def report(
     store = Store.open(out, trust)
     summary, study = store.summary(), store.definition
     if not summary.finished:
-        raise ValueError(f"there is nothing to report on yet\n{summary_text(summary)}")
+        raise ValueError(f"there is nothing to report on yet\n{summary}")
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         published = papers(study.get("paper") or [])
@@ -115,14 +115,14 @@ def report(
     if others:
         found = comparisons(store, others)
     writer = _Writer(Path(out) / FOLDER)
-    sections = [summary_text(summary), *([keys.note] if keys.note else [])]
+    sections = [str(summary), *([keys.note] if keys.note else [])]
     for comparison in _shown(found) if progress else found:
         sections += _section(comparison, study, writer, figures)
     across: list[GoalAttainment | ChangedData] = [*goal_attainments(found, study), *changed_data(found, study)]
     for part in across:
-        sections += [writer.table(_plain(name), one) for name, one in part.tables().items()]
+        sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
-            writer.figure(_plain(name), figure)
+            writer.figure(name, figure)
     sections += [writer.table(name, one) for name, one in published_tables(found, published).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
@@ -145,9 +145,10 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
     if flights is not None:
         tables["representatives"] = flights.table()
         figures |= flights.figures() if drawn else {}
-    texts = [writer.table(f"{_stem(comparison)}-{name}", one) for name, one in tables.items()]
+    stem = f"{comparison.problem}-{comparison.transcription}"
+    texts = [writer.table(f"{stem}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():
-        writer.figure(f"{_stem(comparison)}-{name}", figure)
+        writer.figure(f"{stem}-{name}", figure)
     return [f"{comparison.name}\n{'=' * len(comparison.name)}", *_left_out(comparison), *texts]
 
 
@@ -160,15 +161,6 @@ def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:
         except ValueError as error:
             reasons.append(str(error))
     raise ValueError("; ".join(dict.fromkeys(reasons)))
-
-
-def _stem(comparison: Comparison) -> str:
-    return _plain(f"{comparison.problem}-{comparison.transcription}")
-
-
-def _plain(name: str) -> str:
-    """A name as part of the name of a file."""
-    return re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
 
 
 def _left_out(comparison: Comparison) -> list[str]:
@@ -188,7 +180,7 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
     if not len(reference.front):
         return found
     if len(comparison.known.goals) > 1:
-        found["fronts"] = front_figure(comparison.fronts, reference=reference.front, truth_name=name)
+        found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     # A failed run attains nothing, as an empty front does.
     nothing = comparison.known[:0]
     runs = {solver: [*fronts, *[nothing] * comparison.failures.get(solver, 0)] for solver, fronts in comparison.fronts.items()}
@@ -214,22 +206,22 @@ class _Writer:
         self._folder, self.files = folder, list[Path]()
         self._used: Counter[tuple[str, str]] = Counter()
 
-    def table(self, stem: str, one: Table) -> str:
+    def table(self, name: str, one: Table) -> str:
         """Write a table in its three forms; returns its text."""
-        stem = self._free("table", stem)
-        self.files += one.save(self._folder / stem)
+        self.files += one.save(self._folder / self._free("table", name))
         return one.text()
 
-    def figure(self, stem: str, figure: Figure) -> None:
+    def figure(self, name: str, figure: Figure) -> None:
         """Write a figure, as a picture and for print."""
-        stem = self._free("figure", stem)
+        stem = self._free("figure", name)
         for suffix in ("png", "pdf"):
             content = io.BytesIO()
             figure.savefig(content, format=suffix, dpi=200)
             self.write(f"{stem}.{suffix}", content.getvalue())
 
-    def _free(self, kind: str, stem: str) -> str:
-        """A name that no other table, or figure, has: labels may differ only in characters that file names do not have."""
+    def _free(self, kind: str, name: str) -> str:
+        """The stem of a file that no other table, or figure, has: labels may differ only in characters that file names do not have."""
+        stem = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
         self._used[kind, stem] += 1
         return stem if self._used[kind, stem] == 1 else f"{stem}-{self._used[kind, stem]}"
 

@@ -9,6 +9,7 @@ import numpy as np
 from macs.front import Front
 
 from ..batch.store import StoredRun
+from ..execution.samples import COUNTS
 from ..measures.convergence import History
 from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus
 from ..measures.references import Reference
@@ -51,12 +52,7 @@ def samples(comparison: Comparison, reference: Reference, *, curve: bool = True)
 
 def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
     """{cost: {solver: a value for each finished run}}."""
-    keys = {
-        "evaluations": "evaluations",
-        "inner iterations": "inner_iterations",
-        "gradient solves": "gradient_solves",
-        "time [s]": "wall_time",
-    }
+    keys = {key.replace("_", " "): key for key in COUNTS} | {"time [s]": "wall_time"}
     return {
         name: {solver: [float(run.front.stats[key]) for run in runs] for solver, runs in comparison.runs.items() if runs}
         for name, key in keys.items()

@@ -20,15 +20,8 @@ COUNTED = 1e9
 Cell = str | float | int | None
 """An entry of a table: text, a number, or None if there is none."""
 
-ESCAPES = {
+ESCAPES: dict[str, str] = {character: f"\\{character}" for character in "&%$#_{}"} | {
     "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     "<": r"\textless{}",
@@ -91,7 +84,8 @@ class Table:
         if any(column.unit for column in self.columns):
             headers.append([f"[{column.unit}]" if column.unit else "" for column in self.columns])
         cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
-        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *self._below()])
+        below = ["", *self.notes] if self.notes else []
+        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *below])
 
     def csv(self) -> str:
         """CSV: one header line, numbers in full, empty cells only where there is no value; without caption and notes."""
@@ -139,9 +133,6 @@ class Table:
                     cells[k] = "" if same else row[k]
             shown.append(cells)
         return shown
-
-    def _below(self) -> list[str]:
-        return ["", *self.notes] if self.notes else []
 
 
 def short(value: float, digits: int = 3) -> str:

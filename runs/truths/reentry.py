@@ -34,7 +34,7 @@ from problems.cases.reentry.case3 import ZONES
 from problems.cases.reentry.statement import FOOT, Limits
 from transcription import DFET
 from transcription.nlp.scalarized import Solved
-from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.simulate import simulate
 from transcription.trajectories.trajectory import Trajectory
 
 CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
@@ -79,6 +79,11 @@ class Truth:
         self.descents = MultistartSolver(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
         self.found: list[Solved] = []
 
+    @property
+    def F(self) -> np.ndarray:
+        """Objectives (k, 4) of the flights that are known, minimised."""
+        return np.array([solved.F for solved in self.found])
+
     def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
         """One solve, remembered if it converges."""
         solved = self.descents.from_vector(start, reference, weights, ceiling)
@@ -99,7 +104,7 @@ class Truth:
             steps.begin(f"cross-range {row[0]:.2f}")
             if row[3] <= (1 + ALLOWED) * self.limits.heating_rate:
                 simulated = simulate(self.case, with_commands(self.template, row[4:]), rtol=RTOL, atol=RTOL)
-                if self.feasible(simulated):
+                if simulated.violation <= ALLOWED:
                     z = self.nlp.interpolate(simulated.trajectory)
                     self.found.append(Solved(z, row[:4] * SIGNS, float(self.nlp.evaluate(z[None])[1][0]), CONVERGED, 0))
         print(f"{len(self.found)} of {len(rows)} flights of {EASIEST} are feasible")
@@ -114,7 +119,7 @@ class Truth:
         rows = []
         for i in range(4):
             steps.begin(f"end {i + 1}")
-            F = np.array([solved.F for solved in self.found])
+            F = self.F
             nearest = int(np.lexsort((F[:, i], np.maximum(F - ceiling, 0.0).sum(axis=1)))[0])
             alone = np.where(np.arange(4) == i, 0.0, np.inf)
             first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
@@ -139,7 +144,7 @@ class Truth:
         places = across(((middle + BEYOND * (lattice - middle)) @ ends - ideal) / ranges)
         tried = np.empty((0, 4))
         for _ in range(count):
-            F = np.array([solved.F for solved in self.found])
+            F = self.F
             F = F[(F - ceiling <= 1e-9).all(axis=1)]
             known = np.vstack([across((F - ideal) / ranges), tried])
             place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
@@ -150,30 +155,25 @@ class Truth:
 
     def nearest(self, reference: np.ndarray, ranges: np.ndarray, ceiling: np.ndarray) -> np.ndarray:
         """The best that is known for a place, a vector (n,)."""
-        F = np.array([solved.F for solved in self.found])
+        F = self.F
         merit = np.max((F - reference) / ranges, axis=1) + (np.maximum(F - ceiling, 0.0) / ranges).sum(axis=1)
         return self.found[int(np.argmin(merit))].z
 
     def rows(self, steps: Steps) -> list[np.ndarray]:
         """Simulated points (k, 4 + n): objectives as the user sees them and controls in degrees; none dominated or beyond a limit."""
-        F = np.array([solved.F for solved in self.found])
+        F = self.F
         kept = np.flatnonzero(nondominated(np.round(F / np.maximum(np.ptp(F, axis=0), 1e-9) / 1e-5)))
         kept = kept[apart(F[kept])]
-        rows, infeasible = [], 0
+        rows = []
         for k in kept:
             steps.begin(f"flight {k}")
             trajectory, commands = rounded(self.nlp.unpack(self.found[k].z))
             simulated = simulate(self.case, trajectory, rtol=RTOL, atol=RTOL)
-            if self.feasible(simulated):
+            if simulated.violation <= ALLOWED:
                 rows.append(np.array([*simulated.objectives.values(), *commands]))
-            else:
-                infeasible += 1
+        infeasible = len(kept) - len(rows)
         print(f"{len(self.found)} solves converged, {len(kept)} of them not dominated, {infeasible} of these not feasible as simulated")
         return rows
-
-    def feasible(self, simulated: Simulation) -> bool:
-        """Whether a flight exceeds no limit by more than is allowed."""
-        return simulated.violation <= ALLOWED
 
 
 SIGNS = np.array([-1.0, 1.0, 1.0, 1.0])
@@ -200,11 +200,6 @@ def with_commands(flight: Trajectory, commands: np.ndarray) -> Trajectory:
     phase = flight["entry"]
     control = replace(phase.control, coefficients=np.radians(commands).reshape(phase.control.coefficients.shape))
     return replace(flight, phases=(replace(phase, control=control),))
-
-
-def volume(front: np.ndarray) -> float:
-    """Hypervolume in the paper's units, from the paper's corner, of objectives (k, 4) as the user sees them."""
-    return float(moocore.hypervolume(np.ascontiguousarray(front[:, :4] * SIGNS), ref=CORNER))
 
 
 def made(case: str, points: int) -> np.ndarray:
@@ -247,7 +242,7 @@ def text(case: str, rows: np.ndarray) -> str:
     head = [
         f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
         f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
-        "flown again by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
+        "simulated by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
         "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
         f"angle of attack and bank angle at both ends of each of {METHOD.elements} equal parts of the time, linear between.",
     ]
@@ -264,13 +259,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Make the table of a re-entry case's true front again.")
     parser.add_argument("case", choices=CASES)
     parser.add_argument("--points", type=int, default=120)
-    parser.add_argument("--out", default=None)
+    parser.add_argument("--out")
     given = parser.parse_args()
     try:
         rows = made(given.case, given.points)
     except Unsolved as error:
         raise SystemExit(f"{given.case}: {error}; no table was written") from error
     write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
-    print(f"{given.case}: {len(rows)} points, hypervolume {volume(rows):.1f}")
+    volume = moocore.hypervolume(np.ascontiguousarray(rows[:, :4] * SIGNS), ref=CORNER)
+    print(f"{given.case}: {len(rows)} points, hypervolume {volume:.1f} in the paper's units, from the paper's corner")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
         print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")

@@ -112,17 +112,17 @@ def test_the_scale_says_what_was_done():
     goals = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
     front = foreign(np.array([[110.0, 0.5]]), goals)
     truth = np.array([[100.0, 0.0], [200.0, 1.0], [150.0, 0.8], [300.0, 0.9]])
-    scale = Scale.of(truth, like=front, what="the closed form")
+    scale = Scale.of(truth, goals=goals, what="the closed form")
     assert scale.ideal == (100.0, 1.0) and scale.nadir == (200.0, 0.0) and scale.count == 3
     assert scale.corner == pytest.approx((210.0, -0.1))
     words = scale.describe()
     assert "nadir (flight time 200 s, speed 0 km/s) of the closed form (3 points)" in words
     assert "up to 1.1 in each objective (flight time 210 s, speed -0.1 km/s)" in words
-    assert "(2001 points, the curve through them)" in Scale.of(goddard.reference(), like=front).describe()
-    assert "(2001 points)" in Scale.of(goddard.reference(), like=front, curve=False).describe()
+    assert "(2001 points, the curve through them)" in Scale.of(goddard.reference(), goals=goals).describe()
+    assert "(2001 points)" in Scale.of(goddard.reference(), goals=goals, curve=False).describe()
     # What the volume is measured in: the box from the front's point to the corner, in ranges.
     assert hypervolume(front, truth) == pytest.approx(np.prod((np.array(scale.corner) - [110, 0.5]) / [100, -1]))
-    assert Scale.of(truth * [1, -1]).names == ("objective 1", "objective 2")
+    assert [goal.name for goal in Scale.of(truth * [1, -1]).goals] == ["objective 1", "objective 2"]
 
 
 def test_a_dense_reference_is_a_curve():

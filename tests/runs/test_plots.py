@@ -43,7 +43,7 @@ def words(figure):
 
 def test_all_points_of_all_runs_and_the_truth(tmp_path):
     fronts = {"ours": [foreign(A, GOALS), foreign(B, GOALS), foreign(EMPTY, GOALS)], "theirs": [A - [0, 0.5]]}
-    figure = front_figure(fronts, reference=TRUTH, marked=B)
+    figure = front_figure(fronts, goals=GOALS, reference=TRUTH, marked=B)
     (ax,) = figure.axes
     drawn = lines(ax)
     assert drawn["ours, 3 runs (1 empty)"].tolist() == [[1, 1], [3, 3], [2, 2.5]]
@@ -56,13 +56,13 @@ def test_all_points_of_all_runs_and_the_truth(tmp_path):
 
 
 def test_no_two_of_many_solvers_look_alike():
-    figure = front_figure({f"solver {k}": [foreign(A, GOALS)] for k in range(20)})
+    figure = front_figure({f"solver {k}": [foreign(A, GOALS)] for k in range(20)}, goals=GOALS)
     looks = {(line.get_color(), line.get_marker()) for line in figure.axes[0].get_lines()}
     assert len(looks) == 20
 
 
 def test_arrays_without_a_shape_of_their_own_are_empty_runs():
-    figure = front_figure({"ours": [foreign(A, GOALS), np.empty((0, 0))]})
+    figure = front_figure({"ours": [foreign(A, GOALS), np.empty((0, 0))]}, goals=GOALS)
     assert words(figure) == ["ours, 2 runs (1 empty)"]
 
 
@@ -79,10 +79,11 @@ def test_a_truth_of_few_points_is_no_line():
 
 
 def test_more_objectives_are_drawn_in_pairs():
-    figure = front_figure({"ours": [np.eye(4)]}, reference=np.eye(4))
+    goals = [Objective(f"objective {i}") for i in range(1, 5)]
+    figure = front_figure({"ours": [np.eye(4)]}, goals=goals, reference=np.eye(4))
     assert len(figure.axes) == 6 and figure.axes[5].get_xlabel() == "← objective 3"
     with pytest.raises(ValueError, match="two or more objectives"):
-        front_figure({"ours": []})
+        front_figure({"ours": []}, goals=goals[:1])
 
 
 def test_surfaces_are_staircases():
@@ -99,8 +100,9 @@ def test_surfaces_are_staircases():
     assert second.get_title(loc="left") == "theirs, 1 run" and second.get_xlim() == first.get_xlim()
     empty = attainment_figure({"ours": attainment([foreign(A, GOALS), foreign(EMPTY, GOALS)])}, goals=GOALS, reference=TRUTH)
     assert "worst: not attained" in words(empty)
+    goals = [Objective(f"objective {i}") for i in range(1, 4)]
     with pytest.raises(ValueError, match="two objectives, not of 3"):
-        attainment_figure({"ours": attainment([np.eye(3)])})
+        attainment_figure({"ours": attainment([np.eye(3)])}, goals=goals)
 
 
 @pytest.mark.parametrize("log", [True, False])
@@ -135,15 +137,17 @@ def test_flights_side_by_side_and_the_law(tmp_path):
 def test_paths_in_one_picture():
     front = flights(3)
     law = {"time": np.array([0.0, 1.0]), "h": np.array([1.0, 2.0])}
-    figure = paths_figure([front[0], front[2]], "h", lambda v: 2 * v["h"], ylabel="twice h [km]", laws={"analytic law": [None, law]})
+
+    def track(v):
+        return {"h [km]": v["h"], "twice h [km]": 2 * v["h"]}
+
+    figure = paths_figure([front[0], front[2]], track, laws={"analytic law": [None, law]})
     (ax,) = figure.axes
     drawn = [np.column_stack(line.get_data()) for line in ax.get_lines()]
     assert len(drawn) == 7, "two phases and an end each, and a law"
     assert all(np.allclose(path[:, 1], 2 * path[:, 0], equal_nan=True) for path in drawn)
     assert words(figure) == ["point 1", "point 2", "analytic law"] and ax.get_xlabel() == "h [km]" and ax.get_ylabel() == "twice h [km]"
-    assert len(paths_figure([front[0]], "h", lambda v: v["h"], ylabel="h", laws={"analytic law": [{}]}).axes[0].get_lines()) == 3
-    with pytest.raises(ValueError, match="no 'w' to draw"):
-        paths_figure([front[0]], "h", "w")
+    assert len(paths_figure([front[0]], track, laws={"analytic law": [{}]}).axes[0].get_lines()) == 3
 
 
 def test_flights_that_cannot_be_drawn():

@@ -19,7 +19,7 @@ from runs.execution.task import Outcome
 from runs.measures.references import look_up
 from runs.report.comparison import comparisons
 from runs.report.published import papers, published_tables
-from runs.report.report import _plain, _Writer, report
+from runs.report.report import _Writer, report
 from runs.report.tables import table
 
 SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
@@ -43,9 +43,10 @@ def folder(tmp_path_factory) -> Path:
     study().run(out)
     store = Store.open(out)
     one, other, _ = store.cells
-    store.front_path(one, 2).unlink()
-    store.record_path(one, 2).unlink()
-    store.front_path(other, 3).write_bytes(b"no front")
+    lost = store.run(one, 2).path
+    lost.unlink()
+    lost.with_suffix(".json").unlink()
+    store.run(other, 3).path.write_bytes(b"no front")
     return out
 
 
@@ -153,7 +154,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
     assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
-        store.keep(store.cells[0], 1, Outcome("crashed", "it broke"))
+        store.keep(store.run(store.cells[0], 1), Outcome("crashed", "it broke"))
     with pytest.raises(ValueError, match="nothing to report on yet"):
         report(tmp_path / "out")
     with pytest.raises(ValueError, match="another study"):
@@ -246,6 +247,6 @@ def test_problems_without_finished_runs_are_left_out_of_published_tables(folder)
 def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):
     writer = _Writer(tmp_path / "report")
     for value in (5, -5):
-        writer.table(_plain(f"mass {value:+d} %"), table(["shift"], [[value]], "of the mass"))
+        writer.table(f"mass {value:+d} %", table(["shift"], [[value]], "of the mass"))
     assert len(set(writer.files)) == len(writer.files) == 6 and all(path.exists() for path in writer.files)
     assert [path.name for path in writer.files if path.suffix == ".csv"] == ["mass-5.csv", "mass-5-2.csv"]

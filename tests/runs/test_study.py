@@ -271,7 +271,9 @@ def test_a_run_goes_on_where_it_was(tmp_path, damaged):
 # Killed and interrupted
 
 SCRIPT = """
-import sys
+import signal, sys
+# A shell that starts the tests in the background makes all its children ignore SIGINT.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, {here!r})
 from test_study import slow
 slow({runs}).run("out", jobs=2)
