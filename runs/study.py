@@ -137,6 +137,8 @@ class Study:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ValueError(f"study: name must be a word, not {self.name!r}")
+        if self.name in (".", "..") or set(self.name) & set("/\\\0"):
+            raise ValueError(f"study: its name is that of a folder, so it must not be {self.name!r}")
         with errors_begin_with(f"study '{self.name}'"):
             for key in _KEYS:
                 if key.metadata["kind"] is not None:

@@ -24,6 +24,7 @@ from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
 from macs.solvers.start import STARTS
 from problems import Problem
+from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from transcription.inner import NAMED
 
@@ -57,7 +58,10 @@ def solve(arguments: Namespace) -> int:
     start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
+    check_is_front(out)
     check_picture(arguments.plot)
+    if arguments.plot and Path(arguments.plot).resolve() == out.resolve():
+        raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
     if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
     with wrong_call_on_value_error():
@@ -83,11 +87,20 @@ def solve(arguments: Namespace) -> int:
     print(front.table(defects=defects, columns={"objectives off": [off for _, off in simulated]}))
     missing = sum(not max(pair) <= problem.verify_tolerance for pair in simulated)
     if missing:
-        print(f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}: see `macs verify {out}`.")
+        named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
+        print(
+            f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}: see `macs verify {out}{named}`."
+        )
     print(f"\nfront saved in {out}")
     if arguments.plot:
         draw(front, arguments.plot)
     return DONE if len(front) else FAILED
+
+
+def check_is_front(path: Path) -> None:
+    """Raise `WrongCall` if a file exists that is no front: it would be overwritten."""
+    if path.is_file() and path.stat().st_size and path.read_bytes()[:4] != b"\x89HDF":
+        raise WrongCall(f"--out {path} would overwrite a file that is no front")
 
 
 def show(arguments: Namespace) -> int:
