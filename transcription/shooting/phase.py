@@ -20,8 +20,6 @@ from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .control_law import ControlLaw
 from .step import Step, StepMesh
 
-FORGOTTEN = 1e-17
-"""Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""
 LONG = 3_000_000
 """Most operations of a chain of steps times variables that it depends on, for which its derivatives are written out."""
 
@@ -221,8 +219,7 @@ class ShootingPhase(PhaseWriter):
         seeds, n = self.layout.seeds(), self.mesh.steps
         U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
         C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
-        # The slopes of a spline forget values that are far away, by a factor of 3.7 a node.
-        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0), FORGOTTEN)
+        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0))
         controls = by_values @ seeds[self.layout.index(self.U).tolist(), :]
         statics = seeds[self.layout.index(self.ends.statics).tolist(), :]
         length, each = statics[1, :] - statics[0, :], C.numel() // n
