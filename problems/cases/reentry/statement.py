@@ -114,7 +114,7 @@ def reentry(
     if gravity not in vehicle.GRAVITIES:
         raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, vehicle.GRAVITIES))}, not {gravity!r}")
     mass, lag_gain, final_time = (
-        _positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
+        checks.positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
     )
     given = {"altitude": altitude_tolerance, "speed": speed_tolerance, "flight-path angle": angle_tolerance}
     problem = Problem(name)
@@ -179,10 +179,3 @@ def _check_tolerance(tolerance: Any, state: str, what: str) -> None:
     low, high = BOUNDS[state]
     if not low <= END[state] - tolerance <= END[state] + tolerance <= high:
         raise ValueError(f"{what}: {END[state]:g} +- {tolerance:g} is outside its bounds, {low:g} to {high:g}")
-
-
-def _positive(value: Any, what: str) -> float:
-    number = checks.number(value, what)
-    if number <= 0:
-        raise ValueError(f"{what} must be positive, not {number:g}")
-    return number
