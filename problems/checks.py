@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
@@ -14,13 +14,13 @@ import numpy as np
 from .compiled import Limit, Variable
 
 
-def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
-    """A new name: a non-empty string that is not among `taken`."""
+def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
+    """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
     if not isinstance(name, str) or not name.strip():
         raise ValueError(f"{place}: the name of a {kind} must be a non-empty string, not {name!r}")
     if name in taken:
         raise ValueError(f"{place}: the name '{name}' is used twice")
-    return name
+    return f"{kind} '{name}' of {place}"
 
 
 def number(value: Any, what: str) -> float:
@@ -114,13 +114,14 @@ def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
     return length
 
 
-def expression(value: Any, known: Mapping[int, str], what: str, hint: str) -> ca.MX:
-    """A scalar CasADi expression of known symbols only (by hash); plain numbers are expressions too."""
+def expression(value: Any, known: Iterable[ca.MX], what: str, hint: str) -> ca.MX:
+    """A scalar CasADi expression of known symbols only; plain numbers are expressions too."""
     if isinstance(value, ca.MX):
         if value.shape != (1, 1):
             raise ValueError(f"{what} must be a scalar, not of shape {value.shape}")
+        hashes = {symbol.__hash__() for symbol in known}
         for symbol in ca.symvar(value):
-            if symbol.__hash__() not in known:
+            if symbol.__hash__() not in hashes:
                 raise ValueError(f"{what} uses '{symbol.name()}', {hint}")
         if value.is_constant() and not math.isfinite(float(value)):
             raise ValueError(f"{what} must be finite, not {float(value)}")
