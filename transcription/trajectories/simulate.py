@@ -212,7 +212,7 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
     """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
     edges, nx = planned.state.edges, len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
-    times = (edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]).ravel()
+    times = planned.state.times(DENSE).ravel()
     states = elements[:, :, :nx].reshape(-1, nx)
     controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
     paths, peaks = paths_and_peaks(phase, states, controls, times, s)
