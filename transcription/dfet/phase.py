@@ -149,7 +149,7 @@ class DFETPhase(PhaseWriter):
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)
         points = tables.points[:-1]
-        time = np.append((edges[:-1, None] + 0.5 * (1.0 + points) * np.diff(edges)[:, None]).ravel(), edges[-1])
+        time = np.append(control.times(points).ravel(), edges[-1])
         states = np.vstack([(tables.collocation(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
         inner = (tables.control(points) @ control.coefficients).reshape(len(time) - 1, len(phase.controls))
         controls = np.vstack([inner, control.ends()[1][-1:]])

@@ -15,7 +15,7 @@ from ..base import FAILED, NLP, TIMEOUT
 from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..numerics.batched import expanded
 from ..stopping import stopping
-from .base import InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, scored, started
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Ipopt(InnerSolver):
             propagated = nlp.propagate(Z[left])
             usable = np.isfinite(nlp.evaluate(propagated)[1])
             Z[left[usable]] = propagated[usable]
-        return result(nlp, Z, start, status, iterations, tolerance)
+        return scored(nlp, (Z, *nlp.residuals(Z)), start, status, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base import INFEASIBLE, NLP
 from ..phases.reduced import Propagated, Reduced
-from .base import InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, scored, started
 from .least_distance import least_distance
 
 NEAR = 0.1
@@ -74,7 +74,7 @@ class Newton(InnerSolver):
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
+        return scored(nlp, (Z, *nlp.residuals(Z)), start, np.full(len(start), INFEASIBLE), iterations, tolerance)
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float

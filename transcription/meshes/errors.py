@@ -99,8 +99,9 @@ def _local_defects(
     integrals = _quadrature(phase, trajectory, np.array([trajectory.t0, trajectory.tf, *parameters]))
     sizes = np.abs(integrals).sum(axis=0)
     difference = np.abs(reached[:, len(span) :] - integrals) / np.where(sizes > 0, sizes, 1.0)
-    worst = defect.max(axis=1), difference.max(axis=1, initial=0.0)
-    return np.where(np.isfinite(worst[0]), worst[0], np.inf), np.where(np.isfinite(worst[1]), worst[1], np.inf)
+    worst = np.array([defect.max(axis=1), difference.max(axis=1, initial=0.0)])
+    worst[~np.isfinite(worst)] = np.inf
+    return worst[0], worst[1]
 
 
 def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from problems.compiled import CompiledPhase
 from ..numerics.periodic import wrapped
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .guess import along, line
+from .guess import along, state_along
 from .layout import Layout
 from .state_equations import StateEquations
 
@@ -146,10 +146,7 @@ class PhaseWriter(ABC):
         t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
         slots, share = self.state_nodes()
         for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
-            start = extended[:, self.ends.initial[i]]
-            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
-            given = self.phase.guesses.get(state.name)
-            values = line(start, end, share) if given is None else along(given, t0, tf, share)
+            values = state_along(self.phase, i, extended[:, self.ends.initial[i]], t0, tf, share)
             self.layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
             last = self.ends.final[i : i + 1]
             self.layout.write(extended, last, np.clip(extended[:, last], *final))
