@@ -328,10 +328,9 @@ class NLP(Deriving):
         return residuals
 
     @cached_property
-    def _limits(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Lower and upper limits and scales (n + r,) of the variables and of g."""
-        pairs = (self.lower, self.g_lower), (self.upper, self.g_upper), (self.scale, self.g_scale)
-        return np.concatenate(pairs[0]), np.concatenate(pairs[1]), np.concatenate(pairs[2])
+    def _limits(self) -> np.ndarray:
+        """Lower and upper limits and scales (3, n + r) of the variables and of g."""
+        return np.hstack([[self.lower, self.upper, self.scale], [self.g_lower, self.g_upper, self.g_scale]])
 
     @cached_property
     def _batched(self) -> Batched:
