@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -101,17 +100,12 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
     z = origin(nlp) + y * nlp.scale
     _, g = nlp.functions(z)
-    constant = settings.objective == "constant"
-    f = ca.MX(1) if constant else ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free])
+    projection = settings.objective == "projection"
+    f = ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free]) if projection else ca.MX(1)
     parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
-    solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
-    return solver, *scaled_bounds(nlp)
-
-
-def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
     options = ipopt_options(settings.seconds, settings.max_iterations)
     options |= {"ipopt.tol": 0.1 * tolerance, "ipopt.constr_viol_tol": 0.1 * tolerance}
-    if settings.objective == "projection":
+    if projection:
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
         options |= {
             "ipopt.mu_init": 1e-8,
@@ -126,4 +120,5 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
             "ipopt.acceptable_tol": 0.1 * tolerance,
             "ipopt.acceptable_iter": 5,
         }
-    return options
+    solver = ca.nlpsol("inner", "ipopt", parts, options)
+    return solver, *scaled_bounds(nlp)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Variable
+from problems.compiled import CompiledPhase, CompiledProblem
 
 from .arcs import METHODS, Arcs
 from .limits import DENSE, excess, paths_and_peaks
@@ -157,7 +157,7 @@ class _SimulatedPhase:
         states = self.trajectory.states
         found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(states, phase.states), strict=True)}
         found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, self.path_excess, strict=True)}
-        ends = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.final, strict=True)]
+        ends = [replace(v, lower=low, upper=high) for v, (low, high) in zip(phase.states, phase.final, strict=True)]
         for v, end, amount in zip(phase.states, ends, excess(states[-1:], ends), strict=True):
             if (end.lower, end.upper) != (v.lower, v.upper):
                 found[f"final value of {phase.name}.{v.name}"] = amount
