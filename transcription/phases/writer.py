@@ -243,16 +243,13 @@ class PhaseWriter(ABC):
             rows.add(values[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
 
     def trajectory(
-        self,
-        extended: np.ndarray,
-        time: np.ndarray,
-        states: np.ndarray,
-        controls: np.ndarray,
-        state: PiecewisePolynomial,
-        control: PiecewisePolynomial,
+        self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial
     ) -> PhaseTrajectory:
-        """The trajectory of an extended vector from states (n, nx) and controls (n, nu) at nodes in time (n,), and the two polynomials."""
-        phase, controls = self.phase, wrapped(controls, self.phase.controls)
+        """The trajectory of an extended vector from its two polynomials, with nodes at `tau` (k,) in [-1, 1) of each element and at tf."""
+        phase = self.phase
+        time = np.append(state.times(tau).ravel(), state.edges[-1])
+        states, controls = (np.vstack([*piece.on_elements(tau), piece.ends()[1][-1:]]) for piece in (state, control))
+        controls = wrapped(controls, phase.controls)
         s = extended[self.layout.index(self.ends.statics)]
         return PhaseTrajectory(
             name=phase.name,

@@ -123,10 +123,7 @@ class ShootingPhase(PhaseWriter):
         table[shots[:-1], 0], table[shots[1:] - 1, -1] = B[:-1], B[1:]
         state = PiecewisePolynomial(edges, table, "lobatto")
         inside = 2.0 * np.array([place for place in self.step.points if place < 1.0]) - 1.0
-        time = np.append(state.times(inside).ravel(), edges[-1])
-        nodes = np.vstack([*state.on_elements(inside), B[-1:]])
-        controls = np.vstack([*control.on_elements(inside), control.ends()[1][-1:]])
-        return self.trajectory(extended, time, nodes, controls, state, control)
+        return self.trajectory(extended, inside, state, control)
 
     @property
     def _arrivals(self) -> np.ndarray:

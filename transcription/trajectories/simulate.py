@@ -113,9 +113,16 @@ def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], 
         phase = problem.phases[i]
         planned = [one[phase.name] for one in trajectories]
         starts = np.array([_start(problem, i, *one) for one in zip(planned, simulated, violations, strict=True)])
-        for k, one in enumerate(_simulated_phases(phase, planned, starts, parameters, rtol, atol, method)):
-            simulated[k][i] = one
-            violations[k] |= one.violations(phase)
+        integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
+        tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+        y, elements = np.hstack([starts, integrals]), []
+        for j in range(len(planned[0].state.edges) - 1):
+            arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
+            elements.append(arcs.integrate(y, rtol, tolerances, method))
+            y = elements[-1][:, -1]
+        for k, one in enumerate(zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)):
+            simulated[k][i] = _simulated_phase(phase, *one)
+            violations[k] |= simulated[k][i].violations(phase)
     return [_simulation(problem, *one) for one in zip(simulated, violations, trajectories, parameters, strict=True)]
 
 
@@ -186,26 +193,6 @@ def _start(
                 start[j] = end[name]
                 taken.add(name)
     return start
-
-
-def _simulated_phases(
-    phase: CompiledPhase,
-    planned: Sequence[PhaseTrajectory],
-    starts: np.ndarray,
-    parameters: Sequence[np.ndarray],
-    rtol: float,
-    atol: float,
-    method: str,
-) -> list[_SimulatedPhase]:
-    """One phase of n trajectories of one shape, from their `starts` (n, nx)."""
-    integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
-    y, elements = np.hstack([starts, integrals]), []
-    tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
-    for j in range(len(planned[0].state.edges) - 1):
-        arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
-        elements.append(arcs.integrate(y, rtol, tolerances, method))
-        y = elements[-1][:, -1]
-    return [_simulated_phase(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
 
 
 def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _SimulatedPhase:

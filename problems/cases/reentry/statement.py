@@ -120,7 +120,10 @@ def reentry(
     problem = Problem(name)
     phase = problem.phase("entry", t0=0.0, tf=final_time)
     for state, tolerance in given.items():
-        _check_tolerance(tolerance, state, f"{name}: the tolerance of the final {state}")
+        what = f"{name}: the tolerance of the final {state}"
+        if checks.number(tolerance, what) < 0:
+            raise ValueError(f"{what} must not be negative, not {tolerance:g}")
+        checks.within((END[state] - tolerance, END[state] + tolerance), BOUNDS[state], f"{name}: the final {state} with its tolerance")
     states = declare(phase, START, {state: END[state] for state, tolerance in given.items() if tolerance == 0})
     for angle in ANGLES:
         phase.control(f"{angle} command", bounds=BOUNDS[angle], unit="rad")
@@ -171,11 +174,3 @@ def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) ->
         )
         for name, value in start.items()
     }
-
-
-def _check_tolerance(tolerance: Any, state: str, what: str) -> None:
-    if checks.number(tolerance, what) < 0:
-        raise ValueError(f"{what} must not be negative, not {tolerance:g}")
-    low, high = BOUNDS[state]
-    if not low <= END[state] - tolerance <= END[state] + tolerance <= high:
-        raise ValueError(f"{what}: {END[state]:g} +- {tolerance:g} is outside its bounds, {low:g} to {high:g}")
