@@ -120,11 +120,10 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     The slope of a line through the logarithms of the coefficients from the second on, each taken as large as the largest one after it. The
     slowest column counts, of those that are not `FLAT`. Infinite where all of them are, or where there are too few to tell.
     """
-    count, k, columns = coefficients.shape
-    rates = np.full(count, np.inf)
-    if k < 3 or not columns:
+    count, k, _ = coefficients.shape
+    if k < 3:
         # Two coefficients are no series: nothing speaks against a higher degree.
-        return rates
+        return np.full(count, np.inf)
     size = np.maximum.accumulate(np.abs(coefficients[:, :0:-1]), axis=1)[:, ::-1]
     if k > 3:
         # Of an even or odd function every other coefficient is 0, and so might be the last.
@@ -133,8 +132,7 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     slope = degree - degree.mean()
     logarithms = np.log(np.maximum(size, 1e-14))
     found = -np.einsum("k,nkc->nc", slope, logarithms) / (slope**2).sum()
-    found = np.where(size[:, 0] > FLAT, found, np.inf)
-    return np.minimum(rates, found.min(axis=1, initial=np.inf))
+    return np.where(size[:, 0] > FLAT, found, np.inf).min(axis=1, initial=np.inf)
 
 
 def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:

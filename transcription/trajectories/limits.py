@@ -23,8 +23,6 @@ NEGLIGIBLE = 1e-6
 def excess(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray:
     """The largest scaled amounts by which the columns of `values` (..., k, c) leave their c limits, shape (..., c), 0 where none does."""
     lower, upper, scale = (np.array([getattr(limit, name) for limit in limits]) for name in ("lower", "upper", "scale"))
-    if not len(limits):
-        return np.zeros((*values.shape[:-2], 0))
     return np.maximum(np.maximum(lower - values, values - upper) / scale, 0.0).max(axis=-2, initial=0.0)
 
 

@@ -134,13 +134,10 @@ def reentry(
 
     altitude, speed, attack = phase["altitude"], phase["speed"], phase["angle of attack"]
     heating = vehicle.heating_rate(altitude, speed, attack)
-    pressure, load = vehicle.dynamic_pressure(altitude, speed), vehicle.load_factor(altitude, speed, attack, mass, gravity)
-    for word, value, limit in (
-        ("heating rate", heating, limits.heating_rate),
-        ("dynamic pressure", pressure, limits.dynamic_pressure),
-        ("load factor", load, limits.load_factor),
-    ):
-        phase.path(word, value, upper=limit, scale=limit)
+    load = vehicle.load_factor(altitude, speed, attack, mass, gravity)
+    limited = heating, vehicle.dynamic_pressure(altitude, speed), load
+    for (word, limit), value in zip(vars(limits).items(), limited, strict=True):
+        phase.path(word.replace("_", " "), value, upper=limit, scale=limit)
     for number, zone in enumerate(zones, 1):
         east, north = (degrees(1.0) * phase[word] - getattr(zone, word) for word in ("longitude", "latitude"))
         phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, scale=zone.radius)
