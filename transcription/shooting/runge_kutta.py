@@ -40,14 +40,20 @@ class Tableau:
         return tuple(float(sum(row)) for row in self.A)
 
     @property
+    def matrix(self) -> np.ndarray:
+        """A in full, (s, s), strictly lower triangular."""
+        full = np.zeros((len(self.b), len(self.b)))
+        for i, row in enumerate(self.A):
+            full[i, :i] = row
+        return full
+
+    @property
     def growth(self) -> np.ndarray:
         """Coefficients (s + 1,) of the stability function R(z) = 1 + z b'(1 - z A)^-1 1, from the constant term on."""
-        A, power, terms = np.zeros((len(self.b), len(self.b))), np.ones(len(self.b)), [1.0]
-        for i, row in enumerate(self.A):
-            A[i, :i] = row
+        power, terms = np.ones(len(self.b)), [1.0]
         for _ in self.b:
             terms.append(float(np.array(self.b) @ power))
-            power = A @ power
+            power = self.matrix @ power
         return np.array(terms)
 
     def stability(self, z: np.ndarray) -> np.ndarray:
