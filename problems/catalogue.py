@@ -82,7 +82,8 @@ def load(name: str, **data: Any) -> Problem:
         raise
     if not isinstance(problem, Problem):
         raise ValueError(f"'{name}' must return a Problem, not {type(problem).__name__}")
-    problem.address, problem.data = _portable(name), data
+    # A file is found again from another folder.
+    problem.address, problem.data = f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name, data
     return problem
 
 
@@ -104,12 +105,6 @@ def _knows_problems(module: ModuleType) -> bool:
     """Whether a module has something of this package among its names."""
     origins = (one.__name__ if isinstance(one, ModuleType) else getattr(one, "__module__", None) for one in vars(module).values())
     return any(isinstance(origin, str) and origin.partition(".")[0] == __package__ for origin in origins)
-
-
-def _portable(name: str) -> str:
-    """The address with which the same file is found from another folder."""
-    place, _, function_name = name.rpartition(":")
-    return f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name
 
 
 def _file_module(place: str) -> ModuleType:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
@@ -14,13 +14,13 @@ import numpy as np
 from .compiled import Limit, Variable
 
 
-def name_of(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
-    """A new name: a non-empty string that is not among `taken`."""
+def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
+    """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
     if not isinstance(name, str) or not name.strip():
         raise ValueError(f"{place}: the name of a {kind} must be a non-empty string, not {name!r}")
     if name in taken:
         raise ValueError(f"{place}: the name '{name}' is used twice")
-    return name
+    return f"{kind} '{name}' of {place}"
 
 
 def number(value: Any, what: str) -> float:
@@ -74,14 +74,17 @@ def intersection(first: tuple[float, float], second: tuple[float, float], what: 
     return lower, upper
 
 
+def positive(value: Any, what: str) -> float:
+    """A positive finite number."""
+    result = number(value, what)
+    if result <= 0:
+        raise ValueError(f"{what} must be positive, not {result:g}")
+    return result
+
+
 def scale(value: Any, default: float, what: str) -> float:
     """A positive number, or the default where none is given."""
-    if value is None:
-        return default
-    result = number(value, f"the scale of {what}")
-    if result <= 0:
-        raise ValueError(f"the scale of {what} must be positive, not {result:g}")
-    return result
+    return default if value is None else positive(value, f"the scale of {what}")
 
 
 def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
@@ -90,21 +93,15 @@ def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Lim
     What counts as one in it is by default the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
     the limit's size: so at the usual tolerance of 1e-6 none has to be met to more than nine digits, which scaled solvers cannot reach.
     """
-    low, high = one_sided(lower, upper, what)
-    finite = [abs(side) for side in (low, high) if math.isfinite(side)]
-    default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
-    return Limit(name, low, high, scale(given_scale, default, what))
-
-
-def one_sided(lower: Any, upper: Any, what: str) -> tuple[float, float]:
-    """Limits of which at least one is given; the other is infinite."""
     if lower is None and upper is None:
         raise ValueError(f"{what} has neither a lower nor an upper limit")
     low = -math.inf if lower is None else number(lower, f"the lower limit of {what}")
     high = math.inf if upper is None else number(upper, f"the upper limit of {what}")
     if low > high:
         raise ValueError(f"{what} is an empty interval: {low:g} > {high:g}")
-    return low, high
+    finite = [abs(side) for side in (low, high) if math.isfinite(side)]
+    default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
+    return Limit(name, low, high, scale(given_scale, default, what))
 
 
 def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
@@ -117,13 +114,14 @@ def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
     return length
 
 
-def expression(value: Any, known: Mapping[int, str], what: str, hint: str) -> ca.MX:
-    """A scalar CasADi expression of known symbols only (by hash); plain numbers are expressions too."""
+def expression(value: Any, known: Iterable[ca.MX], what: str, hint: str) -> ca.MX:
+    """A scalar CasADi expression of known symbols only; plain numbers are expressions too."""
     if isinstance(value, ca.MX):
         if value.shape != (1, 1):
             raise ValueError(f"{what} must be a scalar, not of shape {value.shape}")
+        hashes = {symbol.__hash__() for symbol in known}
         for symbol in ca.symvar(value):
-            if symbol.__hash__() not in known:
+            if symbol.__hash__() not in hashes:
                 raise ValueError(f"{what} uses '{symbol.name()}', {hint}")
         if value.is_constant() and not math.isfinite(float(value)):
             raise ValueError(f"{what} must be finite, not {float(value)}")

@@ -161,35 +161,27 @@ class Phase:
 
     def guess(self, **values: Any) -> None:
         """Say from where to start: states, controls, `t0` and `tf` by name. A number, a pair for a straight line, or (times, values)."""
+        times = {word: Variable(word, *limits) for word, limits in (("t0", self._t0_range), ("tf", self._tf_range))}
+        known = self._states | self._controls | times
         for name, value in values.items():
             what = f"phase '{self.name}': the guess of '{name}'"
-            if name not in self._symbols and name not in ("t0", "tf"):
-                raise ValueError(f"{what}: there is no such state, control or time; there are {', '.join((*self._symbols, 't0', 'tf'))}")
-            self._guesses[name] = self._guess(name, value, what)
-
-    def _guess(self, name: str, value: Any, what: str) -> Any:
-        if name in ("t0", "tf"):
-            limits = self._t0_range if name == "t0" else self._tf_range
-            return checks.guessed(checks.number(value, what), Variable(name, *limits), what)
-        variable = self._states.get(name) or self._controls[name]
-        return checks.guessed(checks.guess(value, what), variable, what)
+            if name not in known:
+                raise ValueError(f"{what}: there is no such state, control or time; there are {', '.join((*self._symbols, *times))}")
+            given = checks.number(value, what) if name in times else checks.guess(value, what)
+            self._guesses[name] = checks.guessed(given, known[name], what)
 
     def _new_name(self, kind: str, name: str) -> str:
         taken = {*self._symbols, *self._paths, "time", "t0", "tf"}
-        place = f"phase '{self.name}'"
-        return f"{kind} '{checks.name_of(kind, name, taken, place)}' of {place}"
+        return checks.new_name(kind, name, taken, f"phase '{self.name}'")
 
     def _new_symbol(self, name: str) -> ca.MX:
         self._symbols[name] = ca.MX.sym(name)
         return self._symbols[name]
 
-    def _known(self) -> dict[int, str]:
-        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._parameters.values()]
-        return {symbol.__hash__(): symbol.name() for symbol in own}
-
     def _expression(self, value: Any, what: str) -> ca.MX:
+        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._parameters.values()]
         hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"
-        return checks.expression(value, self._known(), what, hint)
+        return checks.expression(value, own, what, hint)
 
     def _quantity(self, kind: str, expr: Any) -> ca.MX:
         inner = self._expression(expr, f"phase '{self.name}': the expression of {kind}(...)")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
 
@@ -37,7 +38,8 @@ class Problem:
     """
 
     def __init__(self, name: str) -> None:
-        self.name = checks.name_of("problem", name, (), "Problem")
+        checks.new_name("problem", name, (), "Problem")
+        self.name = name
         self.address = ""
         self.data: Mapping[str, Any] = {}
         self.default_transcription = "dfet:8x3:bernstein"
@@ -50,8 +52,7 @@ class Problem:
         self._symbols: dict[str, ca.MX] = {}
         self._objectives: dict[str, tuple[Objective, ca.MX]] = {}
         self._constraints: dict[str, tuple[Limit, ca.MX]] = {}
-        self._links: list[Link] = []
-        self._open_links: set[tuple[int, int]] = set()
+        self._links: dict[tuple[int, int], tuple[str, ...] | None] = {}
         self._guesses: dict[str, float] = {}
 
     def __repr__(self) -> str:
@@ -88,14 +89,13 @@ class Problem:
         -------
         Phase
         """
-        checks.name_of("phase", name, self._phases, f"problem '{self.name}'")
+        checks.new_name("phase", name, self._phases, f"problem '{self.name}'")
         self._phases[name] = Phase(name, t0, tf, duration, time_unit, problem=self.name, parameters=self.parameters)
         return self._phases[name]
 
     def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None) -> ca.MX:
         """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase."""
-        place = f"problem '{self.name}'"
-        what = f"parameter '{checks.name_of('parameter', name, self._parameters, place)}' of {place}"
+        what = checks.new_name("parameter", name, self._parameters, f"problem '{self.name}'")
         limits = checks.interval(bounds, f"the bounds of {what}")
         self._parameters[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0] or 1.0, what))
         self._symbols[name] = ca.MX.sym(name)
@@ -103,8 +103,7 @@ class Problem:
 
     def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
         """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases; `scale` as in `Phase.path`."""
-        place = f"problem '{self.name}'"
-        what = f"constraint '{checks.name_of('constraint', name, self._constraints, place)}' of {place}"
+        what = checks.new_name("constraint", name, self._constraints, f"problem '{self.name}'")
         self._constraints[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
 
     def link(self, first: Phase, second: Phase, *, states: Any = None) -> None:
@@ -122,18 +121,21 @@ class Problem:
                 raise ValueError(f"problem '{self.name}': link takes two of its phases, not {phase!r}")
             numbers.append(list(self._phases).index(phase.name))
         place = f"the link from phase '{first.name}' to phase '{second.name}'"
-        common = _common(first, second)
-        chosen = common if states is None else [states] if isinstance(states, str) else list(states)
-        for name in chosen:
+        pair, common = (numbers[0], numbers[1]), _common(first, second)
+        chosen = None if states is None else (states,) if isinstance(states, str) else tuple(states)
+        for name in chosen or ():
             if name not in common:
                 raise ValueError(f"{place}: '{name}' is not a state of both; they share {', '.join(common) or 'none'}")
-        if any((link.first, link.second) == tuple(numbers) for link in self._links):
+        if pair in self._links:
             raise ValueError(f"{place} is given twice")
-        if numbers[0] == numbers[1] or numbers[0] in _after(self._links, numbers[1]):
-            raise ValueError(f"{place} would make time run in a circle; state a periodic condition with `constraint`")
-        self._links.append(Link(numbers[0], numbers[1], tuple(chosen)))
-        if states is None:
-            self._open_links.add((numbers[0], numbers[1]))
+        order: TopologicalSorter[int] = TopologicalSorter()
+        for before, after in (*self._links, pair):
+            order.add(after, before)
+        try:
+            order.prepare()
+        except CycleError:
+            raise ValueError(f"{place} would make time run in a circle; state a periodic condition with `constraint`") from None
+        self._links[pair] = chosen
 
     def minimize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be minimised: an expression of the same kind as a constraint's.
@@ -168,45 +170,32 @@ class Problem:
             raise ValueError(f"{place} has no phase")
         if not self._objectives:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
-        links = [self._resolved(link) for link in self._links]
-        phases = _narrowed([phase._compile() for phase in self._phases.values()], links)
-        parameters = tuple(self._parameters.values())
-        groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(self._phases.values())}
-        groups["p"] = list(self.parameters.values())
-        goals = tuple(goal for goal, _ in self._objectives.values())
-        minimised = [goal.sign * expr for goal, expr in self._objectives.values()]
+        phases = list(self._phases.values())
+        links = [Link(i, j, _common(phases[i], phases[j]) if states is None else states) for (i, j), states in self._links.items()]
+        groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(phases)} | {"p": list(self._symbols.values())}
         compiled = CompiledProblem(
             name=self.name,
-            phases=tuple(phases),
-            parameters=parameters,
+            phases=tuple(_narrowed([phase._compile() for phase in phases], links)),
+            parameters=tuple(self._parameters.values()),
             guesses=dict(self._guesses),
-            goals=goals,
+            goals=tuple(goal for goal, _ in self._objectives.values()),
             limits=tuple(limit for limit, _ in self._constraints.values()),
             links=tuple(links),
-            objectives=vector_function("objectives", groups, minimised),
+            objectives=vector_function("objectives", groups, [goal.sign * expr for goal, expr in self._objectives.values()]),
             constraints=vector_function("constraints", groups, [expr for _, expr in self._constraints.values()]),
             address=self.address,
             data=dict(self.data),
         )
-        check_numbers(compiled, [phase._labels() for phase in self._phases.values()])
+        check_numbers(compiled, [phase._labels() for phase in phases])
         return with_sizes(compiled)
 
-    def _resolved(self, link: Link) -> Link:
-        """The link with all states that are common by now, unless its user named them."""
-        if (link.first, link.second) not in self._open_links:
-            return link
-        phases = list(self._phases.values())
-        return replace(link, states=tuple(_common(phases[link.first], phases[link.second])))
-
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
-        place = f"problem '{self.name}'"
-        what = f"objective '{checks.name_of('objective', name, self._objectives, place)}' of {place}"
+        what = checks.new_name("objective", name, self._objectives, f"problem '{self.name}'")
         factor = None if scale is None else checks.scale(scale, 1.0, what)
         self._objectives[name] = Objective(name, unit, sense, factor), self._expression(expr, what)
 
     def _expression(self, value: Any, what: str) -> ca.MX:
-        known = {symbol.__hash__(): symbol.name() for phase in self._phases.values() for symbol in phase._quantity_symbols()}
-        known |= {symbol.__hash__(): name for name, symbol in self.parameters.items()}
+        known = [*self._symbols.values(), *(symbol for phase in self._phases.values() for symbol in phase._quantity_symbols())]
         hint = (
             f"which is not of problem '{self.name}' or varies along a phase: "
             "use initial(...), final(...), integral(...) or peak(...) of a phase, times and parameters"
@@ -214,21 +203,9 @@ class Problem:
         return checks.expression(value, known, what, hint)
 
 
-def _common(first: Phase, second: Phase) -> list[str]:
+def _common(first: Phase, second: Phase) -> tuple[str, ...]:
     """Names of the states of both phases."""
-    return [name for name in first._states if name in second._states]
-
-
-def _after(links: list[Link], start: int) -> set[int]:
-    """Indices of the phases that follow phase `start`, directly or not."""
-    reached: set[int] = set()
-    frontier = [start]
-    while frontier:
-        current = frontier.pop()
-        following = {link.second for link in links if link.first == current} - reached
-        reached |= following
-        frontier.extend(following)
-    return reached
+    return tuple(name for name in first._states if name in second._states)
 
 
 def _narrowed(phases: list[CompiledPhase], links: list[Link]) -> list[CompiledPhase]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .compiled import CompiledPhase, CompiledProblem, Variable
 
-SAMPLES = 2048
+SAMPLES, FEW = 2048, 64
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -22,29 +22,30 @@ def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
     labels : sequence of mappings
         For each phase, by name of its Functions, what to call each of their rows.
     """
-    rng = np.random.default_rng(0)
-    p = _within(rng, [(v.lower, v.upper) for v in problem.parameters])
-    quantities = [_quantities(phase, words, p, rng) for phase, words in zip(problem.phases, labels, strict=True)]
+    found = _sampled(problem, labels)
     place = f"of problem '{problem.name}'"
-    _finite(problem.objectives, (*quantities, p), [f"objective '{goal.name}' {place}" for goal in problem.goals])
-    _finite(problem.constraints, (*quantities, p), [f"constraint '{limit.name}' {place}" for limit in problem.limits])
+    _finite(problem.objectives, found, [f"objective '{goal.name}' {place}" for goal in problem.goals])
+    _finite(problem.constraints, found, [f"constraint '{limit.name}' {place}" for limit in problem.limits])
 
 
-def samples(problem: CompiledProblem, count: int = 64) -> list[np.ndarray]:
-    """Samples of the arguments of objectives and constraints: columns of quantities of each phase and of parameters, (size, count) each."""
+def samples(problem: CompiledProblem) -> list[np.ndarray]:
+    """Samples of the arguments of objectives and constraints: columns of quantities of each phase and of parameters, (size, FEW) each."""
+    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
+    labels = [{name: [name] * getattr(phase, name).size1_out(0) for name in names} for phase in problem.phases]
+    return [values[:, :FEW] for values in _sampled(problem, labels)]
+
+
+def _sampled(problem: CompiledProblem, labels: Sequence[Labels]) -> list[np.ndarray]:
+    """The same, (size, SAMPLES) each."""
     rng = np.random.default_rng(0)
-    p = _within(rng, [(v.lower, v.upper) for v in problem.parameters])
-    found = []
-    for phase in problem.phases:
-        names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
-        labels = {name: [name] * getattr(phase, name).size1_out(0) for name in names}
-        found.append(_quantities(phase, labels, p, rng))
-    return [values[:, :count] for values in (*found, p)]
+    p = _between(rng, problem.parameters)
+    return [*(_quantities(phase, words, p, rng) for phase, words in zip(problem.phases, labels, strict=True)), p]
 
 
 def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Samples of a phase's quantities, shape (n_quantities, SAMPLES)."""
-    t0, tf = _times(phase, rng)
+    t0, tf = _between(rng, [phase.t0]), _between(rng, [phase.tf])
+    tf = np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
     share, s = rng.random(SAMPLES), np.vstack([t0, tf, p])
     first, last = _within(rng, phase.initial), _within(rng, phase.final)
     # Half of the samples anywhere in the box, half of them near the ways from the initial to the final states.
@@ -58,13 +59,6 @@ def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.ran
     integrals = _finite(phase.integrands, along, labels["integrands"]) * (tf - t0)
     peaks = _finite(phase.peaks, along, labels["peaks"])
     return np.vstack([t0, tf, initials, finals, integrals, peaks])
-
-
-def _times(phase: CompiledPhase, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Samples of t0 and tf, in that order in time."""
-    t0 = _between(rng, [phase.t0])
-    tf = _between(rng, [phase.tf])
-    return t0, np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
 
 
 def _between(rng: np.random.Generator, variables: Sequence[Variable]) -> np.ndarray:

@@ -6,7 +6,7 @@ objectives.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -42,20 +42,17 @@ class Assembly:
         self._writers: dict[int, PhaseWriter] = {}
         for i in problem.order_in_time:
             self._writers[i] = writer(problem.phases[i], self.layout, self._ends(i))
+        self._declared = [self._writers[i] for i in range(len(problem.phases))]
         self._peaks = [self._add_peaks(phase) for phase in problem.phases]
-        self._least = np.concatenate([*self._peaks, *(self._writers[i].magnitudes for i in range(len(problem.phases)))])
+        self._least = np.concatenate([*self._peaks, *(writer.magnitudes for writer in self._declared)])
 
     def nlp(self, transcription: Transcription) -> NLP:
         """The whole NLP."""
         z = ca.MX.sym("z", len(self.layout.variables) + self.layout.hidden)
         extended = self.layout.extended_symbol(z)
         rows = Rows()
-        quantities, largest, magnitudes = [], [], []
-        for i in range(len(self.problem.phases)):
-            q, peaks, sizes = self._write_phase(i, extended, rows)
-            quantities.append(q)
-            largest.append(peaks)
-            magnitudes.append(sizes)
+        written = [self._write_phase(*one, extended, rows) for one in zip(self._declared, self._peaks, strict=True)]
+        quantities, largest, magnitudes = zip(*written, strict=True)
         self._write_problem(extended, quantities, rows)
         p = self.layout.pick(extended, self.parameters)
         F = ca.densify(self.problem.objectives(*quantities, p))
@@ -107,8 +104,7 @@ class Assembly:
         """See `NLP.profiles`."""
         column = {slot: i for i, slot in enumerate(self.layout.free)}
         found = []
-        for i in range(len(self.problem.phases)):
-            writer = self._writers[i]
+        for writer in self._declared:
             slots, places = writer.control_nodes()
             for control, own in zip(writer.phase.controls, slots.T, strict=True):
                 free = np.flatnonzero(own >= 0)  # a control whose bounds coincide is no variable
@@ -162,7 +158,7 @@ class Assembly:
     def unpack(self, z: np.ndarray) -> Trajectory:
         """See `NLP.unpack`."""
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
-        phases = tuple(self._writers[i].unpack(extended) for i in range(len(self.problem.phases)))
+        phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
 
@@ -200,15 +196,12 @@ class Assembly:
                 shared.setdefault(name, slot)
 
         def end(variable: Variable, word: str, limits: tuple[float, float], free: bool) -> int:
+            if free and variable.name in shared:
+                return shared[variable.name]
             return self.layout.add(replace(variable, name=f"{prefix}{variable.name}{word}", lower=limits[0], upper=limits[1]), free=free)
 
-        t0, tf = phase.t0, phase.tf
-        slot_t0 = shared["t0"] if "t0" in shared else end(t0, "", (t0.lower, t0.upper), True)
-        slot_tf = end(tf, "", (tf.lower, tf.upper), True)
-        initial = [
-            shared[v.name] if v.name in shared else end(v, "(t0)", limits, True)
-            for v, limits in zip(phase.states, phase.initial, strict=True)
-        ]
+        slot_t0, slot_tf = (end(v, "", (v.lower, v.upper), True) for v in (phase.t0, phase.tf))
+        initial = [end(v, "(t0)", limits, True) for v, limits in zip(phase.states, phase.initial, strict=True)]
         final = [end(v, "(tf)", limits, False) for v, limits in zip(phase.states, phase.final, strict=True)]
         return Ends(slot_t0, slot_tf, np.array(initial), np.array(final), self.parameters)
 
@@ -226,11 +219,9 @@ class Assembly:
         variables = [Variable(name, -np.inf, np.inf, "", float(scale or 1.0)) for name, scale in zip(names, scales, strict=True)]
         return np.array([self.layout.add(variable) for variable in variables])
 
-    def _write_phase(self, i: int, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Rows of phase i; its quantities q, the largest samples of its peaks, and its magnitudes."""
-        phase, writer, peaks = self.problem.phases[i], self._writers[i], self._peaks[i]
-        written = writer.write(extended, rows)
-        pick = self.layout.pick
+    def _write_phase(self, writer: PhaseWriter, peaks: np.ndarray, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Rows of one phase; its quantities q, the largest samples of its peaks, and its magnitudes."""
+        phase, pick, written = writer.phase, self.layout.pick, writer.write(extended, rows)
         s = pick(extended, writer.ends.statics)
         first, last = pick(extended, writer.ends.initial), pick(extended, writer.ends.final)
         peak = pick(extended, peaks)
@@ -244,11 +235,11 @@ class Assembly:
         q = ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak)
         return q, ca.vertcat(*largest) if largest else ca.MX(0, 1), written.magnitudes
 
-    def _write_problem(self, extended: ca.MX, quantities: list[ca.MX], rows: Rows) -> None:
+    def _write_problem(self, extended: ca.MX, quantities: Sequence[ca.MX], rows: Rows) -> None:
         """Rows of durations, of links that could not be shared, and of the user's constraints."""
-        for i, phase in enumerate(self.problem.phases):
-            shortest, longest = phase.duration
-            times = self.layout.pick(extended, self._writers[i].ends.statics[:2])
+        for writer in self._declared:
+            phase, (shortest, longest) = writer.phase, writer.phase.duration
+            times = self.layout.pick(extended, writer.ends.statics[:2])
             if phase.tf.lower - phase.t0.upper < shortest or phase.tf.upper - phase.t0.lower > longest:
                 span = phase.tf.upper - phase.t0.lower
                 rows.add(times[1] - times[0], shortest, longest, span, f"duration of '{phase.name}'")

@@ -317,22 +317,20 @@ class NLP(Deriving):
 
     def _residuals(self, Z: np.ndarray, g: np.ndarray) -> np.ndarray:
         """Scaled residuals (k, n + r) of bounds and rows of g (k, r)."""
-        n = Z.shape[1]
-        residuals = np.empty((len(Z), n + g.shape[1]))
+        lower, upper, scale = self._limits
+        residuals = np.hstack([Z, g])
         # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore"):
-            for part, values, lower, upper in (
-                (residuals[:, :n], Z, self.lower, self.upper),
-                (residuals[:, n:], g, self.g_lower, self.g_upper),
-            ):
-                np.subtract(values, upper, out=part)
-                np.maximum(part, lower - values, out=part)
-            residuals /= self._scales
+            below = lower - residuals
+            residuals -= upper
+            np.maximum(residuals, below, out=residuals)
+        residuals /= scale
         return residuals
 
     @cached_property
-    def _scales(self) -> np.ndarray:
-        return np.concatenate([self.scale, self.g_scale])
+    def _limits(self) -> np.ndarray:
+        """Lower and upper limits and scales (3, n + r) of the variables and of g."""
+        return np.hstack([[self.lower, self.upper, self.scale], [self.g_lower, self.g_upper, self.g_scale]])
 
     @cached_property
     def _batched(self) -> Batched:

@@ -9,7 +9,7 @@ published implementation and belong to the problem: without them a coarse mesh h
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -46,8 +46,7 @@ def reference() -> np.ndarray:
 
 def reference_with_costates() -> np.ndarray:
     """The rows of `reference` with the initial costates of r, vr and vt, shape (241, 5)."""
-    with files("problems.cases").joinpath("orbit_rise_front.csv").open() as file:
-        return np.loadtxt(file, delimiter=",", skiprows=1)
+    return np.loadtxt(Path(__file__).with_name("orbit_rise_front.csv"), delimiter=",", skiprows=1)
 
 
 LAW = "indirect shooting"

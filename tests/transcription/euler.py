@@ -87,4 +87,4 @@ class EulerPhase(PhaseWriter):
         time = s[0] + (s[1] - s[0]) * np.array(self.mesh.edges)
         state = PiecewisePolynomial(time, np.stack([B[:-1], B[1:]], axis=1), "lobatto")
         control = PiecewisePolynomial(time, U[:, None], "lobatto")
-        return self.trajectory(extended, time, B, np.vstack([U, U[-1:]]), state, control)
+        return self.trajectory(extended, np.array([-1.0]), state, control)

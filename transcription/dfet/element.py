@@ -56,6 +56,8 @@ class Tables:
     stages : array (l + 1,)
         Gauss-Legendre nodes of the equivalent Runge-Kutta method. Through the states there and at both ends passes its collocation
         polynomial, which is more accurate by one order than the states' own polynomial of degree l.
+    state_nodes, control_nodes : arrays (l + 1,), (q + 1,)
+        Abscissae of the coefficients of the states and of the controls.
     mass : array (l + 1, l + 2)
         Integrals of a state function times the derivative of a test function: exact.
     test : array (nq, l + 2)
@@ -71,6 +73,8 @@ class Tables:
         self.order, self.control_order = order, control_order
         self.state_basis = basis
         self.control_basis = "legendre" if basis == "lobatto" else basis
+        self.state_nodes = polynomials.nodes(self.state_basis, order)
+        self.control_nodes = polynomials.nodes(self.control_basis, control_order)
         self.tau, self.weights = polynomials.gauss_legendre(max(order, control_order) + 1)
         self.points = np.array([-1.0, *self.tau, 1.0])
         self.dense = np.sort(np.concatenate([self.points, 0.5 * (self.points[1:] + self.points[:-1])]))
@@ -92,13 +96,3 @@ class Tables:
     def control(self, tau: np.ndarray) -> np.ndarray:
         """Control functions at `tau` (k,), shape (k, q + 1)."""
         return polynomials.basis_matrix(self.control_basis, self.control_order, tau)
-
-    @property
-    def state_nodes(self) -> np.ndarray:
-        """Abscissae of the coefficients of the states (l + 1,)."""
-        return polynomials.nodes(self.state_basis, self.order)
-
-    @property
-    def control_nodes(self) -> np.ndarray:
-        """Abscissae of the coefficients of the controls (q + 1,)."""
-        return polynomials.nodes(self.control_basis, self.control_order)

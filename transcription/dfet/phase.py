@@ -148,9 +148,4 @@ class DFETPhase(PhaseWriter):
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)
-        points = tables.points[:-1]
-        time = np.append((edges[:-1, None] + 0.5 * (1.0 + points) * np.diff(edges)[:, None]).ravel(), edges[-1])
-        states = np.vstack([(tables.collocation(points) @ closed).reshape(len(time) - 1, len(phase.states)), B[-1:]])
-        inner = (tables.control(points) @ control.coefficients).reshape(len(time) - 1, len(phase.controls))
-        controls = np.vstack([inner, control.ends()[1][-1:]])
-        return self.trajectory(extended, time, states, controls, PiecewisePolynomial(edges, closed, "closed-legendre"), control)
+        return self.trajectory(extended, tables.points[:-1], PiecewisePolynomial(edges, closed, "closed-legendre"), control)

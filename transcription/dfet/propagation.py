@@ -51,7 +51,7 @@ class Propagation:
         self._step: ca.Function | None = None
         if len(phase.states) * len(tables.tau) <= SMALL and expanded(phase.dynamics).is_a("SXFunction"):
             written = _equations(tables, phase, ca.SX)
-            step = _written_out(written, tables, phase)
+            step = _written_out(written, tables)
             if step.n_instructions() <= SHORT:
                 self._equations, self._step = written, step
         self.quick = self._step is not None
@@ -98,7 +98,7 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
     return _Equations((y, left, U, start, h, s), residual, rates, right, X)
 
 
-def _written_out(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.Function:
+def _written_out(element: _Equations, tables: Tables) -> ca.Function:
     """(left, U, start, h, s) -> (right, X, largest residual) by Newton steps from the states that the rates at the left end give."""
     y, left, *others = element.symbols
     whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X])

@@ -90,11 +90,6 @@ def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.nda
     return Z
 
 
-def result(nlp: NLP, Z: np.ndarray, start: np.ndarray, otherwise: np.ndarray, iterations: np.ndarray, tolerance: float) -> InnerResult:
-    """Score vectors (k, n) that a solver returned for `start` (k, n); `otherwise` (k,) is the status of those that are infeasible."""
-    return scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
-
-
 def scored(
     nlp: NLP,
     found: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -103,7 +98,8 @@ def scored(
     iterations: np.ndarray,
     tolerance: float,
 ) -> InnerResult:
-    """The same for vectors whose objectives (k, m) and residuals (k, n + r) are known: `found` are these three, the solver's own arrays."""
+    """The result of a solver that made of `start` (k, n) the vectors, objectives (k, m) and residuals (k, n + r) `found`, its own arrays;
+    `otherwise` (k,) is the status of those that are infeasible."""
     Z, F, residuals = found
     violation = largest(residuals)
     finite = np.isfinite(violation) & np.isfinite(F).all(axis=1)
@@ -113,7 +109,4 @@ def scored(
         broken = ~finite
         Z = np.where(finite[:, None], Z, start)
         F[broken], violation[broken], moved[broken], status[broken] = np.nan, np.inf, 0.0, FAILED
-    clocked = TIMEOUT in otherwise
-    return InnerResult(
-        z=Z, F=F, violation=violation, status=status, moved=moved, iterations=iterations, clocked=clocked, residuals=residuals
-    )
+    return InnerResult(Z, F, violation, status, moved, iterations, clocked=TIMEOUT in otherwise, residuals=residuals)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,7 +14,7 @@ from ..base import FAILED, NLP, TIMEOUT
 from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..numerics.batched import expanded
 from ..stopping import stopping
-from .base import InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, scored, started
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class Ipopt(InnerSolver):
             propagated = nlp.propagate(Z[left])
             usable = np.isfinite(nlp.evaluate(propagated)[1])
             Z[left[usable]] = propagated[usable]
-        return result(nlp, Z, start, status, iterations, tolerance)
+        return scored(nlp, (Z, *nlp.residuals(Z)), start, status, iterations, tolerance)
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
@@ -101,17 +100,12 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
     z = origin(nlp) + y * nlp.scale
     _, g = nlp.functions(z)
-    constant = settings.objective == "constant"
-    f = ca.MX(1) if constant else ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free])
+    projection = settings.objective == "projection"
+    f = ca.sumsqr((ca.vec(z[nlp.free.tolist()]) - candidate) / nlp.span[nlp.free]) if projection else ca.MX(1)
     parts = expanded(ca.Function("program", [y, candidate], [f, g / nlp.g_scale], ["x", "p"], ["f", "g"]))
-    solver = ca.nlpsol("inner", "ipopt", parts, _options(settings, tolerance))
-    return solver, *scaled_bounds(nlp)
-
-
-def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
     options = ipopt_options(settings.seconds, settings.max_iterations)
     options |= {"ipopt.tol": 0.1 * tolerance, "ipopt.constr_viol_tol": 0.1 * tolerance}
-    if settings.objective == "projection":
+    if projection:
         # The candidate is nearly feasible and often on its bounds: a small barrier and a small push keep IPOPT near it.
         options |= {
             "ipopt.mu_init": 1e-8,
@@ -126,4 +120,5 @@ def _options(settings: Ipopt, tolerance: float) -> dict[str, Any]:
             "ipopt.acceptable_tol": 0.1 * tolerance,
             "ipopt.acceptable_iter": 5,
         }
-    return options
+    solver = ca.nlpsol("inner", "ipopt", parts, options)
+    return solver, *scaled_bounds(nlp)

@@ -25,12 +25,10 @@ class Auto(InnerSolver):
             return found
         start = started(nlp, candidates, warm)
         repaired = Ipopt().solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
-        parts = {name: getattr(found, name).copy() for name in ("z", "F", "violation", "status", "moved", "residuals")}
-        for name, values in parts.items():
-            values[rest] = getattr(repaired, name)
-        parts["iterations"] = found.iterations.copy()
-        parts["iterations"][rest] += repaired.iterations
-        return replace(found, **parts, clocked=repaired.clocked, fallbacks=len(rest))
+        for name in ("z", "F", "violation", "status", "moved", "residuals"):
+            getattr(found, name)[rest] = getattr(repaired, name)
+        found.iterations[rest] += repaired.iterations
+        return replace(found, clocked=repaired.clocked, fallbacks=len(rest))
 
 
 @dataclass(frozen=True)

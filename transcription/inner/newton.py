@@ -8,26 +8,18 @@ import numpy as np
 
 from ..base import INFEASIBLE, NLP
 from ..phases.reduced import Propagated, Reduced
-from .base import InnerResult, InnerSolver, result, started
+from .base import InnerResult, InnerSolver, scored, started
 from .least_distance import least_distance
 
 NEAR = 0.1
 """Largest scaled residual of the equations at which inequalities are considered, and steps remembered: from afar both only do
 harm."""
-
-
 CAP = 0.3
 """Longest step, in spans."""
-
-
 STILL = 1e-6
 """Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
-
-
 PATIENCE = 30
 """Iterations after which a point only has to be feasible, be it the nearest one or not."""
-
-
 PLAIN, MEMORY = 2, 6
 """Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
 
@@ -74,14 +66,14 @@ class Newton(InnerSolver):
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return result(nlp, Z, start, np.full(len(start), INFEASIBLE), iterations, tolerance)
+        return scored(nlp, (Z, *nlp.residuals(Z)), start, np.full(len(start), INFEASIBLE), iterations, tolerance)
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
     ) -> None:
         """One step of those that go on, from their propagated vectors."""
         near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
-        going.watch((outside > 0.1 * tolerance) & near[:, None])
+        going.watched |= (outside > 0.1 * tolerance) & near[:, None]
         if going.settled.any():
             pull = np.where(going.settled[:, None], 0.0, pull)
         step = going.towards(propagated, pull)
@@ -119,8 +111,6 @@ class _Going:
         The rows of the reduced problem that steps consider: equations, and what was violated on the way.
     multipliers : array (k, rows)
         Those of the last step.
-    inside : array (k,) of bool
-        Whether any of these needs states inside the elements.
     settled : array (k,) of bool
         Whether they are near enough to their candidates and only have to be feasible.
     last : array (k,)
@@ -137,20 +127,14 @@ class _Going:
         self.index, self._vectors = np.arange(k), start.copy()
         self.x = self.center = (start[:, free] - self.origin) / self.span
         self.watched, self.multipliers = np.tile(self.reduced.equation, (k, 1)), np.zeros((k, len(self.reduced.equation)))
-        self.inside = (self.watched & self.reduced.inside).any(axis=1)
         self.settled, self.last = np.zeros(k, dtype=bool), np.zeros(k)
         self.memory = Anderson(k, len(free), MEMORY)
 
     def keep(self, on: np.ndarray) -> None:
         """Go on with some of them only."""
-        for name in ("index", "_vectors", "x", "center", "watched", "inside", "multipliers", "settled", "last"):
+        for name in ("index", "_vectors", "x", "center", "watched", "multipliers", "settled", "last"):
             setattr(self, name, getattr(self, name)[on])
         self.memory.keep(on)
-
-    def watch(self, rows: np.ndarray) -> None:
-        """From now on consider these rows (k, rows) too."""
-        self.watched |= rows
-        self.inside = (self.watched & self.reduced.inside).any(axis=1)
 
     def vectors(self) -> np.ndarray:
         """Vectors (k, n) of the NLP with the free variables where they are: periodic ones wrapped, the others within bounds."""
@@ -160,11 +144,11 @@ class _Going:
 
     def towards(self, propagated: Propagated, pull: np.ndarray) -> np.ndarray:
         """Steps (k, d) to the nearest points, seen from `pull`, that satisfy the linearised constraints that are watched."""
-        count = int(np.count_nonzero(self.inside))
-        if count in (0, len(pull)):
+        inside = (self.watched & self.reduced.inside).any(axis=1)
+        if inside.all() or not inside.any():
             return self._towards(slice(None), propagated, pull)
         step = np.empty_like(pull)
-        for some in np.flatnonzero(self.inside), np.flatnonzero(~self.inside):  # apart: the derivatives of the first are costly
+        for some in np.flatnonzero(inside), np.flatnonzero(~inside):  # apart: the derivatives of the first are costly
             step[some] = self._towards(some, Propagated(propagated.Z[some], propagated.values[some]), pull[some])
         return step
 

@@ -19,8 +19,6 @@ Method = TypeVar("Method", bound=Meshed)
 
 SAFETY = 0.5
 """Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
-
-
 COST = 10.0
 """Multiple of the tolerance by which objectives may be off, in ranges of the front: their loss by poorly described controls is of second
 order."""
@@ -100,8 +98,7 @@ class Verdict:
         i = int(np.argmax([score.max() for score in scores]))
         j = int(np.argmax(scores[i]))
         phase, steep = trajectory[names[i]], self.errors[i].steep[j]
-        left, right = phase.state.edges[j : j + 2]
-        time = left + 0.5 * (1.0 + (0.0 if np.isnan(steep) else steep)) * (right - left)
+        time = phase.state.times(np.nan_to_num([steep]))[j, 0]
         why = "" if np.isnan(steep) else ", where a control switches or is steep"
         return f"the mesh is coarsest for phase '{names[i]}' near {time:.6g} {phase.time_unit}{why}"
 
@@ -135,24 +132,14 @@ def next_method(method: Method, verdict: Verdict, trajectory: Trajectory, *, int
 
 SMOOTH = 0.8
 """Rate of decay of Legendre coefficients from which on a higher degree is worth more than shorter elements."""
-
-
 SLOWEST = 1e-3
 """A rate below this is none."""
-
-
 WORST_SHARE = 0.1
 """Elements whose error is at least this share of the largest are refined together."""
-
-
 LAYER = 0.3
 """Half width, on [-1, 1], of the element that is put around a place where a control changes steeply."""
-
-
 SHORTEST = 1e-7
 """No element is cut to less than this length, relative to its phase."""
-
-
 MARGIN = 0.1
 """Distance from the ends of an element, on [-1, 1], within which it is not cut."""
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from ..numerics.polynomials import gauss_legendre, legendre_coefficients
 from ..trajectories.arcs import Arcs
@@ -53,31 +54,27 @@ class PhaseErrors:
     steep: np.ndarray
 
 
-def phase_errors(
-    problem: CompiledProblem, trajectory: Trajectory, *, rtol: float, atol: float, method: str = "DOP853"
-) -> list[PhaseErrors]:
+def phase_errors(problem: CompiledProblem, trajectory: Trajectory, *, rtol: float, atol: float) -> list[PhaseErrors]:
     """The errors of each phase.
 
     Parameters
     ----------
     problem : CompiledProblem
     trajectory : Trajectory
-    rtol, atol, method
+    rtol, atol
         Of the integrator; see `simulate`.
     """
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    return [_errors(phase, trajectory[phase.name], parameters, rtol, atol, method) for phase in problem.phases]
+    return [_errors(phase, trajectory[phase.name], parameters, rtol, atol) for phase in problem.phases]
 
 
-def _errors(
-    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
-) -> PhaseErrors:
-    elements = range(len(trajectory.state.edges) - 1)
+def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float) -> PhaseErrors:
     excess = excess_by_element(phase, trajectory, parameters)
     names = {v.name for v in phase.controls}
-    nothing = np.zeros(len(elements))
+    values = trajectory.control.on_elements(DENSE) / np.array([v.span for v in phase.controls])
+    nothing = np.zeros(len(values))
     controls, states = _coefficients(trajectory)
-    defect, integral = local_defects(phase, trajectory, parameters, rtol, atol, method)
+    defect, integral = _local_defects(phase, trajectory, parameters, rtol, atol)
     return PhaseErrors(
         defect=defect,
         integral=integral,
@@ -85,44 +82,36 @@ def _errors(
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
         tail=np.abs(controls[:, 1:][:, -2:]).max(axis=(1, 2), initial=0.0),
         rate=np.minimum(decay_rates(states), decay_rates(controls)),
-        steep=np.array([_steepest(trajectory, j) for j in elements]),
+        steep=np.array([_steepest(one, phase.controls) for one in values]),
     )
 
 
-def local_defects(
-    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float, method: str
+def _local_defects(
+    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """See `PhaseErrors.defect` and `PhaseErrors.integral`."""
-    elements, span = len(trajectory.state.edges) - 1, np.array([v.span for v in phase.states])
-    s = np.concatenate([[trajectory.t0, trajectory.tf], parameters])
-    nothing = np.zeros(phase.integrands.size1_out(0))
-    tolerances = atol * np.concatenate([span, np.ones(len(nothing))])
-    starts = np.array([np.concatenate([start, nothing]) for start in trajectory.edge_states[:-1]])
+    elements, span = len(trajectory.state.coefficients), np.array([v.span for v in phase.states])
+    nothing = np.zeros((elements, phase.integrands.size1_out(0)))
+    tolerances = atol * np.concatenate([span, np.ones(nothing.shape[1])])
     arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements)])
-    reached = arcs.integrate(starts, rtol, tolerances, method)[:, -1]
-    defect = (np.abs(reached[:, : len(span)] - trajectory.edge_states[1:]) / span).max(axis=1)
-    if not len(nothing):
-        return _or_infinite(defect), np.zeros(elements)
-    integrals = _quadrature(phase, trajectory, s)
+    reached = arcs.integrate(np.hstack([trajectory.edge_states[:-1], nothing]), rtol, tolerances, "DOP853")[:, -1]
+    defect = np.abs(reached[:, : len(span)] - trajectory.edge_states[1:]) / span
+    integrals = _quadrature(phase, trajectory, np.array([trajectory.t0, trajectory.tf, *parameters]))
     sizes = np.abs(integrals).sum(axis=0)
     difference = np.abs(reached[:, len(span) :] - integrals) / np.where(sizes > 0, sizes, 1.0)
-    return _or_infinite(defect), _or_infinite(difference.max(axis=1))
+    worst = np.array([defect.max(axis=1), difference.max(axis=1, initial=0.0)])
+    worst[~np.isfinite(worst)] = np.inf
+    return worst[0], worst[1]
 
 
 def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray) -> np.ndarray:
     """Integrals (N, k) over each element by Gauss-Legendre's rule on as many nodes as the trajectory has inside it."""
-    edges = trajectory.state.edges
-    tau, weights = gauss_legendre(max(1, (len(trajectory.time) - 1) // (len(edges) - 1) - 1))
-    found = []
-    for j, length in enumerate(np.diff(edges)):
-        times = edges[j] + 0.5 * (1.0 + tau) * length
-        values = np.array(phase.integrands(trajectory.state.on_element(j, tau).T, trajectory.controls_on(j, tau).T, times[None], s))
-        found.append(0.5 * length * values @ weights)
-    return np.array(found)
-
-
-def _or_infinite(values: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(values), values, np.inf)
+    lengths = np.diff(trajectory.state.edges)
+    tau, weights = gauss_legendre(max(1, (len(trajectory.time) - 1) // len(lengths) - 1))
+    times = trajectory.state.times(tau)
+    x, u = (values.reshape(times.size, -1) for values in (trajectory.state.on_elements(tau), trajectory.controls_on_elements(tau)))
+    values = np.array(phase.integrands(x.T, u.T, times.reshape(1, -1), s)).reshape(-1, *times.shape)
+    return (0.5 * lengths[:, None] * values @ weights).T
 
 
 def decay_rates(coefficients: np.ndarray) -> np.ndarray:
@@ -131,11 +120,10 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     The slope of a line through the logarithms of the coefficients from the second on, each taken as large as the largest one after it. The
     slowest column counts, of those that are not `FLAT`. Infinite where all of them are, or where there are too few to tell.
     """
-    count, k, columns = coefficients.shape
-    rates = np.full(count, np.inf)
-    if k < 3 or not columns:
+    count, k, _ = coefficients.shape
+    if k < 3:
         # Two coefficients are no series: nothing speaks against a higher degree.
-        return rates
+        return np.full(count, np.inf)
     size = np.maximum.accumulate(np.abs(coefficients[:, :0:-1]), axis=1)[:, ::-1]
     if k > 3:
         # Of an even or odd function every other coefficient is 0, and so might be the last.
@@ -144,8 +132,7 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     slope = degree - degree.mean()
     logarithms = np.log(np.maximum(size, 1e-14))
     found = -np.einsum("k,nkc->nc", slope, logarithms) / (slope**2).sum()
-    found = np.where(size[:, 0] > FLAT, found, np.inf)
-    return np.minimum(rates, found.min(axis=1, initial=np.inf))
+    return np.where(size[:, 0] > FLAT, found, np.inf).min(axis=1, initial=np.inf)
 
 
 def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -159,10 +146,8 @@ def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
     return found[0], found[1][:, :-1] if trajectory.state.basis == "closed-legendre" else found[1]
 
 
-def _steepest(trajectory: PhaseTrajectory, j: int) -> float:
-    """See `PhaseErrors.steep`, on element j."""
-    variables = trajectory.control_variables
-    values = trajectory.control.on_element(j, DENSE) / np.array([v.span for v in variables])
+def _steepest(values: np.ndarray, variables: Sequence[Variable]) -> float:
+    """See `PhaseErrors.steep`, on one element, from its controls (len(DENSE), nu) in spans."""
     for i, v in enumerate(variables):
         if v.period is None and not np.isnan(place := _switch(values[:, i], v.lower / v.span)):
             return place

@@ -261,13 +261,12 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     stuck = bool((made_up & (np.stack([y - lower, upper - y]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
     z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
     F, violation = nlp.evaluate(z[None])
+    status = STATUS_OF_IPOPT.get(outcome, FAILED)
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
         z, status = start, FAILED
         F, violation = nlp.evaluate(z[None])
-    elif violation[0] <= tolerance and task.excess(F[0]) <= tolerance:
-        status = CONVERGED if outcome in SOLVED else STATUS_OF_IPOPT.get(outcome, FAILED)
-    else:
-        status = INFEASIBLE if outcome in SOLVED else STATUS_OF_IPOPT.get(outcome, FAILED)
+    elif outcome in SOLVED:
+        status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     return Solved(z, F[0], float(violation[0]), status, iterations, "Time" in outcome), stuck
 
 

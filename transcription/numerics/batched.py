@@ -17,16 +17,10 @@ import numpy as np
 PAYS, TYPICAL = 30_000_000, 1500
 """Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
 proportion for longer ones."""
-
-
 LONG = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
-
-
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
-
-
 WORTH = 24
 """Calls of a block of so many from which on all of them, by a wide Function, take less time."""
 

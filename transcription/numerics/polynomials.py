@@ -51,28 +51,6 @@ def nodes(basis: str, degree: int) -> np.ndarray:
     return points
 
 
-def lagrange_matrix(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Values of the Lagrange functions on `points` (k,), of barycentric `weights` (k,), at `tau` (n,), shape (n, k)."""
-    difference = np.asarray(tau, dtype=float)[:, None] - points
-    hit = np.abs(difference) < 1e-15
-    if hit.any():
-        difference[hit] = 1.0
-        values = weights / difference
-        values /= values.sum(axis=1, keepdims=True)
-        return np.where(hit.any(axis=1, keepdims=True), hit, values)
-    values = weights / difference
-    return values / values.sum(axis=1, keepdims=True)
-
-
-def lagrange_derivative(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Derivatives of the Lagrange functions on `points` (k,), of barycentric `weights` (k,), at `tau` (n,), shape (n, k)."""
-    difference = points[:, None] - points + np.eye(len(points))
-    at_points = (weights / weights[:, None]) / difference
-    np.fill_diagonal(at_points, 0.0)
-    np.fill_diagonal(at_points, -at_points.sum(axis=1))
-    return lagrange_matrix(points, weights, tau) @ at_points
-
-
 def bernstein_matrix(degree: int, tau: np.ndarray) -> np.ndarray:
     """Values of the Bernstein functions of a degree at `tau` (n,), shape (n, degree + 1)."""
     s = 0.5 * (np.asarray(tau, dtype=float)[:, None] + 1.0)
@@ -93,14 +71,26 @@ def basis_matrix(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Values of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
     if basis == "bernstein":
         return bernstein_matrix(degree, tau)
-    return lagrange_matrix(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
+    points, weights = nodes(basis, degree), _barycentric_weights(basis, degree)
+    difference = np.asarray(tau, dtype=float)[:, None] - points
+    hit = np.abs(difference) < 1e-15
+    at_points = hit.any()
+    if at_points:
+        difference[hit] = 1.0
+    values = weights / difference
+    values /= values.sum(axis=1, keepdims=True)
+    return np.where(hit.any(axis=1, keepdims=True), hit, values) if at_points else values
 
 
 def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Derivatives of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
     if basis == "bernstein":
         return bernstein_derivative(degree, tau)
-    return lagrange_derivative(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
+    points, weights = nodes(basis, degree), _barycentric_weights(basis, degree)
+    at_points = (weights / weights[:, None]) / (points[:, None] - points + np.eye(len(points)))
+    np.fill_diagonal(at_points, 0.0)
+    np.fill_diagonal(at_points, -at_points.sum(axis=1))
+    return basis_matrix(basis, degree, tau) @ at_points
 
 
 @cache

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from problems.compiled import CompiledPhase
+
 
 def line(start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Straight lines from `start` (k,) to `end` (k,) at `share` (...) of the way; shape (k, ...)."""
@@ -32,3 +34,11 @@ def along(given: Any, t0: np.ndarray, tf: np.ndarray, share: np.ndarray) -> np.n
     if np.ndim(first):
         return np.interp(line(t0, tf, share), first, second)
     return line(np.full(len(t0), float(first)), np.full(len(t0), float(second)), share)
+
+
+def state_along(phase: CompiledPhase, i: int, start: np.ndarray, t0: np.ndarray, tf: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Values (k, ...) of state i, as guessed, or on lines from `start` (k,) to the middle of its final range; `share` as in `along`."""
+    state, final = phase.states[i], phase.final[i]
+    if state.name in phase.guesses:
+        return along(phase.guesses[state.name], t0, tf, share)
+    return line(start, start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final)), share)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,13 +90,13 @@ class PhaseMesh:
 def as_meshes(given: Any) -> tuple[tuple[str, PhaseMesh], ...]:
     """Meshes by name of the phase, sorted, from a mapping or from pairs. Raises ValueError that names the phase."""
     try:
-        pairs: Sequence[tuple[str, Any]] = sorted((given.items() if hasattr(given, "items") else given), key=lambda pair: str(pair[0]))
-        meshes = []
-        for name, mesh in pairs:
-            try:
-                meshes.append((str(name), PhaseMesh.of(mesh)))
-            except ValueError as error:
-                raise ValueError(f"phase '{name}': {error}") from None
-    except (TypeError, IndexError):
+        named = {str(name): mesh for name, mesh in dict(given).items()}
+    except (TypeError, ValueError):
         raise ValueError(f"mesh must be a mapping of phases' names to (edges, order), not {given!r}") from None
+    meshes = []
+    for name in sorted(named):
+        try:
+            meshes.append((name, PhaseMesh.of(named[name])))
+        except ValueError as error:
+            raise ValueError(f"phase '{name}': {error}") from None
     return tuple(meshes)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from problems.compiled import Variable
+from problems.derived import Deriving, remembered
 
 from ..numerics.batched import Batched
 from .layout import Layout
@@ -30,7 +29,7 @@ class Propagated:
     scores: tuple[np.ndarray, np.ndarray] | None = None
 
 
-class Reduced:
+class Reduced(Deriving):
     """The constraints that propagation leaves to satisfy: lower <= values <= upper.
 
     The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
@@ -69,25 +68,26 @@ class Reduced:
         self._rest, g_lower, g_upper, g_scale = rest
         self._scores = scores
         self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
-        finals: list[tuple[Variable, tuple[float, float]]] = [
-            pair for writer in writers for pair in zip(writer.phase.states, writer.phase.final, strict=True)
+        finals = [
+            replace(v, lower=low, upper=high)
+            for writer in writers
+            for v, (low, high) in zip(writer.phase.states, writer.phase.final, strict=True)
         ]
         self._imposed = np.flatnonzero(np.concatenate([writer.ends.final for writer in writers]) < 0)
-        imposed = [finals[i] for i in self._imposed]
-        dependent = [layout.variables[i] for i in self._dependent]
-        self.lower = np.concatenate([[low for _, (low, _) in imposed], [v.lower for v in dependent], g_lower])
-        self.upper = np.concatenate([[high for _, (_, high) in imposed], [v.upper for v in dependent], g_upper])
-        self.scale = np.concatenate([[v.scale for v, _ in imposed], [v.scale for v in dependent], g_scale])
+        rows = [*(finals[i] for i in self._imposed), *(layout.variables[i] for i in self._dependent)]
+        self.lower = np.append([v.lower for v in rows], g_lower)
+        self.upper = np.append([v.upper for v in rows], g_upper)
+        self.scale = np.append([v.scale for v in rows], g_scale)
         self.equation = self.lower == self.upper
         self.inside = self._rows_inside()
         self._among_ends = np.cumsum(~self.inside) - 1
 
     def propagate(self, Z: np.ndarray) -> Propagated:
         """Propagate vectors (k, n), of which only the free entries matter."""
-        propagated, values, residual, *scores = self._quick(Z)
+        propagated, values, residual, *scores = self._propagation(False)(Z)
         if not residual.max(initial=0.0) <= SOLVED:
             unsolved = ~(residual.max(axis=1) <= SOLVED)
-            propagated[unsolved], values[unsolved], _, *again = self._robust(Z[unsolved])
+            propagated[unsolved], values[unsolved], _, *again = self._propagation(True)(Z[unsolved])
             for found, better in zip(scores, again, strict=True):
                 found[unsolved] = better
         return Propagated(propagated, values, (scores[0], scores[1]) if scores else None)
@@ -95,7 +95,7 @@ class Reduced:
     def derivatives(self, propagated: Propagated, rows: np.ndarray) -> np.ndarray:
         """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
         interior = bool(self.inside[rows].any())
-        function, chosen = (self._everywhere, rows) if interior else (self._at_ends, self._among_ends[rows])
+        function, chosen = self._derivatives(interior), rows if interior else self._among_ends[rows]
         count, d = len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
         found = np.empty((len(propagated.Z), len(rows), d))
         some = max(1, MOST // max(1, count * d))
@@ -104,28 +104,23 @@ class Reduced:
             found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
         return found
 
-    @cached_property
-    def _quick(self) -> Batched:
-        wide = (lambda k: self._propagation(robust=False, k=k)) if all(writer.wide for writer in self._writers) else None
-        return Batched(self._propagation(robust=False), compiled=self._compilable, wide=wide)
+    @remembered
+    def _propagation(self, robust: bool) -> Batched:
+        function = self._propagation_function(robust)
+        if robust:
+            return Batched(function, compiled=False)
+        wide = (lambda k: self._propagation_function(robust, k)) if all(writer.wide for writer in self._writers) else None
+        return Batched(function, compiled=self._compilable, wide=wide)
 
-    @cached_property
-    def _robust(self) -> Batched:
-        return Batched(self._propagation(robust=True), compiled=False)
-
-    @cached_property
-    def _at_ends(self) -> Batched:
-        return Batched(self._total(interior=False), compiled=self._compilable)
-
-    @cached_property
-    def _everywhere(self) -> Batched:
-        return Batched(self._total(interior=True), compiled=self._compilable)
+    @remembered
+    def _derivatives(self, interior: bool) -> Batched:
+        return Batched(self._total(interior=interior), compiled=self._compilable)
 
     @property
     def _compilable(self) -> bool:
         return all(writer.compilable for writer in self._writers)
 
-    def _propagation(self, *, robust: bool, k: int = 1) -> ca.Function:
+    def _propagation_function(self, robust: bool, k: int = 1) -> ca.Function:
         """z -> (propagated z, values, residuals of the equations of states [, F, g]); for k vectors side by side, if writers are `wide`."""
         start = ca.MX.sym("z", len(self._layout.variables), k)
         extended, finals, residuals = self._layout.extended_symbol(start), [], []

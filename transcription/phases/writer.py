@@ -15,7 +15,7 @@ from problems.compiled import CompiledPhase
 from ..numerics.periodic import wrapped
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .guess import along, line
+from .guess import along, state_along
 from .layout import Layout
 from .state_equations import StateEquations
 
@@ -146,10 +146,7 @@ class PhaseWriter(ABC):
         t0, tf = extended[:, self.ends.t0], extended[:, self.ends.tf]
         slots, share = self.state_nodes()
         for i, (state, final) in enumerate(zip(self.phase.states, self.phase.final, strict=True)):
-            start = extended[:, self.ends.initial[i]]
-            end = start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final))
-            given = self.phase.guesses.get(state.name)
-            values = line(start, end, share) if given is None else along(given, t0, tf, share)
+            values = state_along(self.phase, i, extended[:, self.ends.initial[i]], t0, tf, share)
             self.layout.write(extended, slots[:, i], np.clip(values, state.lower, state.upper))
             last = self.ends.final[i : i + 1]
             self.layout.write(extended, last, np.clip(extended[:, last], *final))
@@ -246,16 +243,13 @@ class PhaseWriter(ABC):
             rows.add(values[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
 
     def trajectory(
-        self,
-        extended: np.ndarray,
-        time: np.ndarray,
-        states: np.ndarray,
-        controls: np.ndarray,
-        state: PiecewisePolynomial,
-        control: PiecewisePolynomial,
+        self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial
     ) -> PhaseTrajectory:
-        """The trajectory of an extended vector from states (n, nx) and controls (n, nu) at nodes in time (n,), and the two polynomials."""
-        phase, controls = self.phase, wrapped(controls, self.phase.controls)
+        """The trajectory of an extended vector from its two polynomials, with nodes at `tau` (k,) in [-1, 1) of each element and at tf."""
+        phase = self.phase
+        time = np.append(state.times(tau).ravel(), state.edges[-1])
+        states, controls = (np.vstack([*piece.on_elements(tau), piece.ends()[1][-1:]]) for piece in (state, control))
+        controls = wrapped(controls, phase.controls)
         s = extended[self.layout.index(self.ends.statics)]
         return PhaseTrajectory(
             name=phase.name,

@@ -7,7 +7,6 @@ steps see `runge_kutta.py`.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -59,7 +58,9 @@ class Shooting(Transcription):
     path_points: int = 0
 
     _counted: ClassVar[tuple[str, int]]
-    """The setting from which the number of intervals follows, and its least value."""
+    """The setting from which the number of intervals follows, and its least value, which makes one."""
+    _apart: ClassVar[bool]
+    """Whether the states at the nodes are variables of their own."""
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -71,14 +72,10 @@ class Shooting(Transcription):
         check_choice(f"{name}: control", self.control, DEGREES)
 
     @property
-    @abstractmethod
     def _intervals(self) -> int:
         """Number of intervals between nodes."""
-
-    @property
-    @abstractmethod
-    def _apart(self) -> bool:
-        """Whether the states at the nodes are variables of their own."""
+        setting, least = self._counted
+        return int(getattr(self, setting)) - least + 1
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
@@ -136,19 +133,12 @@ class SingleShooting(Shooting):
     nodes: int
 
     _counted = "nodes", 2
+    _apart = False
     word = "shooting"
     examples = (
         "shooting:200 (200 nodes), shooting:200x2:linear:rk8 (2 steps between each, linear controls, another Runge-Kutta scheme), "
         "shooting:200:spline:21 (controls on 21 nodes)"
     )
-
-    @property
-    def _intervals(self) -> int:
-        return self.nodes - 1
-
-    @property
-    def _apart(self) -> bool:
-        return False
 
 
 @dataclass(frozen=True)
@@ -168,16 +158,9 @@ class MultipleShooting(Shooting):
     intervals: int
 
     _counted = "intervals", 1
+    _apart = True
     word = "multiple-shooting"
     examples = "multiple-shooting:40 (intervals), the rest as for shooting"
-
-    @property
-    def _intervals(self) -> int:
-        return self.intervals
-
-    @property
-    def _apart(self) -> bool:
-        return True
 
 
 def _sees_controls(phase: CompiledPhase) -> bool:

@@ -12,16 +12,13 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics.batched import CHAIN, Batched, widened, work
-from ..numerics.periodic import wrapped_controls
-from ..numerics.polynomials import basis_matrix, lobatto_nodes
+from ..numerics.polynomials import lobatto_nodes
 from ..phases.layout import Layout
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .control_law import ControlLaw
 from .step import Step, StepMesh
 
-FORGOTTEN = 1e-17
-"""Derivatives of controls by their values at nodes, where the largest are 1, that count as 0."""
 LONG = 3_000_000
 """Most operations of a chain of steps times variables that it depends on, for which its derivatives are written out."""
 
@@ -70,7 +67,7 @@ class ShootingPhase(PhaseWriter):
         seen = pick(extended, self.W)
         self.add_paths(rows, seen)
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
-        return Written(self._control(first, 0.0), self._control(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
+        return Written(self.step.controls(first, 0.0), self.step.controls(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.state_nodes`."""
@@ -126,10 +123,7 @@ class ShootingPhase(PhaseWriter):
         table[shots[:-1], 0], table[shots[1:] - 1, -1] = B[:-1], B[1:]
         state = PiecewisePolynomial(edges, table, "lobatto")
         inside = 2.0 * np.array([place for place in self.step.points if place < 1.0]) - 1.0
-        time = np.append((edges[:-1, None] + 0.5 * (1.0 + inside) * np.diff(edges)[:, None]).ravel(), edges[-1])
-        nodes = np.vstack([*state.on_elements(inside), B[-1:]])
-        controls = np.vstack([*control.on_elements(inside), control.ends()[1][-1:]])
-        return self.trajectory(extended, time, nodes, controls, state, control)
+        return self.trajectory(extended, inside, state, control)
 
     @property
     def _arrivals(self) -> np.ndarray:
@@ -155,11 +149,6 @@ class ShootingPhase(PhaseWriter):
         length = s[1] - s[0]
         starts, lengths = s[0] + length * ca.DM(places[:-1]).T, length * ca.DM(np.diff(places)).T
         return C, starts, lengths, ca.repmat(s, 1, len(places) - 1)
-
-    def _control(self, C: ca.MX, place: float) -> ca.MX:
-        """Controls (nu,) at a place in [0, 1] of a step, by its coefficients."""
-        weights = basis_matrix("lobatto", self.law.degree, np.array([2.0 * place - 1.0])).T
-        return wrapped_controls(C @ ca.DM(weights), self.phase)
 
     def _chain(self, n: int) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
@@ -221,8 +210,7 @@ class ShootingPhase(PhaseWriter):
         seeds, n = self.layout.seeds(), self.mesh.steps
         U = ca.MX.sym("U", len(self.phase.controls), self.law.count)
         C = ca.vec(self.law.coefficients(U, self.mesh.places, self.phase))
-        # The slopes of a spline forget values that are far away, by a factor of 3.7 a node.
-        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0), FORGOTTEN)
+        by_values = ca.sparsify(ca.Function("slopes", [U], [ca.jacobian(C, ca.vec(U))])(0))
         controls = by_values @ seeds[self.layout.index(self.U).tolist(), :]
         statics = seeds[self.layout.index(self.ends.statics).tolist(), :]
         length, each = statics[1, :] - statics[0, :], C.numel() // n

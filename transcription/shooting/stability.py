@@ -18,7 +18,7 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem
 
-from ..phases.guess import along, line
+from ..phases.guess import state_along
 from .runge_kutta import Tableau
 
 FACTOR = log(1e3)
@@ -83,7 +83,9 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray) -> list[tuple[np.
     t0 = float(np.clip(phase.guesses.get("t0", phase.t0.upper), phase.t0.lower, phase.t0.upper))
     start, s = np.array([t0]), np.array([t0, t0 + length, *p])
     span, found = np.array([v.span for v in phase.states]), []
-    for x in _states(phase, start, start + length).T:
+    middles = [np.array([0.5 * sum(first)]) for first in phase.initial]
+    states = np.array([state_along(phase, i, middle, start, start + length, POINTS)[0] for i, middle in enumerate(middles)])
+    for x in states.T:
         for level in (0.0, 0.5, 1.0):
             u = [v.lower + level * v.span for v in phase.controls]
             matrix = np.array(jacobian(x, u, t0 + 0.5 * length, s))
@@ -92,14 +94,3 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray) -> list[tuple[np.
             rates, vectors = np.linalg.eig(matrix)
             found.append((rates, [phase.states[i].name for i in np.argmax(np.abs(vectors) / span[:, None], axis=0)]))
     return found
-
-
-def _states(phase: CompiledPhase, t0: np.ndarray, tf: np.ndarray) -> np.ndarray:
-    """States (nx, len(POINTS)) from the initial to the final ones, or as they are guessed."""
-    rows = []
-    for v, first, last in zip(phase.states, phase.initial, phase.final, strict=True):
-        start = np.array([0.5 * sum(first)])
-        end = start if last == (v.lower, v.upper) else np.array([0.5 * sum(last)])
-        given = phase.guesses.get(v.name)
-        rows.append((line(start, end, POINTS) if given is None else along(given, t0, tf, POINTS))[0])
-    return np.array(rows)

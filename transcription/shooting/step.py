@@ -107,7 +107,7 @@ class Step:
         nx = len(self.phase.states)
 
         def rates(c: float, y: Any) -> Any:
-            inputs = y[:nx, :], self._controls(C, c), start + c * h, s
+            inputs = y[:nx, :], self.controls(C, c), start + c * h, s
             return ca.vertcat(self.phase.dynamics(*inputs), self.phase.integrands(*inputs))
 
         after, _ = self.scheme.step(rates, ca.vertcat(x, self._kind.zeros(self.phase.integrands.size1_out(0))), h)
@@ -122,15 +122,15 @@ class Step:
         if place == 0.0:
             return x
         return self.scheme.step(
-            lambda c, state: self.phase.dynamics(state, self._controls(C, c * place), start + c * place * h, s), x, place * h
+            lambda c, state: self.phase.dynamics(state, self.controls(C, c * place), start + c * place * h, s), x, place * h
         )[0]
 
     def _sample(self, x: Any, C: Any, place: float, start: Any, h: Any, s: Any) -> Any:
         """Path constraints and peaks (rows,) at a place where the states are x."""
-        inputs = x, self._controls(C, place), start + place * h, s
+        inputs = x, self.controls(C, place), start + place * h, s
         return ca.vertcat(self.phase.path(*inputs), self.phase.peaks(*inputs))
 
-    def _controls(self, C: Any, place: float) -> Any:
+    def controls(self, C: Any, place: float) -> Any:
         """Controls (nu,) at a place in [0, 1], within the bounds of those that are periodic."""
         weights = basis_matrix("lobatto", self.degree, np.array([2.0 * place - 1.0])).T
         return wrapped_controls(C @ ca.sparsify(ca.DM(weights)), self.phase)

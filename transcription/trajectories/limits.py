@@ -23,8 +23,6 @@ NEGLIGIBLE = 1e-6
 def excess(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray:
     """The largest scaled amounts by which the columns of `values` (..., k, c) leave their c limits, shape (..., c), 0 where none does."""
     lower, upper, scale = (np.array([getattr(limit, name) for limit in limits]) for name in ("lower", "upper", "scale"))
-    if not len(limits):
-        return np.zeros((*values.shape[:-2], 0))
     return np.maximum(np.maximum(lower - values, values - upper) / scale, 0.0).max(axis=-2, initial=0.0)
 
 
@@ -70,18 +68,12 @@ def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, paramet
 
     Controls that are periodic never do, and are left out.
     """
-    states, controls, paths = _dense(phase, trajectory, parameters)
+    times = trajectory.state.times(DENSE)
+    states, controls = trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE)
+    x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
+    s = np.array([trajectory.t0, trajectory.tf, *parameters])
+    paths = paths_and_peaks(phase, x, u, times.ravel(), s)[0].reshape(*times.shape, len(phase.paths))
     bounded = [i for i, v in enumerate(phase.controls) if v.period is None]
     limits: tuple[Variable | Limit, ...] = (*phase.states, *(phase.controls[i] for i in bounded), *phase.paths)
     amounts = excess(np.concatenate([states, controls[..., bounded], paths], axis=2), limits)
     return {limit.name: amounts[:, i] for i, limit in enumerate(limits)}
-
-
-def _dense(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States, controls and path constraints (N, len(DENSE), ...) on all elements."""
-    edges = trajectory.state.edges
-    times = edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]
-    states, controls = trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE)
-    x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
-    paths, _ = paths_and_peaks(phase, x, u, times.ravel(), np.array([trajectory.t0, trajectory.tf, *parameters]))
-    return states, controls, paths.reshape(*times.shape, len(phase.paths))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Variable
+from problems.compiled import CompiledPhase, CompiledProblem
 
 from .arcs import METHODS, Arcs
 from .limits import DENSE, excess, paths_and_peaks
@@ -113,9 +113,16 @@ def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], 
         phase = problem.phases[i]
         planned = [one[phase.name] for one in trajectories]
         starts = np.array([_start(problem, i, *one) for one in zip(planned, simulated, violations, strict=True)])
-        for k, one in enumerate(_simulated_phases(phase, planned, starts, parameters, rtol, atol, method)):
-            simulated[k][i] = one
-            violations[k] |= one.violations(phase)
+        integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
+        tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+        y, elements = np.hstack([starts, integrals]), []
+        for j in range(len(planned[0].state.edges) - 1):
+            arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
+            elements.append(arcs.integrate(y, rtol, tolerances, method))
+            y = elements[-1][:, -1]
+        for k, one in enumerate(zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)):
+            simulated[k][i] = _simulated_phase(phase, *one)
+            violations[k] |= simulated[k][i].violations(phase)
     return [_simulation(problem, *one) for one in zip(simulated, violations, trajectories, parameters, strict=True)]
 
 
@@ -157,7 +164,7 @@ class _SimulatedPhase:
         states = self.trajectory.states
         found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(states, phase.states), strict=True)}
         found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, self.path_excess, strict=True)}
-        ends = [Variable(v.name, *limits, v.unit, v.scale) for v, limits in zip(phase.states, phase.final, strict=True)]
+        ends = [replace(v, lower=low, upper=high) for v, (low, high) in zip(phase.states, phase.final, strict=True)]
         for v, end, amount in zip(phase.states, ends, excess(states[-1:], ends), strict=True):
             if (end.lower, end.upper) != (v.lower, v.upper):
                 found[f"final value of {phase.name}.{v.name}"] = amount
@@ -188,31 +195,11 @@ def _start(
     return start
 
 
-def _simulated_phases(
-    phase: CompiledPhase,
-    planned: Sequence[PhaseTrajectory],
-    starts: np.ndarray,
-    parameters: Sequence[np.ndarray],
-    rtol: float,
-    atol: float,
-    method: str,
-) -> list[_SimulatedPhase]:
-    """One phase of n trajectories of one shape, from their `starts` (n, nx)."""
-    integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
-    y, elements = np.hstack([starts, integrals]), []
-    tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
-    for j in range(len(planned[0].state.edges) - 1):
-        arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
-        elements.append(arcs.integrate(y, rtol, tolerances, method))
-        y = elements[-1][:, -1]
-    return [_simulated_phase(phase, *one) for one in zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)]
-
-
 def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _SimulatedPhase:
     """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
     edges, nx = planned.state.edges, len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
-    times = (edges[:-1, None] + 0.5 * (1.0 + DENSE) * np.diff(edges)[:, None]).ravel()
+    times = planned.state.times(DENSE).ravel()
     states = elements[:, :, :nx].reshape(-1, nx)
     controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
     paths, peaks = paths_and_peaks(phase, states, controls, times, s)

@@ -46,6 +46,10 @@ class PiecewisePolynomial:
         values = basis_matrix(self.basis, self.coefficients.shape[1] - 1, 2.0 * (flat - left) / length - 1.0)
         return np.einsum("ni,nik->nk", values, self.coefficients[element]).reshape(*times.shape, self.coefficients.shape[2])
 
+    def times(self, tau: np.ndarray) -> np.ndarray:
+        """Times (N, len(tau)) of local coordinates `tau` in [-1, 1] on each element."""
+        return self.edges[:-1, None] + 0.5 * (1.0 + tau) * np.diff(self.edges)[:, None]
+
     def on_element(self, j: int, tau: np.ndarray) -> np.ndarray:
         """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]

@@ -6,38 +6,23 @@ to lie 6.3 degrees farther south; of the second, south of the first, 1.5 degrees
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from functools import partial
+from typing import Any
 
 from ...problem import Problem
-from . import figures, front
+from . import figures
 from .case1 import LIMITS
+from .figures import track
+from .front import REFERENCE, known
 from .statement import Zone, reentry
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+__all__ = ["LIMITS", "REFERENCE", "ZONES", "plot", "problem", "reference", "track"]
 
 ZONES = (Zone(30.0, 7.5, 5.0), Zone(60.0, 15.0, 5.0), Zone(70.0, 20.0, 5.0))
-REFERENCE = front.REFERENCE
+plot = partial(figures.plot, zones=ZONES)
+reference = partial(known, "case3")
 
 
 def problem(**data: Any) -> Problem:
     """The case; for `data` see `statement.reentry`."""
     return reentry("reentry_case3", LIMITS, ZONES, **data)
-
-
-def reference() -> np.ndarray:
-    """The true front as far as gradients found it; see `front.known`."""
-    return front.known("case3")
-
-
-def plot(flights: Sequence[Any]) -> dict[str, Figure]:
-    """Pictures of one flight or many, which may be a Front; see `figures`."""
-    return figures.plot(flights, ZONES)
-
-
-def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Coordinates of a ground track by label."""
-    return figures.track(values)

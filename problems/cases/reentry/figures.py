@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .statement import ANGLES
+from .vehicle import STATES
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -16,20 +19,15 @@ if TYPE_CHECKING:
 PHASE = "entry"
 SAMPLES = 801
 GREY, RED = "#666666", "#D55E00"
-ALONG = {
-    "altitude": ("altitude [km]", 1e-3),
-    "longitude": ("longitude [deg]", degrees(1.0)),
-    "latitude": ("latitude [deg]", degrees(1.0)),
-    "speed": ("speed [km/s]", 1e-3),
-    "flight-path angle": ("flight-path angle [deg]", degrees(1.0)),
-    "heading": ("heading [deg]", degrees(1.0)),
-    "angle of attack": ("angle of attack [deg]", degrees(1.0)),
-    "bank angle": ("bank angle [deg]", degrees(1.0)),
-    "angle of attack command": ("angle of attack command [deg]", degrees(1.0)),
-    "bank angle command": ("bank angle command [deg]", degrees(1.0)),
+ALONG = (*STATES, *ANGLES, *(f"{angle} command" for angle in ANGLES))
+UNITS = {
+    "altitude": ("km", 1e-3),
+    "speed": ("km/s", 1e-3),
+    "heating rate": ("Btu/ft2/s", 1.0),
+    "dynamic pressure": ("lbf/ft2", 1.0),
+    "load factor": ("g", 1.0),
 }
-PATHS = {"heating rate": "Btu/ft2/s", "dynamic pressure": "lbf/ft2", "load factor": "g"}
-"""The others are distances in degrees."""
+"""Unit of a panel, and its size in that of the quantity; the others are in degrees."""
 
 
 def plot(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> dict[str, Figure]:
@@ -53,14 +51,14 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     phases = _phases(flights)
     limits = phases[0].path_limits
     panels = [*ALONG, *(limit.name for limit in limits)]
-    figure, colors = _new_figure(7.2, 1.45 * -(-len(panels) // 3) + 0.3), _colors(phases)
+    figure, (shades, colors) = _new_figure(7.2, 1.45 * -(-len(panels) // 3) + 0.3), _colors(phases)
     grid = figure.subplots(-(-len(panels) // 3), 3, sharex=True).ravel()
     for ax, name in zip(grid, panels, strict=False):
-        text, unit = ALONG.get(name) or (f"{name} [{PATHS.get(name, 'deg')}]", 1.0)
+        unit, size = UNITS.get(name, ("deg", degrees(1.0) if name in ALONG else 1.0))
         for phase, color in zip(phases, colors, strict=True):
             times, values = _along(phase, name) if name in ALONG else (phase.time, phase[name])
-            ax.plot(times, unit * values, color=color, lw=0.9 if len(phases) > 1 else 1.3)
-        ax.set_title(text, loc="left")
+            ax.plot(times, size * values, color=color, lw=0.9 if len(phases) > 1 else 1.3)
+        ax.set_title(f"{name} [{unit}]", loc="left")
         ax.margins(x=0.0)
     for ax, limit in zip(grid[len(ALONG) :], limits, strict=False):
         for bound in (limit.lower, limit.upper):
@@ -71,27 +69,27 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     for ax in grid[len(panels) - 3 : len(panels)]:
         ax.tick_params(labelbottom=True)
     figure.supxlabel("time [s]")
-    _bar(figure, phases, grid[: len(panels)].tolist())
+    _bar(figure, shades, colors, grid[: len(panels)].tolist())
     return figure
 
 
 def track_figure(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> Figure:
     """Latitude over longitude with the no-fly zones; parameters as of `flights_figure`."""
     phases = _phases(flights)
-    figure = _new_figure(5.0, 3.0)
+    figure, (shades, colors) = _new_figure(5.0, 3.0), _colors(phases)
     ax = figure.subplots()
     around = np.linspace(0.0, 2 * np.pi, 181)
     for zone in zones:
         east, north = zone.longitude + zone.radius * np.cos(around), zone.latitude + zone.radius * np.sin(around)
         ax.fill(east, north, facecolor="#f3c9b3", edgecolor=RED, lw=0.9, zorder=1)
-    for phase, color in zip(phases, _colors(phases), strict=True):
+    for phase, color in zip(phases, colors, strict=True):
         east, north = (degrees(1.0) * _along(phase, name)[1] for name in ("longitude", "latitude"))
         ax.plot(east, north, color=color, lw=0.9 if len(phases) > 1 else 1.3, zorder=2)
         ax.plot(east[-1:], north[-1:], "o", color=color, ms=3.0, mec="white", mew=0.3, zorder=3)
     ax.set_xlabel("longitude [deg]")
     ax.set_ylabel("latitude [deg]")
     ax.set_aspect("equal", adjustable="datalim")
-    _bar(figure, phases, [ax])
+    _bar(figure, shades, colors, [ax])
     return figure
 
 
@@ -107,29 +105,22 @@ def _along(phase: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
     return times, phase.at(times)[name]
 
 
-def _shades(phases: Sequence[Any]) -> Any:
-    """From cross-ranges in degrees to colours."""
+def _colors(phases: Sequence[Any]) -> tuple[Any, list[Any]]:
+    """A scale of colours for cross-ranges in degrees, and the colour of each phase."""
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
-    values = _cross_ranges(phases)
+    values = np.array([degrees(phase["latitude"][-1]) for phase in phases])
     colors = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
-    return ScalarMappable(Normalize(values.min(), values.max()), ListedColormap(colors))
+    shades = ScalarMappable(Normalize(values.min(), values.max()), ListedColormap(colors))
+    return shades, shades.to_rgba(values).tolist()
 
 
-def _cross_ranges(phases: Sequence[Any]) -> np.ndarray:
-    return np.array([degrees(phase["latitude"][-1]) for phase in phases])
-
-
-def _colors(phases: Sequence[Any]) -> list[Any]:
-    return _shades(phases).to_rgba(_cross_ranges(phases)).tolist()
-
-
-def _bar(figure: Figure, phases: Sequence[Any], axes: Sequence[Any]) -> None:
+def _bar(figure: Figure, shades: Any, colors: Sequence[Any], axes: Sequence[Any]) -> None:
     """A colour bar, where there are several colours."""
-    if len(phases) > 1:
-        figure.colorbar(_shades(phases), ax=axes, label="cross-range [deg]", shrink=0.5, aspect=30, pad=0.02).outline.set_visible(False)
+    if len(colors) > 1:
+        figure.colorbar(shades, ax=axes, label="cross-range [deg]", shrink=0.5, aspect=30, pad=0.02).outline.set_visible(False)
 
 
 def _new_figure(width: float, height: float) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
@@ -15,5 +15,4 @@ def known(case: str) -> np.ndarray:
 
     The further columns of the table are the commands that were simulated, from which each row can be checked.
     """
-    with files("problems.cases.reentry").joinpath(f"{case}.csv").open() as file:
-        return np.loadtxt(file, delimiter=",", usecols=range(4), ndmin=2)
+    return np.loadtxt(Path(__file__).with_name(f"{case}.csv"), delimiter=",", usecols=range(4), ndmin=2)

@@ -114,13 +114,16 @@ def reentry(
     if gravity not in vehicle.GRAVITIES:
         raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, vehicle.GRAVITIES))}, not {gravity!r}")
     mass, lag_gain, final_time = (
-        _positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
+        checks.positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
     )
     given = {"altitude": altitude_tolerance, "speed": speed_tolerance, "flight-path angle": angle_tolerance}
     problem = Problem(name)
     phase = problem.phase("entry", t0=0.0, tf=final_time)
     for state, tolerance in given.items():
-        _check_tolerance(tolerance, state, f"{name}: the tolerance of the final {state}")
+        what = f"{name}: the tolerance of the final {state}"
+        if checks.number(tolerance, what) < 0:
+            raise ValueError(f"{what} must not be negative, not {tolerance:g}")
+        checks.within((END[state] - tolerance, END[state] + tolerance), BOUNDS[state], f"{name}: the final {state} with its tolerance")
     states = declare(phase, START, {state: END[state] for state, tolerance in given.items() if tolerance == 0})
     for angle in ANGLES:
         phase.control(f"{angle} command", bounds=BOUNDS[angle], unit="rad")
@@ -131,13 +134,10 @@ def reentry(
 
     altitude, speed, attack = phase["altitude"], phase["speed"], phase["angle of attack"]
     heating = vehicle.heating_rate(altitude, speed, attack)
-    pressure, load = vehicle.dynamic_pressure(altitude, speed), vehicle.load_factor(altitude, speed, attack, mass, gravity)
-    for word, value, limit in (
-        ("heating rate", heating, limits.heating_rate),
-        ("dynamic pressure", pressure, limits.dynamic_pressure),
-        ("load factor", load, limits.load_factor),
-    ):
-        phase.path(word, value, upper=limit, scale=limit)
+    load = vehicle.load_factor(altitude, speed, attack, mass, gravity)
+    limited = heating, vehicle.dynamic_pressure(altitude, speed), load
+    for (word, limit), value in zip(vars(limits).items(), limited, strict=True):
+        phase.path(word.replace("_", " "), value, upper=limit, scale=limit)
     for number, zone in enumerate(zones, 1):
         east, north = (degrees(1.0) * phase[word] - getattr(zone, word) for word in ("longitude", "latitude"))
         phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, scale=zone.radius)
@@ -171,18 +171,3 @@ def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) ->
         )
         for name, value in start.items()
     }
-
-
-def _check_tolerance(tolerance: Any, state: str, what: str) -> None:
-    if checks.number(tolerance, what) < 0:
-        raise ValueError(f"{what} must not be negative, not {tolerance:g}")
-    low, high = BOUNDS[state]
-    if not low <= END[state] - tolerance <= END[state] + tolerance <= high:
-        raise ValueError(f"{what}: {END[state]:g} +- {tolerance:g} is outside its bounds, {low:g} to {high:g}")
-
-
-def _positive(value: Any, what: str) -> float:
-    number = checks.number(value, what)
-    if number <= 0:
-        raise ValueError(f"{what} must be positive, not {number:g}")
-    return number
