@@ -12,9 +12,11 @@ Every file is written whole, all but checkpoints and samples by the process that
 from __future__ import annotations
 
 import json
+import os
+import socket
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -25,23 +27,26 @@ from zlib import crc32
 
 import msgspec
 import numpy as np
+from filelock import FileLock, Timeout
 
 from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.text import duration, text_table
 
-from ..data import records
 from ..data.addresses import load_front
-from ..data.schema import Count, Natural, Positive, checked, errors_begin_with
+from ..data.schema import Count, Natural, Positive, checked, errors_begin_with, from_record, to_record
 from ..execution.samples import History
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 from ..measures.simulation_record import SimulationRecord
 from .cells import Cell
-from .lock import locked
 
 MISSING, UNREADABLE = "missing", "unreadable"
+
+
 FORMAT, VERSION = "macs study", 2
 """Of study.json."""
+
+
 LONGEST, MOST = 200, 20
 """Characters of a reason why a run failed, and number of reasons that a summary lists."""
 
@@ -201,7 +206,7 @@ class Store:
         if not path.is_dir():
             raise ValueError(f"there is no folder '{out}'" if not path.exists() else f"'{out}' is not a folder")
         try:
-            data = records.from_bytes(record.read_bytes())
+            data = from_record(record.read_bytes())
             if data["format"] != FORMAT:
                 raise ValueError("it is not the record of a study")
             if data["version"] != VERSION:
@@ -236,7 +241,7 @@ class Store:
             latest = {**definition, "runs": max(definition["runs"], known.definition["runs"] if known else 0)}
             if known is None or latest != known.definition:
                 record = {"format": FORMAT, "version": VERSION, "study": latest}
-                write_whole(path / "study.json", records.to_bytes(record, indent=1))
+                write_whole(path / "study.json", to_record(record, indent=1))
             yield cls(path, latest)
 
     @classmethod
@@ -314,7 +319,7 @@ class Store:
         cannot be written."""
         front, checkpoint = run.path, self.checkpoint_path(run)
         checksum = crc32(outcome.front) if outcome.status == FINISHED else None
-        write_whole(front.with_suffix(".json"), records.to_bytes({**vars(outcome), "front": checksum}))
+        write_whole(front.with_suffix(".json"), to_record({**vars(outcome), "front": checksum}))
         if outcome.status == FINISHED:
             if front.exists():
                 # It could not be read, but it is the user's to delete.
@@ -329,7 +334,7 @@ def _record(path: Path) -> RunRecord:
     if not path.exists():
         return RunRecord()
     with errors_begin_with(f"its record '{path}' is damaged"):
-        return checked(records.from_bytes(path.read_bytes()), RunRecord)
+        return checked(from_record(path.read_bytes()), RunRecord)
 
 
 def _check_front(path: Path, record: RunRecord) -> None:
@@ -358,3 +363,29 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "
 def reason(status: str, message: str) -> str:
     """crashed: ValueError: no such thing."""
     return f"{status}: {message}" if message else status
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """A context in which no other process has the lock on a file, which is made if it does not exist.
+
+    Raises
+    ------
+    ValueError
+        Another process has it; the message names the process.
+    OSError
+        The file cannot be made.
+    """
+    lock, owner = FileLock(path), path.with_name(f"{path.name}.owner")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        by = f", {owner.read_text(encoding='utf-8')}" if owner.exists() else ""
+        raise ValueError(f"'{path.parent}' is being written by another process{by}") from None
+    try:
+        # In a file of its own, which can be read while the lock is taken. It is for the message alone, so a full disk is no error.
+        with suppress(OSError):
+            owner.write_text(f"{os.getpid()} on {socket.gethostname()}", encoding="utf-8")
+        yield
+    finally:
+        lock.release()

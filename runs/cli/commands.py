@@ -88,9 +88,8 @@ def solve(arguments: Namespace) -> int:
     missing = sum(not max(pair) <= problem.verify_tolerance for pair in simulated)
     if missing:
         named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-        print(
-            f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}: see `macs verify {out}{named}`."
-        )
+        print(f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}:", end=" ")
+        print(f"see `macs verify {out}{named}`.")
     print(f"\nfront saved in {out}")
     if arguments.plot:
         draw(front, arguments.plot)

@@ -1,4 +1,7 @@
-"""Schemas of plain data, checked by msgspec. Errors are one line: the place, the value, what it must be, and the nearest known word."""
+"""Plain data of files: schemas, checked by msgspec, and records, which have a checksum.
+
+Errors are one line: the place, the value, what it must be, and the nearest known word.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import types
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from zlib import crc32
 
 import msgspec
 from msgspec import Meta
@@ -18,12 +22,26 @@ from problems.checks import unknown
 
 LONGEST = 80
 """Characters of a value in a message."""
+
+
 LARGEST = sys.float_info.max
+
+
 Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST, description="a finite number")]
+
+
 Positive = Annotated[float, Meta(gt=0, le=LARGEST, description="a positive number")]
+
+
 Count = Annotated[int, Meta(ge=1, description="a whole number of at least 1")]
+
+
 Natural = Annotated[int, Meta(ge=0, description="a whole number of at least 0")]
+
+
 Text = Annotated[str, Meta(description="a text")]
+
+
 Flag = Annotated[bool, Meta(description="true or false")]
 
 
@@ -151,3 +169,25 @@ def errors_begin_with(where: str, anything: str = "") -> Iterator[None]:
         if not anything:
             raise
         raise ValueError(f"{where}: {anything}: {type(error).__name__}: {error}") from error
+
+
+def to_record(content: Any, indent: int | None = None) -> bytes:
+    """A record of plain data, as the bytes of a file; indented if it is made to be read by a person."""
+    return json.dumps({"crc32": _checksum(content), "content": content}, indent=indent).encode() + b"\n"
+
+
+def from_record(data: bytes) -> Any:
+    """The content of a record. Raises ValueError if it is damaged, or no record."""
+    try:
+        record = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"it is not JSON ({error})") from error
+    if not isinstance(record, dict) or record.keys() != {"crc32", "content"}:
+        raise ValueError("it has no checksum: another version of MACS wrote it, or it is damaged")
+    if record["crc32"] != _checksum(record["content"]):
+        raise ValueError("its content does not match its checksum")
+    return record["content"]
+
+
+def _checksum(content: Any) -> int:
+    return crc32(json.dumps(content).encode())

@@ -9,8 +9,7 @@ from typing import Any, TypedDict
 
 from macs.io.atomic import write_whole
 
-from ..data import records
-from ..data.schema import checked
+from ..data.schema import checked, from_record, to_record
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30
@@ -92,7 +91,7 @@ class Samples:
     def _write(self) -> None:
         assert self._path is not None
         try:
-            write_whole(self._path, records.to_bytes(self.columns))
+            write_whole(self._path, to_record(self.columns))
             self._behind = False
         except OSError as error:  # as for a checkpoint: the run goes on, and the next write may succeed
             log.warning("%s", error)
@@ -103,7 +102,7 @@ def _read(path: Path | None) -> dict[str, list[Any]] | None:
     if path is None or not path.exists():
         return None
     try:
-        columns = checked(records.from_bytes(path.read_bytes()), History)
+        columns = checked(from_record(path.read_bytes()), History)
         if columns.keys() != History.__annotations__.keys():
             raise ValueError(f"it has {', '.join(columns)}")
     except (OSError, ValueError) as error:

@@ -14,7 +14,7 @@ from macs import MACS, NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.data.records import from_bytes, to_bytes
+from runs.data.schema import from_record, to_record
 from runs.report.comparison import comparisons
 from runs.report.published import papers, published_tables
 
@@ -115,8 +115,8 @@ def test_without_flights_points_are_what_the_solver_says(tmp_path):
 def test_points_whose_flights_are_lost_are_simulated_again_if_their_problem_is_found(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "out")
     files = sorted((tmp_path / "out").glob("*/000?.json"))
-    data = from_bytes(files[0].read_bytes())
-    files[0].write_bytes(to_bytes({**data, "simulated": {}}))
+    data = from_record(files[0].read_bytes())
+    files[0].write_bytes(to_record({**data, "simulated": {}}))
     files[1].unlink()
     with pytest.raises(ValueError, match=r"points of run 1 of braking, dfet:1x2, \w+ cannot be simulated: .* was stated in a script"):
         study().report(tmp_path / "out")

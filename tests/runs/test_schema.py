@@ -6,8 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from runs.data.records import from_bytes, to_bytes
-from runs.data.schema import Count, Number, Positive, Section, Text, checked
+from runs.data.schema import Count, Number, Positive, Section, Text, checked, from_record, to_record
 
 
 class Bird(Section, tag="bird", tag_field="of"):
@@ -70,8 +69,8 @@ def test_errors_are_one_line_in_the_users_words(value, message):
 
 def test_records_come_back_or_are_refused():
     content = {"a": [1, 2.5, float("inf")], "b": {"c": None}}
-    assert from_bytes(to_bytes(content)) == from_bytes(to_bytes(content, indent=1)) == content
-    for damaged in (b"", b"[1]", b"[" * 10_000, to_bytes(content).replace(b"2.5", b"2.6"), b"\xff", to_bytes(content)[:-5]):
+    assert from_record(to_record(content)) == from_record(to_record(content, indent=1)) == content
+    for damaged in (b"", b"[1]", b"[" * 10_000, to_record(content).replace(b"2.5", b"2.6"), b"\xff", to_record(content)[:-5]):
         with pytest.raises(ValueError) as refused:
-            from_bytes(damaged)
+            from_record(damaged)
         assert "\n" not in str(refused.value)

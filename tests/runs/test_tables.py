@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from runs.measures.statistics import overall, pairwise, summarise
-from runs.report.statistics_tables import overall_table, pairs_table, summary_table
+from runs.report.comparison_tables import overall_table, pairs_table, summary_table
 from runs.report.tables import Column, escaped, latex_number, short, table
 
 EXAMPLE = table(

@@ -17,7 +17,7 @@ from problems.catalogue import CASES, is_catalogued
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
-from runs.data import records
+from runs.data.schema import from_record, to_record
 
 MARK = "from pathlib import Path\nPath({mark!r}).touch()\ndef build(**data): Path({mark!r}).touch()\nreference = build\n"
 TOML = 'solvers = ["macs"]\nruns = 1\nseed = 1\nevaluations = 50\n'
@@ -99,8 +99,8 @@ def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
     front.source = Source(front.source.name, front.source.fingerprint, address, {"command": "touch it_ran"})
     front.save(path)
     record = path.with_suffix(".json")
-    forged = {**records.from_bytes(record.read_bytes()), "front": crc32(path.read_bytes()), "simulated": {}}
-    record.write_bytes(records.to_bytes(forged))
+    forged = {**from_record(record.read_bytes()), "front": crc32(path.read_bytes()), "simulated": {}}
+    record.write_bytes(to_record(forged))
     assert main(["study", "status", str(out)]) == 0
     capsys.readouterr()
     said = refused(capsys, "study", "report", str(out), "--no-figures")
@@ -110,9 +110,9 @@ def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
 @pytest.mark.parametrize("reference", [*ADDRESSES, {"goddard": "evil:reference"}])
 def test_a_definition_runs_no_code_of_its_own(mark, out, capsys, reference):
     path = out / "study.json"
-    content = records.from_bytes(path.read_bytes())
+    content = from_record(path.read_bytes())
     content["study"]["reference"] = reference
-    path.write_bytes(records.to_bytes(content))
+    path.write_bytes(to_record(content))
     assert main(["study", "status", str(out)]) == 0
     capsys.readouterr()
     assert "--trust" in refused(capsys, "study", "report", str(out), "--no-figures") and not mark.exists()
@@ -137,12 +137,12 @@ def test_a_definition_runs_no_code_of_its_own(mark, out, capsys, reference):
 )
 def test_a_forged_record_is_one_line_or_an_unreadable_run(mark, out, capsys, name, path, value):
     for file in out.rglob(name):
-        content = records.from_bytes(file.read_bytes())
+        content = from_record(file.read_bytes())
         inner = content
         for key in path[:-1]:
             inner = inner[key]
         inner[path[-1]] = value
-        file.write_bytes(records.to_bytes(content))
+        file.write_bytes(to_record(content))
     said = refused(capsys, "study", "report", str(out), "--no-figures")
     assert "Traceback" not in said and ("study.json" in said or "goal" in said or "0 of 2 runs finished" in said)
 

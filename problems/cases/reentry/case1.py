@@ -7,8 +7,7 @@ from typing import Any
 
 from ...problem import Problem
 from .figures import plot, track
-from .front import REFERENCE, known
-from .statement import Limits, reentry
+from .statement import REFERENCE, Limits, known, reentry
 
 __all__ = ["LIMITS", "REFERENCE", "plot", "problem", "reference", "track"]
 

@@ -13,8 +13,7 @@ from ...problem import Problem
 from . import figures
 from .case1 import LIMITS
 from .figures import track
-from .front import REFERENCE, known
-from .statement import Zone, reentry
+from .statement import REFERENCE, Zone, known, reentry
 
 __all__ = ["LIMITS", "REFERENCE", "ZONES", "plot", "problem", "reference", "track"]
 
