@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from problems.checks import short_repr
 from transcription import Smooth
 
 from .batch import file as studyfile
@@ -43,7 +44,7 @@ def _key(kind: Any = None, *, decides: bool = False, record: Callable[[Any], Any
     return {"kind": kind, "decides": decides, "record": record}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Study:
     """Independent runs of solvers on problems; `run` makes them, and makes only those that are missing when it is called again.
 
@@ -133,6 +134,9 @@ class Study:
     """Every combination, problems first."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
     """By labels of a cell: its problem and transcription, and its solver, pickled for the processes that run them."""
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():

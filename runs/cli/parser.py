@@ -11,6 +11,7 @@ import difflib
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
@@ -96,6 +97,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # A unit that the terminal cannot show is no reason to fail.
         sys.stdout.reconfigure(errors="replace")
+    # A warning, such as that of an old file, is one line, without the place in our code.
+    warnings.formatwarning = lambda message, *_: f"{arguments.parser.prog}: {message}\n"
     try:
         from . import commands
 

@@ -6,7 +6,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ import msgspec
 from macs.front import Front
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
+from macs.io.text import counted
 
 from ..batch.store import Store
 from ..data.addresses import check_trusted
@@ -49,7 +50,7 @@ class ReportKeys(msgspec.Struct):
     note: Text = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """The text of a report, and the files that were written.
 
@@ -61,10 +62,13 @@ class Report:
     """
 
     text: str
-    files: tuple[Path, ...] = field(repr=False)
+    files: tuple[Path, ...]
 
     def __str__(self) -> str:
         return self.text
+
+    def __repr__(self) -> str:
+        return f"<Report: {counted(len(self.files), 'file')}>"
 
 
 def report(
@@ -102,7 +106,7 @@ def report(
     store = Store.open(out, trust)
     summary, study = store.summary(), store.definition
     if not summary.finished:
-        raise ValueError(f"there is nothing to report on yet\n{summary}")
+        raise ValueError(f"there is nothing to report on yet: {str(summary).splitlines()[0]}")
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         published = papers(study.get("paper") or [])

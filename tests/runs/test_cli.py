@@ -289,3 +289,13 @@ def test_a_cut_file_is_one_line(saved):
     for command in ("show", "verify"):
         done = subprocess.run([*MACS, command, "cut.nc"], capture_output=True, text=True, timeout=60)
         assert done.returncode == 2 and done.stderr.count("\n") == 1 and "cut.nc" in done.stderr
+
+
+def test_a_result_overwrites_no_file_of_another_kind(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("macs.solvers.solver.Solver.solve", lambda *_, **__: pytest.fail("the work started"))
+    source = tmp_path / "mine.py"
+    source.write_text("print('mine')\n", encoding="utf-8")
+    assert "would overwrite a file that is no front" in wrong(capsys, "solve", "goddard", "--out", str(source))
+    assert source.read_text(encoding="utf-8") == "print('mine')\n"
+    same = str(tmp_path / "q.png")
+    assert "would overwrite the front" in wrong(capsys, "solve", "goddard", "--out", same, "--plot", same)

@@ -442,3 +442,14 @@ def test_what_other_processes_cannot_have_is_refused_before_any_work(monkeypatch
 def test_records_are_plain_text(made):
     record = json.loads((made[0] / "study.json").read_text(encoding="utf-8"))["content"]
     assert record["study"]["cells"][0]["problem"] == "glide" and record["study"]["seed"] == 1
+
+
+@pytest.mark.parametrize("name", ["../evil", "/evil", "a\\b", "..", "a\0b"])
+def test_the_name_of_a_study_leads_to_no_other_folder(name):
+    with pytest.raises(ValueError, match="its name is that of a folder"):
+        Study(name, **KEEP)
+
+
+def test_a_study_and_its_report_print_on_one_line(tmp_path):
+    made = study()
+    assert repr(made).startswith("Study(name='glides'") and "\n" not in repr(made) and "retry" not in repr(made)
