@@ -76,6 +76,8 @@ def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
     assert np.abs((fine.F - coarse.F) / span)[1:].max() < 1e-5
     assert fine.stats["gradient_solves"] >= 8 and fine.stats["mesh_tolerance"] == 1e-7
     assert coarse.stats["gradient_solves"] == 0 and fine.stats["wall_time"] > 0
+    # Each solve takes at least one iteration.
+    assert fine.stats["inner_iterations"] >= coarse.stats["inner_iterations"] + fine.stats["gradient_solves"]
     assert len(fine[0].decision) > len(fine[3].decision) and fine[0].transcription["settings"]["basis"] == "bernstein"
 
 
