@@ -156,10 +156,8 @@ def test_nothing_is_called_that_makes_no_problem(address, data, word, tmp_path):
 
 
 def test_a_function_of_a_file_is_called_only_if_it_is_defined_there_and_says_nothing_else(case):
-    case.write_text(
-        CASE
-        + "from os import system\nfrom problems.cases.goddard import problem as other\ndef count() -> int:\n    return 1\ndef mine() -> 'Problem':\n    return problem()\n"
-    )
+    imports = "from os import system\nfrom problems.cases.goddard import problem as other\n"
+    case.write_text(CASE + imports + "def count() -> int:\n    return 1\ndef mine() -> 'Problem':\n    return problem()\n")
     refused(lambda: load(f"{case}:system", command="true"), "has no function 'system' of its own")
     refused(lambda: load(f"{case}:other"), "has no function 'other' of its own")
     refused(lambda: load(f"{case}:count"), "'count' is not known to return a Problem")
