@@ -98,7 +98,11 @@ def solve(arguments: Namespace) -> int:
 
 def check_is_front(path: Path) -> None:
     """Raise `WrongCall` if a file exists that is no front: it would be overwritten."""
-    if path.is_file() and path.stat().st_size and path.read_bytes()[:4] != b"\x89HDF":
+    if not path.is_file() or not path.stat().st_size:
+        return
+    with path.open("rb") as file:
+        known = file.read(4) == b"\x89HDF"
+    if not known:
         raise WrongCall(f"--out {path} would overwrite a file that is no front")
 
 

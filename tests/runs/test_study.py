@@ -20,6 +20,7 @@ from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow
 from runs import Study
 from runs.batch.store import Store
 from runs.execution.task import perform
+from runs.report.report import Report
 from transcription import DFET
 
 HERE = Path(__file__).parent
@@ -450,6 +451,7 @@ def test_the_name_of_a_study_leads_to_no_other_folder(name):
         Study(name, **KEEP)
 
 
-def test_a_study_and_its_report_print_on_one_line(tmp_path):
-    made = study()
-    assert repr(made).startswith("Study(name='glides'") and "\n" not in repr(made) and "retry" not in repr(made)
+def test_a_study_and_its_report_print_on_one_line():
+    shown = repr(study())
+    assert shown.startswith("Study(name='glides'") and "\n" not in shown and "time_limit" not in shown
+    assert repr(Report("a table\nof two lines", (Path("report.txt"),))) == "<Report: 1 file>"
