@@ -112,6 +112,8 @@ class Meshed(Transcription):
         Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
     highest_order, most_elements : int
         Limits of mesh refinement in each phase; of elements, there may be twice as many as it began with, if that is more.
+    orders_controls, moves_edges : bool
+        Whether the method uses the `control_order` of a mesh, and its `moving` edges; what it does not use is refused.
     """
 
     elements: int
@@ -119,6 +121,8 @@ class Meshed(Transcription):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None
     highest_order: ClassVar[int] = 10
     most_elements: ClassVar[int] = 40
+    orders_controls: ClassVar[bool] = False
+    moves_edges: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -129,6 +133,11 @@ class Meshed(Transcription):
                 object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
             except ValueError as error:
                 raise ValueError(f"{name}: {error}") from None
+        for phase, mesh in self.meshes.items():
+            if mesh.control_order is not None and not self.orders_controls:
+                raise ValueError(f"{name}: phase '{phase}': the order of its controls cannot be chosen")
+            if mesh.moving and not self.moves_edges:
+                raise ValueError(f"{name}: phase '{phase}': the edges of its elements cannot move")
 
     @property
     def meshes(self) -> dict[str, PhaseMesh]:

@@ -1,7 +1,8 @@
-"""The mesh of one phase: where its elements end, and the degree of its states on them."""
+"""The mesh of one phase: where its elements end, and the degrees of its states and controls on them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,15 +24,21 @@ class PhaseMesh:
         Ends of the elements, relative to the phase: increasing from 0 to 1.
     order : int
         Degree of the states on each element.
+    control_order : int, optional
+        Degree of the controls on each element; by default the method's own rule.
+    moving : sequence of int
+        Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them.
 
     Raises
     ------
     ValueError
-        If the edges are not such, or the order is no whole number of at least 0.
+        If the edges are not such, an order is no whole number of at least 0, or a moving edge is no inner one or given twice.
     """
 
     edges: tuple[float, ...]
     order: int
+    control_order: int | None = None
+    moving: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         try:
@@ -43,9 +50,15 @@ class PhaseMesh:
         check_count("order of a mesh", self.order, 0)
         object.__setattr__(self, "edges", tuple(edges.tolist()))
         object.__setattr__(self, "order", int(self.order))
+        if self.control_order is not None:
+            check_count("control_order of a mesh", self.control_order, 0)
+            object.__setattr__(self, "control_order", int(self.control_order))
+        object.__setattr__(self, "moving", self._inner_edges(self.moving))
 
     def __repr__(self) -> str:
-        return f"PhaseMesh({self.elements} elements of order {self.order})"
+        controls = "" if self.control_order is None else f", controls of order {self.control_order}"
+        moving = f", {len(self.moving)} of {self.elements - 1} inner edges moving" if self.moving else ""
+        return f"PhaseMesh({self.elements} elements of order {self.order}{controls}{moving})"
 
     @classmethod
     def uniform(cls, elements: int, order: int) -> PhaseMesh:
@@ -54,13 +67,14 @@ class PhaseMesh:
 
     @classmethod
     def of(cls, given: Any) -> PhaseMesh:
-        """From what a user writes, (edges, order), or a file: {"edges": ..., "order": ...}. Raises ValueError for anything else."""
+        """From what a user writes, (edges, order) and perhaps control_order and moving, or a file, a mapping of these names. Raises
+        ValueError for anything else."""
         if isinstance(given, PhaseMesh):
             return given
         try:
             return cls(**given) if isinstance(given, dict) else cls(*given)
         except TypeError:
-            raise ValueError(f"the mesh of a phase is written (edges, order), not {given!r}") from None
+            raise ValueError(f"the mesh of a phase is written (edges, order[, control_order[, moving]]), not {given!r}") from None
 
     @property
     def elements(self) -> int:
@@ -83,8 +97,25 @@ class PhaseMesh:
         return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain data."""
-        return {"edges": list(self.edges), "order": self.order}
+        """As plain data; what a mesh does not have is left out."""
+        plain: dict[str, Any] = {"edges": list(self.edges), "order": self.order}
+        if self.control_order is not None:
+            plain["control_order"] = self.control_order
+        return plain | {"moving": list(self.moving)} if self.moving else plain
+
+    def _inner_edges(self, given: Any) -> tuple[int, ...]:
+        """Indices of inner edges, sorted. Raises ValueError if they are not such, or one is given twice."""
+        if not isinstance(given, Iterable) or isinstance(given, str | bytes):
+            raise ValueError(f"moving edges of a mesh must be a sequence of their indices, not {given!r}")
+        indices = tuple(given)
+        for one in indices:
+            if isinstance(one, bool) or not isinstance(one, int | np.integer) or not 1 <= one < self.elements:
+                raise ValueError(
+                    f"a moving edge of a mesh of {self.elements} elements must be one of 1 to {self.elements - 1}, not {one!r}"
+                )
+        if len(set(indices)) < len(indices):
+            raise ValueError(f"moving edges of a mesh must differ, not {given!r}")
+        return tuple(sorted(map(int, indices)))
 
 
 def as_meshes(given: Any) -> tuple[tuple[str, PhaseMesh], ...]:
