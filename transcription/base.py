@@ -153,6 +153,12 @@ class Meshed(Transcription):
         the method has such."""
         return replace(self, mesh={**self.meshes, **meshes})  # type: ignore[type-var]
 
+    def settled(self, trajectory: Trajectory) -> Self:
+        """The same method on the meshes of a trajectory that it made: moving edges begin where they are there, and can move as far
+        again. To hold them there, see `PhaseMesh.moving`."""
+        meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
+        return self.remeshed(meshes) if meshes else self
+
     def check_phases(self, problem: CompiledProblem) -> None:
         """Raise ValueError if a mesh is given for a phase that the problem does not have."""
         names = [phase.name for phase in problem.phases]

@@ -64,6 +64,7 @@ class DFET(Meshed):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
     orders_controls = True
+    moves_edges = True
     word = "dfet"
     examples = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1)"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,10 @@ from problems.checks import check_count
 
 SHORTEST = 1e-9
 """Shortest element, relative to its phase: below, its length is mostly rounding."""
+REACH, FAR = 0.45, 0.9
+"""How far a moving edge may go towards the next one, as a fraction of the distance: where that moves too, and where it stays."""
+SAME = 1e-9
+"""Largest difference between the same edge in a mesh and in its trajectory, relative to the phase: of rounding, of times far from 0 too."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,6 +99,34 @@ class PhaseMesh:
         """Local coordinates (k,) in [-1, 1], relative to the phase: shape (N, k)."""
         places = self.places
         return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
+
+    def ranges(self) -> np.ndarray:
+        """Bounds (m, 2) of the places of the moving edges, relative to the phase.
+
+        Two that are next to each other may each use less than half of what lies between them, so that they never meet; beside one that
+        stays there is more room.
+        """
+        edges, j = np.array(self.edges), np.array(self.moving, dtype=int)
+        neighbours = [np.where(np.isin(j + side, j), REACH, FAR) * (edges[j + side] - edges[j]) for side in (-1, 1)]
+        return np.stack([edges[j] + reach for reach in neighbours], axis=-1)
+
+    def moved(self, places: np.ndarray) -> PhaseMesh:
+        """The same mesh with its moving edges at other places (m,), relative to the phase: from there they can move as far again."""
+        edges = np.array(self.edges)
+        edges[list(self.moving)] = places
+        return replace(self, edges=tuple(edges.tolist()))
+
+    def found_in(self, edges: np.ndarray) -> PhaseMesh:
+        """This mesh as it lies in a trajectory of it, from the ends (N + 1,) of the trajectory's elements, in time: with its moving edges
+        where they are there. The mesh as it is, if the trajectory is of another one."""
+        if len(edges) != len(self.edges) or not self.moving or not edges[-1] > edges[0]:
+            return self
+        places = (edges - edges[0]) / (edges[-1] - edges[0])
+        chosen = places[list(self.moving)]
+        low, high = self.ranges().T
+        still = np.delete(places - np.array(self.edges), self.moving)
+        own = np.abs(still).max() <= SAME and (chosen >= low - SAME).all() and (chosen <= high + SAME).all()
+        return self.moved(np.clip(chosen, low, high)) if own else self
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; what a mesh does not have is left out."""
