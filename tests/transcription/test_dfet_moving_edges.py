@@ -29,7 +29,8 @@ def test_moving_edges_are_free_variables_that_cannot_meet():
     names = [nlp.variables[i].name for i in nlp.free]
     found = {name: nlp.variables[i] for i, name in zip(nlp.free, names, strict=True) if "edge" in name}
     assert list(found) == ["swing.edge[1]", "swing.edge[3]"]
-    assert found["swing.edge[1]"].lower == pytest.approx(0.01) and found["swing.edge[1]"].upper == pytest.approx(0.1 + 0.9 * 0.25)
+    assert found["swing.edge[1]"].lower == pytest.approx(0.01) and found["swing.edge[1]"].upper == pytest.approx(0.1 + 0.45 * 0.5)
+    assert found["swing.edge[3]"].lower == pytest.approx(0.6 - 0.45 * 0.5) and found["swing.edge[3]"].upper == pytest.approx(0.96)
     assert all(v.scale == v.upper - v.lower for v in found.values())
     close = PhaseMesh((0.0, 0.2, 0.4, 1.0), 1, None, (1, 2)).ranges()
     assert close == pytest.approx(np.array([[0.02, 0.29], [0.31, 0.94]]))
@@ -42,8 +43,8 @@ def test_where_the_edges_are_the_equations_are_those_of_a_mesh_with_these_edges(
     nlp = moving(basis, order, 2).transcribe(oscillator())
     chosen = [slot(nlp, f"swing.edge[{j}]") for j in MOVING]
     for z in propagated(nlp):
-        edges = np.array(EDGES)
-        edges[list(MOVING)] = z[chosen]
+        one, two = z[chosen]
+        edges = np.array([0.0, one, 0.5 * (one + two), two, 1.0])
         still = DFET(2, 2, basis=basis, mesh={"swing": (edges, order, 2)}).transcribe(oscillator())
         same = np.delete(z, chosen)[None]
         assert np.abs(still.propagate(same) - same).max() < 1e-11
@@ -97,7 +98,7 @@ def test_a_trajectory_comes_back_from_its_own_mesh_with_its_edges(basis):
 
 def test_in_trajectories_of_other_meshes_the_edges_begin_where_the_mesh_has_them():
     nlp = moving().transcribe(oscillator())
-    other = DFET(4, 3).transcribe(oscillator())
+    other = DFET(5, 3).transcribe(oscillator())
     flight = other.unpack(propagated(other, k=1)[0])
     z = nlp.interpolate(flight)
     assert [z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING] == [0.1, 0.6]
@@ -112,15 +113,16 @@ def test_a_settled_method_begins_where_the_edges_of_a_trajectory_are():
     flight = nlp.unpack(z)
     settled = method.settled(flight)
     mesh = settled.mesh_of("swing")
-    assert mesh.moving == MOVING and mesh.edges[2] == EDGES[2] and mesh.order == 3
+    assert mesh.moving == MOVING and mesh.order == 3
+    assert mesh.edges[2] == pytest.approx(0.5 * (mesh.edges[1] + mesh.edges[3]), abs=1e-15)
     assert [mesh.edges[j] for j in MOVING] == pytest.approx([z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING], abs=1e-12)
     again = settled.transcribe(oscillator())
     assert again.evaluate(again.interpolate(flight)[None])[1] < 1e-10
     assert settled.settled(again.unpack(again.interpolate(flight))).mesh_of("swing").edges == pytest.approx(mesh.edges, abs=1e-12)
     # Not from a trajectory of another mesh, and not where nothing moves.
-    other = DFET(4, 3).transcribe(oscillator())
+    other = DFET(5, 3).transcribe(oscillator())
     assert method.settled(other.unpack(propagated(other, k=1)[0])) == method
-    assert DFET(4, 3).settled(flight) == DFET(4, 3)
+    assert DFET(5, 3).settled(flight) == DFET(5, 3)
 
 
 def least_time() -> Problem:

@@ -37,6 +37,7 @@ class DFETPhase(PhaseWriter):
         moving = zip(mesh.moving, mesh.ranges().tolist(), strict=True)
         places = [Variable(f"{prefix}edge[{j}]", low, high, "", high - low) for j, (low, high) in moving]
         self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
+        self._begin = np.array(mesh.edges)[list(mesh.moving)]
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
         at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
         self.interior = self.X.ravel()
@@ -127,9 +128,8 @@ class DFETPhase(PhaseWriter):
         places = ca.DM(self.mesh.places).T
         if not len(self.E):
             return places
-        order = np.arange(self.n + 1)
-        order[list(self.mesh.moving)] = self.n + 1 + np.arange(len(self.E))
-        return ca.horzcat(places, self.n * extended[self.layout.index(self.E).tolist()].T)[order.tolist()]
+        moved = extended[self.layout.index(self.E).tolist()] - ca.DM(self._begin)
+        return places + self.n * (ca.sparsify(ca.DM(self.mesh.shares)) @ moved).T
 
     def _outer(self, extended: ca.MX) -> list[ca.DM | ca.MX]:
         """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element by the free variables.
@@ -141,14 +141,15 @@ class DFETPhase(PhaseWriter):
         mean, places = (statics[1, :] - statics[0, :]) / self.n, self._places(extended)
         starts = [statics[0, :] + mean * places[j] for j in range(self.n)]
         lengths = [mean * (places[j + 1] - places[j]) for j in range(self.n)]
-        for j, slot in zip(self.mesh.moving, self.E.tolist(), strict=True):
-            moved = length * seeds[slot, :]
-            starts[j], lengths[j], lengths[j - 1] = starts[j] + moved, lengths[j] - moved, lengths[j - 1] + moved
+        if len(self.E):
+            moved = length * (ca.DM(self.mesh.shares) @ seeds[self.E.tolist(), :])
+            starts = [start + moved[j, :] for j, start in enumerate(starts)]
+            lengths = [one + moved[j + 1, :] - moved[j, :] for j, one in enumerate(lengths)]
         return [ca.vertcat(controls[j], starts[j], lengths[j], statics) for j in range(self.n)]
 
     def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
         """See `PhaseWriter.guess_controls`; edges that move begin where the mesh has them."""
-        edges = {int(slot): self.mesh.edges[j] for j, slot in zip(self.mesh.moving, self.E, strict=True)}
+        edges = dict(zip(self.E.tolist(), self._begin.tolist(), strict=True))
         return edges | super().guess_controls(t0, tf)
 
     def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
@@ -169,7 +170,8 @@ class DFETPhase(PhaseWriter):
         """See `PhaseWriter.unpack`."""
         phase, tables = self.phase, self.tables
         s, places = extended[self.ends.statics], self.mesh.places
-        places[list(self.mesh.moving)] = self.n * extended[self.E]
+        if len(self.E):
+            places = places + self.n * self.mesh.shares @ (extended[self.E] - self._begin)
         edges = s[0] + (s[1] - s[0]) * places / self.n
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]

@@ -31,7 +31,8 @@ class PhaseMesh:
     control_order : int, optional
         Degree of the controls on each element; by default the method's own rule.
     moving : sequence of int
-        Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them.
+        Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them. The edges between
+        two of these, or one and an end of the phase, share the distance as they do here.
 
     Raises
     ------
@@ -100,20 +101,33 @@ class PhaseMesh:
         places = self.places
         return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
 
+    @property
+    def knots(self) -> tuple[int, ...]:
+        """Indices (m + 2,) of the moving edges and the two ends."""
+        return (0, *self.moving, self.elements)
+
     def ranges(self) -> np.ndarray:
         """Bounds (m, 2) of the places of the moving edges, relative to the phase.
 
-        Two that are next to each other may each use less than half of what lies between them, so that they never meet; beside one that
-        stays there is more room.
+        Two neighbours may each use less than half of what lies between them, so that they never meet; beside an end there is more room.
         """
-        edges, j = np.array(self.edges), np.array(self.moving, dtype=int)
-        neighbours = [np.where(np.isin(j + side, j), REACH, FAR) * (edges[j + side] - edges[j]) for side in (-1, 1)]
-        return np.stack([edges[j] + reach for reach in neighbours], axis=-1)
+        distances = np.diff(np.array(self.edges)[list(self.knots)])
+        reach = np.full((2, len(self.moving)), REACH)
+        reach[0, :1], reach[1, -1:] = FAR, FAR
+        places = np.array(self.edges)[list(self.moving)]
+        return np.stack([places - reach[0] * distances[:-1], places + reach[1] * distances[1:]], axis=-1)
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Derivatives (N + 1, m) of the places of all edges by those of the moving ones."""
+        knots = np.array(self.edges)[list(self.knots)]
+        return np.array([np.interp(self.edges, knots, one) for one in np.eye(len(knots))[1:-1]]).reshape(-1, len(self.edges)).T
 
     def moved(self, places: np.ndarray) -> PhaseMesh:
         """The same mesh with its moving edges at other places (m,), relative to the phase: from there they can move as far again."""
-        edges = np.array(self.edges)
-        edges[list(self.moving)] = places
+        if not self.moving:
+            return self
+        edges = np.array(self.edges) + self.shares @ (places - np.array(self.edges)[list(self.moving)])
         return replace(self, edges=tuple(edges.tolist()))
 
     def found_in(self, edges: np.ndarray) -> PhaseMesh:
@@ -122,11 +136,9 @@ class PhaseMesh:
         if len(edges) != len(self.edges) or not self.moving or not edges[-1] > edges[0]:
             return self
         places = (edges - edges[0]) / (edges[-1] - edges[0])
-        chosen = places[list(self.moving)]
         low, high = self.ranges().T
-        still = np.delete(places - np.array(self.edges), self.moving)
-        own = np.abs(still).max() <= SAME and (chosen >= low - SAME).all() and (chosen <= high + SAME).all()
-        return self.moved(np.clip(chosen, low, high)) if own else self
+        mesh = self.moved(np.clip(places[list(self.moving)], low, high))
+        return mesh if np.abs(places - mesh.edges).max() <= SAME else self
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; what a mesh does not have is left out."""
