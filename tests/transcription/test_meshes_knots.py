@@ -174,8 +174,8 @@ def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_
     # Two of one control are not one, however near.
     assert knots({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, {}, mesh, NOTHING) == [0.4, 0.401]
     # A contact beside a switch is this; others have knots of their own.
-    touching = {"state x": [Switch(0.45, INSIDE, UPPER, 0.5), Switch(0.85, UPPER, INSIDE, 0.5)]}
-    assert knots(found, touching, mesh, NOTHING) == pytest.approx([0.405, 0.7, 0.85])
+    touching = {"state x": [Switch(0.45, INSIDE, UPPER, 0.5), Switch(0.07, UPPER, INSIDE, 0.5)]}
+    assert knots(found, touching, mesh, NOTHING) == pytest.approx([0.07, 0.405, 0.7])
     # Near a moving edge they are there; two that were pressed together leave nothing, or one.
     moving = PhaseMesh((0, 0.3, 0.31, 1), 3, 1, (1, 2))
     pair = [Switch(0.3, LOWER, UPPER, 1.0), Switch(0.31, UPPER, LOWER, 1.0)]
@@ -230,7 +230,7 @@ def test_controls_are_constant_where_they_are_on_bounds():
     assert on_bounds(flight, inside, [0.2, 0.3, 0.5]) == {"u": [0, 3]}
 
 
-@pytest.mark.parametrize(("wall", "word"), [(1 / 9, "dfet:8x3:bernstein"), (0.1, "dfet:6x4")])
+@pytest.mark.parametrize(("wall", "word"), [(0.1, "dfet:8x3:bernstein"), (0.1, "dfet:6x4"), (0.14, "dfet:6x4")])
 def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word):
     """Bryson, Denham and Dreyfus, AIAA Journal 1, 1963: on the wall l from 3 l to 1 - 3 l, effort 4 / (9 l)."""
     problem = Problem("Bryson-Denham")
@@ -242,7 +242,7 @@ def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word
     assert x is not None
     found, method = followed(problem, parse(word), rounds=1)
     exact = 4 / (9 * wall)
-    assert abs(found[0][0] - exact) > 1e-4 and found[1][0] == pytest.approx(exact, rel=1e-7)
+    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=1e-7)
     # The effort depends on the places to the third order.
     edges = np.array(method.settled(found[1][1]).mesh_of("move").edges)
     assert edges[list(method.mesh_of("move").moving)] == pytest.approx([3 * wall, 1 - 3 * wall], abs=2e-3)

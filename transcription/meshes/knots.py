@@ -25,7 +25,7 @@ TAU = np.linspace(-1.0, 1.0, 65)
 NEAR, NEAREST = 0.05, 1e-3
 """Switches of two controls that are no further apart than so many elements, or than this relative to the phase, share a knot; no knot
 is so near to an end of the phase."""
-BESIDE = 0.5
+BESIDE = 1.0
 """Elements within which a contact with a limit begins, or ends, at the switch of a control beside it."""
 PRESSED = 0.01
 """A moving edge at an end of its range, but for this share of it, would go on."""

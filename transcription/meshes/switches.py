@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +22,10 @@ SMEARED, PULSE = 1.25, 2.25
 CONTACT, LASTING = 5e-3, 0.5
 """A state, or a path constraint, is at a limit if it is nearer than this, in its own range on the phase, for at least so many elements.
 A gap of less is none."""
+LEVELS = (1.0, 4.0, 16.0)
+"""Multiples of that distance at which it is seen how fast a limit is reached."""
+SLOWEST = 1.25
+"""Ratio of the times between these levels below which nothing is concluded: the distance grows as the sixth power of time."""
 BRIEF = 0.1
 """Contact with a bound of less than so many elements, between two stretches inside, is a touch of one stretch."""
 HUMP = 0.25
@@ -105,7 +108,7 @@ def switches(places: np.ndarray, values: np.ndarray) -> list[Switch]:
 
 
 def contacts(places: np.ndarray, values: np.ndarray, lower: float, upper: float) -> list[Switch]:
-    """Where a state or a path constraint reaches and leaves its limits.
+    """Where a state or a path constraint reaches and leaves its limits, or only touches one: from INSIDE to INSIDE.
 
     Parameters
     ----------
@@ -123,7 +126,35 @@ def contacts(places: np.ndarray, values: np.ndarray, lower: float, upper: float)
     # At the ends of a phase, too: a limit is often the first value, or the last.
     ends = Stretch(parts[0].start, parts[0].start, 0, 0, INSIDE), Stretch(parts[-1].end, parts[-1].end, 0, 0, INSIDE)
     parts = [one for one in _without([ends[0], *parts, ends[1]], places, (LOWER, UPPER), INSIDE, LASTING) if one.length > 0.0]
-    return [Switch(part.start, before.label, part.label, 0.5) for before, part in pairwise(parts)]
+    t, found = places.ravel(), []
+    for i, part in enumerate(parts):
+        if part.label == INSIDE:
+            continue
+        distance = (values - lower if part.label == LOWER else upper - values).ravel() / near
+        before = parts[i - 1].label if i else None
+        after = parts[i + 1].label if i + 1 < len(parts) else None
+        start = _reached(t[part.first :: -1], distance[part.first :: -1]) if before == INSIDE else part.start
+        end = _reached(t[part.last :], distance[part.last :]) if after == INSIDE else part.end
+        if start >= end:
+            found.append(Switch(0.5 * (part.start + part.end), INSIDE, INSIDE, 0.25))
+            continue
+        found += [Switch(start, before, part.label, 0.5)] if before is not None else []
+        # A limit that follows at once has its own beginning.
+        found += [Switch(end, part.label, after, 0.5)] if after == INSIDE else []
+    return found
+
+
+def _reached(t: np.ndarray, distance: np.ndarray) -> float:
+    """Where a limit is reached, seen from there: the distance grows as some power of the time from it, which three levels tell."""
+    beyond = [np.flatnonzero(distance >= level) for level in LEVELS]
+    if not all(len(one) for one in beyond):
+        return float(t[0])
+    near, middle, far = (
+        float(np.interp(level, distance[k[0] - 1 : k[0] + 1], t[k[0] - 1 : k[0] + 1])) if k[0] else float(t[0])
+        for level, k in zip(LEVELS, beyond, strict=True)
+    )
+    growth = (far - middle) / (middle - near) if middle != near else np.inf
+    return near - (middle - near) / (growth - 1.0) if growth > SLOWEST else near
 
 
 def _passages(part: Stretch, t: np.ndarray, u: np.ndarray, before: int | None, after: int | None, elements: float) -> list[Switch]:
