@@ -177,7 +177,7 @@ class Front(Points):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates."""
-        from .fronts.front_plot import draw_front
+        from .fronts.pictures.front_plot import draw_front
 
         return draw_front(self, ax)
 

@@ -392,7 +392,7 @@ class Point:
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Axes with the states, controls and path constraints over time, one for each of them."""
-        from .flight_plot import draw_flight
+        from .pictures.flight_plot import draw_flight
 
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")

@@ -13,9 +13,9 @@ import numpy as np
 import problems
 import transcription
 from macs.front import Front
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_picture
 from macs.fronts.points import Point
-from macs.fronts.style import label
+from macs.fronts.pictures.style import label
 from macs.fronts.verification import Check, missed, objective_scales
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target

@@ -11,14 +11,14 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..io.atomic import write_whole
-from .points import Point
+from ...io.atomic import write_whole
+from ..points import Point
 from .style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .points import Points
+    from ..points import Points
 
 
 def save_picture(what: Points | Point, path: str | PathLike[str]) -> None:

@@ -1,0 +1,1 @@
+"""Figures of fronts and flights. matplotlib is imported only where one is drawn."""
