@@ -15,6 +15,7 @@ from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
 from .fronts.tables import front_table, headline
+from .fronts.verified import VERIFY, verified
 from .gradients.front_polish import polished
 from .gradients.mesh_refinement import refine_mesh
 
@@ -32,7 +33,7 @@ class Front(Points):
     says why, and `closest` is the least infeasible point.
 
     - See: `table()`, `plot()`, `front[i].plot()`
-    - Verify: `simulate()`, `front[i].simulate()`
+    - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
     """
@@ -128,6 +129,29 @@ class Front(Points):
         """
         return Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
 
+    def verify(self, tolerance: float = VERIFY) -> Front:
+        """The same points, simulated by an independent integrator, and marked by whether they are as they say.
+
+        Every solver and gradient tool does so at its end. A point is `verified` if nothing differs by more than the tolerance: its states,
+        in spans of their bounds; its bounds, final values, paths and constraints, controls between nodes included, in their scales (the
+        scale of an equality or a limit on one side is at least its size); and its objectives, in ranges of the front.
+
+        Parameters
+        ----------
+        tolerance : float
+
+        Returns
+        -------
+        Front
+            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and `note`s on what is missed.
+
+        Raises
+        ------
+        ValueError
+            For a tolerance that is not positive, and a problem that cannot be found.
+        """
+        return verified(self, tolerance)
+
     def simulate(
         self,
         problem: Problem | CompiledProblem | None = None,
@@ -163,17 +187,15 @@ class Front(Points):
         """
         return Front.of(simulated(self, problem, tolerance, rtol, atol, method))
 
-    def table(self, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
-        """The front as plain text: a headline, a row for each point, and warnings.
+    def table(self, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+        """The front as plain text: a headline, a row for each point, those that are not verified apart, and warnings.
 
         Parameters
         ----------
-        defects : n floats, optional
-            Largest defect of each simulated point, shown as a column.
         columns : mapping, optional
             Further columns: header -> n values.
         """
-        return front_table(self, defects, columns)
+        return front_table(self, columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates."""

@@ -12,6 +12,7 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.text import counted
+from .columns import by_first, column, frozen, number, shared
 from .decision_table import Decisions
 from .provenance import STATS, Source, versions
 
@@ -41,6 +42,9 @@ class Points:
         Scaled residual of the conditions of Pareto optimality.
     notes : n str, optional
         Remarks, for example why a mesh could not be refined enough.
+    defect, simulated_violation, simulated_F, verified : (n,), (n,), (n, m), (n,), optional
+        By a simulation: largest difference of a state from the transcription, in spans of its bounds; largest scaled residual of any
+        constraint; objectives, all minimised; whether these agree with the point within `stats["verify"]`. NaN and False without it.
     transcriptions : dict, or n of them, optional
         `{"method": ..., "settings": {...}}`: the transcription of all points, or one for each; None for black boxes.
     problem : CompiledProblem or Source, optional
@@ -58,7 +62,7 @@ class Points:
 
     Attributes
     ----------
-    F, violation, status : read-only arrays
+    F, violation, status, defect, simulated_violation, simulated_F, verified : read-only arrays
     violations, trajectories, excursions, optimality, notes, transcriptions : tuples of n
         As above. Points on one mesh share one dict of `transcriptions`.
     goals, solver, stats, message, source
@@ -69,7 +73,10 @@ class Points:
         A column for each of `variables`; NaN if the point, on a mesh of its own, does not have the variable. `Point.decision` has no NaN.
     """
 
-    ROWS = ("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions")
+    ROWS = (
+        *("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions"),
+        *("defect", "simulated_violation", "simulated_F", "verified"),
+    )
     """Columns with one entry for each point, besides the decision vectors."""
 
     def __init__(
@@ -87,6 +94,10 @@ class Points:
         optimality: Sequence[float | None] | None = None,
         notes: Sequence[str | None] | None = None,
         transcriptions: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
+        defect: Any = None,
+        simulated_violation: Any = None,
+        simulated_F: Any = None,
+        verified: Any = None,
         problem: CompiledProblem | Source | None = None,
         solver: Mapping[str, Any] | None = None,
         stats: Mapping[str, Any] | None = None,
@@ -105,14 +116,17 @@ class Points:
 
         rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
         n = len(rows)
-        order = by_first(rows * self._signs) if sort else np.arange(n)
+        order = by_first(rows * self.signs) if sort else np.arange(n)
 
         def ordered(values: Any, name: str) -> list[Any]:
             entries = column(values, n, name)
             return [entries[i] for i in order]
 
+        def numbers(values: Any, name: str) -> np.ndarray:
+            return frozen(np.asarray(ordered(np.full(n, np.nan) if values is None else values, name), dtype=float))
+
         self.F = frozen(rows[order])
-        self.violation = frozen(np.asarray(ordered(violation, "violation"), dtype=float))
+        self.violation = numbers(violation, "violation")
         self.status = frozen(np.asarray(ordered(status, "status"), dtype=str))
         common = not len(variables) or isinstance(variables[0], Variable)
         self._decisions = Decisions.of(ordered(decision, "decision"), variables if common else ordered(variables, "variables"))
@@ -123,9 +137,14 @@ class Points:
         self.excursions: tuple[Mapping[str, float] | None, ...] = tuple(ordered(excursions, "excursions"))
         self.optimality = tuple(number(value) for value in ordered(optimality, "optimality"))
         self.notes = tuple(note or "" for note in ordered(notes, "notes"))
+        self.defect = numbers(defect, "defect")
+        self.simulated_violation = numbers(simulated_violation, "simulated_violation")
+        self.simulated_F = numbers(np.full(rows.shape, np.nan) if simulated_F is None else simulated_F, "simulated_F").reshape(rows.shape)
+        self.verified = frozen(np.asarray(ordered(np.zeros(n) if verified is None else verified, "verified"), dtype=bool))
 
     @property
-    def _signs(self) -> np.ndarray:
+    def signs(self) -> np.ndarray:
+        """+1 for a minimised, -1 for a maximised objective, (m,)."""
         return np.array([goal.sign for goal in self.goals])
 
     @property
@@ -146,7 +165,12 @@ class Points:
     @property
     def objectives(self) -> np.ndarray:
         """Objectives (n, m) in the user's units and senses."""
-        return self.F * self._signs
+        return self.F * self.signs
+
+    @property
+    def was_simulated(self) -> np.ndarray:
+        """Mask (n,) of the points that were simulated."""
+        return ~np.isnan(self.defect)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -318,6 +342,29 @@ class Point:
         return str(self._points.status[self.index])
 
     @property
+    def verified(self) -> bool | None:
+        """Whether a simulation agrees with this point within the front's `stats["verify"]`; None if it was not simulated."""
+        return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
+
+    @property
+    def defect(self) -> float | None:
+        """Largest difference between simulated states and those of the transcription, in spans of their bounds; None: not simulated."""
+        return number(self._points.defect[self.index])
+
+    @property
+    def simulated(self) -> dict[str, float] | None:
+        """Objectives by name as simulated, in the user's units and senses; None: not simulated."""
+        if not self._points.was_simulated[self.index]:
+            return None
+        values = self._points.simulated_F[self.index] * self._points.signs
+        return dict(zip(self._points.names, values.tolist(), strict=True))
+
+    @property
+    def simulated_violation(self) -> float | None:
+        """Largest scaled residual of any constraint of the simulated trajectory; None: not simulated."""
+        return number(self._points.simulated_violation[self.index])
+
+    @property
     def decision(self) -> np.ndarray:
         """Decision vector, in the user's units; `variables` are its entries."""
         return self._points._decisions.row(self.index)
@@ -406,42 +453,3 @@ class Point:
 
     def __repr__(self) -> str:
         return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"
-
-
-def frozen(array: Any) -> np.ndarray:
-    """A read-only copy."""
-    copy = np.array(array)
-    copy.setflags(write=False)
-    return copy
-
-
-def by_first(objectives: np.ndarray) -> np.ndarray:
-    """Rows sorted by the first objective, ties by the next ones; NaN last."""
-    return np.lexsort(objectives.T[::-1])
-
-
-def number(value: Any) -> float | None:
-    """The value as a float; None for None and for NaN."""
-    return None if value is None or np.isnan(value) else float(value)
-
-
-def column(values: Any, n: int, name: str) -> Any:
-    """The `values`, which must be n; n times None for None."""
-    if values is None:
-        return [None] * n
-    if len(values) != n:
-        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
-    return values
-
-
-def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """The dicts, with equal ones as one object."""
-    distinct: list[dict[str, Any]] = []
-    found: list[dict[str, Any] | None] = []
-    for given in dicts:
-        known = next((one for one in distinct if one == given), None)
-        if known is None and given is not None:
-            known = dict(given)
-            distinct.append(known)
-        found.append(known)
-    return tuple(found)

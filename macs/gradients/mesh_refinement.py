@@ -22,7 +22,7 @@ from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import vectors_points
 from ..fronts.points import Point, Points
 from ..fronts.provenance import more_costs
-from ..fronts.verification import missed, objective_scales
+from ..fronts.verified import missed, objective_scales
 from ..io.console import working
 from ..pareto.dominance import extremes
 from .multistart import GradientSolves
