@@ -17,6 +17,7 @@ from .fronts.simulated import simulated
 from .fronts.tables import front_table, headline
 from .fronts.verified import VERIFY, verified
 from .gradients.front_polish import polished
+from .gradients.mending import mended
 from .gradients.mesh_refinement import refine_mesh
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Front(Points):
 
     - See: `table()`, `plot()`, `front[i].plot()`
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
-    - Improve: `polished()`, `refine_mesh()`
+    - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
     """
 
@@ -129,7 +130,7 @@ class Front(Points):
         """
         return Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
 
-    def verify(self, tolerance: float = VERIFY) -> Front:
+    def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
 
         Every solver and gradient tool does so at its end. A point is `verified` if nothing differs by more than the tolerance: its states,
@@ -138,7 +139,8 @@ class Front(Points):
 
         Parameters
         ----------
-        tolerance : float
+        tolerance : float or None
+            None: the points are not simulated.
 
         Returns
         -------
@@ -151,6 +153,31 @@ class Front(Points):
             For a tolerance that is not positive, and a problem that cannot be found.
         """
         return verified(self, tolerance)
+
+    def mended(self, *, time_limit: float | None = None, progress: bool = False) -> Front:
+        """The front with those points solved again that a simulation did not confirm.
+
+        Each is solved where it misses: on finer meshes of its own. The others stay as they are. Points that are verified are compared by
+        their simulated objectives; what is still not verified stays only if no verified point is as good.
+
+        Parameters
+        ----------
+        time_limit : float, optional
+            Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
+        progress : bool
+            Show the progress on the terminal.
+
+        Returns
+        -------
+        Front
+            Costs are added to those of the front.
+
+        Raises
+        ------
+        ValueError
+            For a black box, and a problem that cannot be found.
+        """
+        return Front.of(mended(self, time_limit, progress))
 
     def simulate(
         self,

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -27,7 +29,11 @@ from .front import Front
 from .fronts.builders import nearest_violation, vectors_points
 from .fronts.points import Point
 from .fronts.provenance import costs
-from .gradients.multistart import MultistartSolver
+from .fronts.verified import VERIFY, check_verify
+from .gradients.first_mesh import default_transcription
+from .gradients.multistart import MOST_ITERATIONS, MultistartSolver
+from .io.console import working
+from .io.interrupts import NO_TIME, Interrupts
 from .pareto.directions import divisions_below, simplex_lattice
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
@@ -42,20 +48,26 @@ NO_RANGE, NOTHING = 1e-8, 1e-10
 
 def optimize(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     objective: str | None = None,
     start: Any = None,
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool = False,
 ) -> Point:
     """The local optimum of one objective; the others are ignored.
 
     Parameters
     ----------
     problem : Problem
-    transcription : Transcription
+    transcription : Transcription, optional
+        Default: the problem's own, or DFET on a coarse mesh; points that are not verified there are then solved again on meshes of their
+        own. On a transcription that is given, points are only marked.
     objective : str, optional
         Name of the objective. Default: the first one.
     start : Front, Points or array (k, n), optional
@@ -66,40 +78,55 @@ def optimize(
         Seed of the random starts. None draws one, which is recorded in `stats`.
     tolerance : float
         Largest scaled residual of a feasible point.
+    verify : float, optional
+        How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: it is not simulated.
+    max_iterations : int
+        Most iterations of IPOPT in one strategy of a solve.
+    time_limit : float, optional
+        Seconds after which the work ends with its results so far.
+    progress : bool
+        Show the progress on the terminal.
 
     Returns
     -------
     Point
-        With its `optimality`. If no solve converged, the least infeasible point, with its status.
+        With its `optimality`, simulated. If no solve converged, the least infeasible point, with its status.
 
     Raises
     ------
     ValueError
         If the problem is not stated correctly, an argument is not valid, or a peak is neither minimised nor bounded above; before any work.
     """
-    job = _Job("optimize", problem, transcription, start, starts, seed, tolerance, objective=objective)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("optimize", problem, transcription, terms, objective=objective)
     names = [goal.name for goal in job.nlp.problem.goals]
     if objective is not None and objective not in names:
         raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
     i = 0 if objective is None else names.index(objective)
     reference = np.where(np.arange(len(names)) == i, 0.0, np.inf)
-    return job.front([job.solver.solve(reference, np.eye(len(names))[i])], None)[0]
+    with job.working():
+        found = job.front([job.solver.solve(reference, np.eye(len(names))[i])], None)
+    return job.settled(found)[0]
 
 
 def payoff(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     start: Any = None,
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool = False,
 ) -> Front:
     """The ends of the front: for each objective its best value, and for that the best values of the others, in their order.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
         As for `optimize`.
 
     Returns
@@ -112,14 +139,17 @@ def payoff(
     ValueError
         As for `optimize`.
     """
-    job = _Job("payoff", problem, transcription, start, starts, seed, tolerance)
-    ends = job.ends()
-    return job.front(ends, job.ranges(ends), sort=False)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("payoff", problem, transcription, terms)
+    with job.working():
+        ends = job.ends()
+        found = job.front(ends, job.ranges(ends), sort=False)
+    return job.settled(found)
 
 
 def sweep(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     points: int,
     method: str = "pascoletti-serafini",
@@ -127,12 +157,16 @@ def sweep(
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool = False,
 ) -> Front:
     """A front by gradient solves along it, each from the best point found before.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
         As for `optimize`; each point is solved from so many `starts`.
     points : int
         Number of points, the ends included; with three or more objectives, the largest number.
@@ -154,44 +188,86 @@ def sweep(
     check_count("points", points, 2)
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; there are {', '.join(METHODS)}")
-    job = _Job("sweep", problem, transcription, start, starts, seed, tolerance, points=int(points), method=method)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.nlp.problem.goals))
-    for _ in range(ROUNDS):
-        ends = job.ends()
-        if any(end.status != CONVERGED for end in ends):
-            return job.sifted(ends)
-        found = job.along(targets(np.array([end.F for end in ends]), job.ranges(ends), points, method))
-        if not job.surpassed(ends, found):
-            break
-    return job.sifted([*ends, *found], job.ranges(ends))
+    with job.working():
+        front = job.swept(points, method)
+    return job.settled(front)
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The arguments that all gradient tools have; see `optimize`."""
+
+    start: Any
+    starts: int
+    seed: int | None
+    tolerance: float
+    verify: float | None
+    max_iterations: int
+    time_limit: float | None
+    progress: bool
+
+    def __post_init__(self) -> None:
+        check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
+        check_count("starts", self.starts, 1)
+        check_count("max_iterations", self.max_iterations, 1)
+        check_verify(self.verify)
 
 
 class _Job:
     """One call of a gradient tool: its NLP, its solver, and the front made of its results."""
 
     def __init__(
-        self,
-        name: str,
-        problem: Problem | CompiledProblem,
-        transcription: Transcription,
-        start: Any,
-        starts: int,
-        seed: int | None,
-        tolerance: float,
-        **settings: Any,
+        self, name: str, problem: Problem | CompiledProblem, transcription: Transcription | None, terms: Terms, **settings: Any
     ) -> None:
-        check_run(1, seed, tolerance, None, None, None)
-        check_count("starts", starts, 1)
         check_problem(problem, transcription)
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        compiled = problem.compile()
         refuse_peaks(compiled)
-        self.nlp = transcription.transcribe(compiled)
+        self.nlp = (transcription or default_transcription(problem)).transcribe(compiled)
         check_freedom(self.nlp)
-        self._seed = secrets.randbits(63) if seed is None else int(seed)
-        given = beginning(start, self.nlp)
+        self._terms, self._fixed = terms, transcription is not None
+        self._seed = secrets.randbits(63) if terms.seed is None else int(terms.seed)
+        given = beginning(terms.start, self.nlp)
         self._began = time.perf_counter()
-        self.solver = MultistartSolver(self.nlp, given, int(starts), np.random.default_rng(self._seed), float(tolerance))
-        self._about = {"name": name, "settings": {**settings, "starts": int(starts)}}
+        self._interrupts: Interrupts | None = None
+        rng = np.random.default_rng(self._seed)
+        self.solver = MultistartSolver(self.nlp, given, int(terms.starts), rng, float(terms.tolerance), int(terms.max_iterations))
+        self._about = {"name": name, "settings": {**settings, "starts": int(terms.starts)}}
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        """Within, the time limit and Ctrl-C ask the work to end, and its progress is shown."""
+        with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
+            self._interrupts = interrupts
+            self.solver.tell(lambda: show(f"{self._about['name']}: {self.solver.counts.gradient_solves} gradient solves done"))
+            yield
+
+    @property
+    def _stopped(self) -> str:
+        """The reason why the work was ended early; empty if it was not."""
+        return "" if self._interrupts is None else self._interrupts.reason
+
+    def settled(self, front: Front) -> Front:
+        """The front, simulated; unless its transcription was given, with points that are not verified solved again."""
+        marked = front.verify(self._terms.verify)
+        if self._fixed or self._stopped or self._terms.verify is None:
+            return marked
+        limit = self._terms.time_limit
+        left = None if limit is None else max(limit - (time.perf_counter() - self._began), NO_TIME)
+        return marked.mended(time_limit=left, progress=self._terms.progress)
+
+    def swept(self, points: int, method: str) -> Front:
+        """The front of a sweep; its ends alone if one of them was not found."""
+        for _ in range(ROUNDS):
+            ends = self.ends()
+            if any(end.status != CONVERGED for end in ends):
+                return self.sifted(ends)
+            found = self.along(targets(np.array([end.F for end in ends]), self.ranges(ends), points, method))
+            if not self.surpassed(ends, found):
+                break
+        return self.sifted([*ends, *found], self.ranges(ends))
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
@@ -260,7 +336,8 @@ class _Job:
             wall_time=time.perf_counter() - self._began,
             seed=self._seed,
             tolerance=self.solver.tolerance,
-            reproducible=not self.solver.counts.clocked,
+            reproducible=not (self.solver.counts.clocked or self._stopped),
+            **({"stopped": self._stopped} if self._stopped else {}),
         )
         status = [solved.status for solved in found]
         return Front.of(vectors_points(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more))

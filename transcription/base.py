@@ -352,11 +352,11 @@ def largest(residuals: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(violation), violation, np.inf)
 
 
-def check_problem(problem: Any, transcription: Any) -> None:
-    """Raise ValueError if these are no problem and no transcription."""
+def check_problem(problem: Any, transcription: Any = None) -> None:
+    """Raise ValueError if these are no problem and, unless it is None, no transcription."""
     if not isinstance(problem, Problem | CompiledProblem):
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
-    if not isinstance(transcription, Transcription):
+    if transcription is not None and not isinstance(transcription, Transcription):
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
 
 

@@ -62,7 +62,9 @@ ROOT: dict[str, Column] = {
     "status": Column(("point",), TEXT, "converged, infeasible, failed or timeout", rows="status"),
     "optimality": Column(("point",), NUMBER, "scaled residual of Pareto optimality, NaN if not computed", rows="optimality"),
     "note": Column(("point",), TEXT, "remark on the point", rows="notes"),
-    "defect": Column(("point",), NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", rows="defect", optional=True),
+    "defect": Column(
+        ("point",), NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", rows="defect", optional=True
+    ),
     "simulated_violation": Column(
         ("point",), NUMBER, "largest scaled residual of any constraint as simulated", rows="simulated_violation", optional=True
     ),

@@ -56,7 +56,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
     rows = list(zip(*cells, strict=True))
     lines = text_table([titles, units], [rows[i] for i in order], left).split("\n")
-    if 0 < len(apart):
+    if len(apart) > 0:
         lines.insert(len(lines) - len(apart), f"\nNot verified: simulated, these differ by more than {front.stats['verify']:g}.")
     return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
 

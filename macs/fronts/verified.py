@@ -51,9 +51,9 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
     ValueError
         If the tolerance is not positive, or the problem of the points cannot be found.
     """
+    check_verify(tolerance)
     if tolerance is None or points.source is None:
         return points
-    check_positive("verify", tolerance)
     rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
     problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
     rtol, atol = accuracy(tolerance)
@@ -78,6 +78,12 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
         notes=notes,
         stats={**points.stats, "verify": float(tolerance)},
     )
+
+
+def check_verify(tolerance: float | None) -> None:
+    """Raise ValueError if what points may miss is neither None nor positive."""
+    if tolerance is not None:
+        check_positive("verify", tolerance)
 
 
 def accuracy(tolerance: float) -> tuple[float, float]:

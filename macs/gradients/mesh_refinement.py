@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,16 +103,18 @@ class MeshRefinement:
         of the front.
     rounds : int
         Largest number of meshes for each point.
+    rows : sequence of int, optional
+        Points that are refined. Default: all that converged.
     """
 
-    def __init__(self, front: Points, tolerance: float, rounds: int) -> None:
+    def __init__(self, front: Points, tolerance: float, rounds: int, rows: Sequence[int] | None = None) -> None:
         self.front, self.tolerance, self.rounds = front, tolerance, rounds
         self.problem = front.compiled()
         self.good = np.flatnonzero(front.status == CONVERGED)
         ranges = np.ptp(front.F[self.good], axis=0) if len(self.good) else np.zeros(len(front.goals))
         self.ranges = np.where(ranges > 0, ranges, objective_scales(front))
         self.solver = PointSolver(self.ranges, front.F[self.good], 0.1 * tolerance)
-        self.points = {i: self._begin(i) for i in self.good.tolist()}
+        self.points = {i: self._begin(i) for i in (self.good.tolist() if rows is None else rows)}
 
     def go(self, time_limit: float | None, progress: bool) -> Points:
         """The refined points; after Ctrl-C or the time limit, on the meshes reached by then."""

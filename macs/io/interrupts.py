@@ -9,6 +9,9 @@ from contextlib import AbstractContextManager
 from types import FrameType, TracebackType
 from typing import Any
 
+NO_TIME = 1e-6
+"""Time limit, in seconds, of further work after work that used up its own: this then ends before its first step."""
+
 
 class Stopped(Exception):  # noqa: N818 - an end, not an error
     """Raised to end the work with its results so far. The text is the reason."""

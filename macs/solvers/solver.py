@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
-from problems.problem import Problem
+from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
@@ -20,14 +20,15 @@ from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
 from ..front import Front
 from ..fronts.builders import black_box_points, trajectory_points
+from ..fronts.verified import VERIFY, check_verify
+from ..gradients.first_mesh import default_transcription
+from ..io.interrupts import NO_TIME
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
 from .start import beginning, check_run, decisions, drawing
 
 Callback = Callable[[Progress], Any]
-NO_TIME = 1e-6
-"""Time limit, in seconds, of the work after a search that used up its own: this work then ends before its first solve."""
 
 
 class Solver(SearchMethod):
@@ -36,13 +37,14 @@ class Solver(SearchMethod):
     def solve(
         self,
         problem: Problem | CompiledProblem,
-        transcription: Transcription,
+        transcription: Transcription | None = None,
         *,
-        evaluations: int,
+        evaluations: int | None = None,
         seed: int | None = None,
         inner: str | InnerSolver = "auto",
         tolerance: float = 1e-6,
         start: Any = None,
+        verify: float | None = VERIFY,
         time_limit: float | None = None,
         progress: bool = False,
         callback: Callback | None = None,
@@ -53,9 +55,10 @@ class Solver(SearchMethod):
         Parameters
         ----------
         problem : Problem
-        transcription : Transcription
-        evaluations : int
-            Largest number of candidates that are sent to the inner level.
+        transcription : Transcription, optional
+            Default: the problem's own; if it has none, DFET on a mesh that is found, see `gradients.found_mesh`.
+        evaluations : int, optional
+            Largest number of candidates that are sent to the inner level. Default: the problem's own number.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver
@@ -67,6 +70,9 @@ class Solver(SearchMethod):
             First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
             guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
+        verify : float, optional
+            How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
+            simulated.
         time_limit : float, optional
             Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
             batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
@@ -81,8 +87,8 @@ class Solver(SearchMethod):
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points. If none was found it is empty: `message` says why, and `closest` is the least
-            infeasible point.
+            Feasible, mutually non-dominated points, simulated. If none was found it is empty: `message` says why, and `closest` is the
+            least infeasible point.
 
         Raises
         ------
@@ -102,9 +108,13 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
+        check_problem(problem)
+        if evaluations is None:
+            evaluations = problem.default_evaluations if isinstance(problem, Problem) else DEFAULT_EVALUATIONS
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
-        check_problem(problem, transcription)
+        check_verify(verify)
         solver = inner_solver(inner)
+        transcription = transcription or default_transcription(problem)
         nlp = transcription.nlp(problem)
         self.check_transcription(transcription, nlp.problem)
         check_freedom(nlp)
@@ -135,9 +145,9 @@ class Solver(SearchMethod):
         began = time.perf_counter()
         front = run.go(time_limit, progress, callback, checkpoint)
         if front.stats["stopped"] not in ENDED:
-            return front
+            return front.verify(verify)
         left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
-        return self.finish(front, left, progress)
+        return self.finish(front, verify, left, progress)
 
     def minimize(
         self,

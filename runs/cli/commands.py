@@ -14,8 +14,8 @@ import problems
 import transcription
 from macs.front import Front
 from macs.fronts.pictures.front_plot import save_picture
-from macs.fronts.points import Point
 from macs.fronts.pictures.style import label
+from macs.fronts.points import Point
 from macs.fronts.verification import Check, missed, objective_scales
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target

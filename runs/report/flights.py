@@ -12,8 +12,8 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along
-from macs.fronts.points import Point
 from macs.fronts.pictures.style import label
+from macs.fronts.points import Point
 from macs.gradient_tools import payoff
 from problems import load
 from transcription import SingleShooting, from_dict, parse, word
