@@ -12,7 +12,7 @@ that do not have it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -229,7 +229,7 @@ def _whole(values: np.ndarray) -> np.ndarray:
     return np.asarray(values, dtype=np.int32)
 
 
-CONVERSIONS = {TEXT: words, NUMBER: _numbers, COUNT: _whole}
+CONVERSIONS: dict[str, Callable[[Any], np.ndarray]] = {TEXT: words, NUMBER: _numbers, COUNT: _whole}
 """From columns of `Points` to arrays of a file, by their kind."""
 
 

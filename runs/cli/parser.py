@@ -163,12 +163,17 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(
-        "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"
+        "--mesh",
+        metavar="KIND",
+        help="mended: solve points that a simulation does not confirm again, on finer meshes (default); adaptive: all; fixed: none",
     )
     solve.add_argument(
         "--polish-on",
         metavar="T",
         help="polish the front on this transcription by gradients in the end, so that its points are feasible when simulated",
+    )
+    solve.add_argument(
+        "--verify", metavar="T", type=_verify, help="what simulated points may miss, in scales, or none: no simulation (default: 0.001)"
     )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
@@ -189,7 +194,7 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
-    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="what simulated points may miss (default: 0.001)")
 
 
 def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -249,3 +254,7 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
 _natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
 _tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))
+
+
+def _verify(text: str) -> float | str:
+    return text if text == "none" else float(_tolerance(text))
