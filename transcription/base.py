@@ -159,6 +159,10 @@ class Meshed(Transcription):
         meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
         return self.remeshed(meshes) if meshes else self
 
+    def alternatives(self) -> tuple[Self, ...]:
+        """Other methods on much the same meshes, to be tried where solves with this one fail."""
+        return ()
+
     def check_phases(self, problem: CompiledProblem) -> None:
         """Raise ValueError if a mesh is given for a phase that the problem does not have."""
         names = [phase.name for phase in problem.phases]
