@@ -31,6 +31,8 @@ PROGRESS = 0.5
 """The error falls at least to this fraction where there is progress."""
 DETOURS = 4
 """Number of other meshes that are tried for a point where solves fail."""
+BLUNT = 1e-4
+"""Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
 DRIFT = 1e-2
 """If a point gets worse by more than this, in units, other starts are tried too."""
 
@@ -243,7 +245,7 @@ class MeshLoop:
         if status != CONVERGED:
             return None, status
         reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
-        return replace(reached, change=_change(present, F, task)), status
+        return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
 
     def _from_starts(
         self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
@@ -285,8 +287,10 @@ def _achieved(point: OnMesh, task: Task) -> float:
     return np.inf if point.achieved is None else task.loss(point.achieved) + point.verdict.doubt
 
 
-def _change(before: OnMesh, F: np.ndarray, task: Task) -> float:
-    """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation achieved,
-    whichever is less: what a coarse mesh has wrong is no change of the point."""
+def _change(before: OnMesh, F: np.ndarray, task: Task, settled: float) -> float:
+    """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation
+    achieved, whichever is less: what a coarse mesh has wrong is no change of the point. Of objectives that are not `sharp`, a change of
+    `BLUNT` counts as one of `settled`."""
     known = [before.F] if before.achieved is None else [before.F, before.achieved]
-    return min(float((np.abs(F - one) / task.units)[task.used].max()) for one in known)
+    weights = np.where(task.sharp, 1.0, min(1.0, settled / BLUNT)) / task.units
+    return min(float((np.abs(F - one) * weights)[task.used].max()) for one in known)

@@ -33,6 +33,8 @@ SAME_END = 1e-6
 """A point is an end of the whole front if on its own mesh its best objective cannot get better by more than this, in units."""
 MOVED = 0.05
 """Where the ends of a front move by more than this part of its range on finer meshes, the points between them move along."""
+NOT_BEGUN = "it was not solved on a finer mesh"
+"""Note of a point that was still to be refined when the work was to end."""
 NEIGHBOURS = 2
 """Number of neighbours whose trajectories are further starts of a point."""
 
@@ -95,11 +97,13 @@ class FrontRefinement:
         self.units = self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
         ends = self._ends()
         for k, (i, task) in enumerate(ends.items()):
+            if self.loop.ended:
+                return
             show(f"meshes of the front: end {k + 1} of {len(ends)}")
             self._refine(i, task)
         between = [i for i in self.chosen if i not in self.found]
         references, weights = self._places(between, {end.objective: i for i, end in ends.items()})
-        while between:
+        while between and not self.loop.ended:
             i = min(between, key=lambda j: min((self._distance(j, k) for k in self.found), default=0.0))
             between.remove(i)
             show(f"meshes of the front: point {len(self.found) + 1} of {len(self.chosen)}")
@@ -109,6 +113,8 @@ class FrontRefinement:
         """The front with the refined points, and what they cost."""
         front = self.front
         rows = [self._rows.get(i, front[[i]]) for i in range(len(front))]
+        for i in set(self.chosen) - set(self.found):
+            rows[i] = rows[i].replace(notes=[NOT_BEGUN])
         reached = sum(not found.complaints() for found in self.found.values())
         return (
             Points.concatenate(rows)

@@ -13,9 +13,6 @@ from transcription.nlp.scalarized import Solved
 from ..evaluation.evaluator import CONVERGED
 from .multistart import GradientSolves
 
-CAP = 1e-9
-"""Fraction of its unit that the best objective of an end may lose while the others are improved."""
-
 
 class Task(ABC):
     """A scalarised problem that can be solved on any mesh.
@@ -40,6 +37,11 @@ class Task(ABC):
     @abstractmethod
     def used(self) -> np.ndarray:
         """Mask (m,) of the objectives that matter."""
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """Mask (m,) of those that a solve determines as exactly as its tolerance. By default all that matter."""
+        return self.used
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,8 @@ class End(Task):
         first = solves(nlp, start, np.where(mine, 0.0, np.inf), self.units)
         if first.status != CONVERGED or len(self.units) == 1:
             return first
-        ceiling = np.where(mine, first.F + CAP * self.units, np.inf)
+        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+        ceiling = np.where(mine, first.F, np.inf)
         second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
         return second if second.status == CONVERGED else first
 
@@ -92,3 +95,8 @@ class End(Task):
     def used(self) -> np.ndarray:
         """See `Task.used`."""
         return np.ones(len(self.units), dtype=bool)
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """See `Task.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
+        return np.arange(len(self.units)) == self.objective

@@ -47,7 +47,7 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
         remain = merged(np.array(old.edges), old.order, np.maximum(scores.states, scores.controls), kept)
         before = np.array(old.edges)
         edges, order = refine(
-            before, old.order, error, rate, errors.steep, most=most + np.count_nonzero(~remain), highest=method.highest_order
+            before, old.order, error, rate, errors.steep, most=most + int(np.count_nonzero(~remain)), highest=method.highest_order
         )
         if len(edges) > len(before) or order > old.order:
             edges = edges[~np.isin(edges, before[~remain])]
