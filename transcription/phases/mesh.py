@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -129,6 +129,13 @@ class PhaseMesh:
             return self
         edges = np.array(self.edges) + self.shares @ (places - np.array(self.edges)[list(self.moving)])
         return replace(self, edges=tuple(edges.tolist()))
+
+    def with_elements(self, edges: Sequence[float], order: int, control_order: int | None) -> PhaseMesh:
+        """Other elements, and degrees on them, with the same moving edges. Raises ValueError if these are not among `edges`."""
+        j = np.searchsorted(edges, [self.edges[k] - SHORTEST for k in self.moving])
+        if any(k >= len(edges) or abs(edges[k] - self.edges[one]) > SHORTEST for k, one in zip(j, self.moving, strict=True)):
+            raise ValueError("a moving edge of a mesh has to stay one of its edges")
+        return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()))
 
     def found_in(self, edges: np.ndarray) -> PhaseMesh:
         """This mesh as it lies in a trajectory of it, from the ends (N + 1,) of the trajectory's elements, in time: with its moving edges
