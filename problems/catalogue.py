@@ -26,7 +26,7 @@ CASES: dict[str, tuple[str, str]] = {
     "reentry_case3": ("problems.cases.reentry.case3:problem", "the same around three no-fly zones"),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
-    **{STANDARD + name: case for name, case in standard.cases().items()},
+    **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},
 }
 FILE = "_problem_file_"
 """Beginning of the names of modules that are read from files."""

@@ -24,7 +24,7 @@ from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
 from macs.solvers.start import STARTS
 from problems import Problem
-from problems.catalogue import STANDARD, is_catalogued
+from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from transcription.inner import NAMED
 
@@ -40,12 +40,8 @@ def list_all(arguments: Namespace) -> int:
     """The problems and the studies there are."""
     cases = {name: problems.describe(name) for name in problems.names()}
     batches = {name: f"study: {studyfile.describe(name)}" for name in studyfile.names()}
-    known = {name: cases.pop(name) for name in tuple(cases) if name.startswith(STANDARD)}
-    width = max(map(len, (*cases, *batches, *known)))
+    width = max(map(len, (*cases, *batches)))
     for name, text in (cases | batches).items():
-        print(f"{name:{width}}  {text}")
-    print("\npublished problems of one objective, with known optima (macs bench standard):")
-    for name, text in known.items():
         print(f"{name:{width}}  {text}")
     return DONE
 
