@@ -8,6 +8,6 @@ are so wide that they do not act, except where a module says otherwise. To add a
 """
 
 from .collection import ROOMS, cases, published
-from .published import Published
+from .published import SHARE, Published
 
-__all__ = ["ROOMS", "Published", "cases", "published"]
+__all__ = ["ROOMS", "SHARE", "Published", "cases", "published"]

@@ -39,7 +39,7 @@ def cases() -> dict[str, tuple[str, str]]:
 
 
 def published(name: str) -> tuple[Published, ...]:
-    """The published optima of a problem, that for its default data first."""
+    """The published optima of a problem, that for its default data first. Raises ValueError if there is no such problem."""
     room = next((room for room, texts in ROOMS.items() if name in texts), None)
     if room is None:
         raise ValueError(f"there is no problem '{name}' in the collection; there are {', '.join(cases())}")
