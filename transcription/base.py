@@ -112,6 +112,8 @@ class Meshed(Transcription):
         Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
     highest_order, most_elements : int
         Limits of mesh refinement in each phase; of elements, there may be twice as many as it began with, if that is more.
+    orders_controls, moves_edges : bool
+        Whether the method uses the `control_order` of a mesh, and its `moving` edges; what it does not use is refused.
     """
 
     elements: int
@@ -119,6 +121,8 @@ class Meshed(Transcription):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None
     highest_order: ClassVar[int] = 10
     most_elements: ClassVar[int] = 40
+    orders_controls: ClassVar[bool] = False
+    moves_edges: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -129,6 +133,11 @@ class Meshed(Transcription):
                 object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
             except ValueError as error:
                 raise ValueError(f"{name}: {error}") from None
+        for phase, mesh in self.meshes.items():
+            if mesh.control_order is not None and not self.orders_controls:
+                raise ValueError(f"{name}: phase '{phase}': the order of its controls cannot be chosen")
+            if mesh.moving and not self.moves_edges:
+                raise ValueError(f"{name}: phase '{phase}': the edges of its elements cannot move")
 
     @property
     def meshes(self) -> dict[str, PhaseMesh]:
@@ -143,6 +152,16 @@ class Meshed(Transcription):
         """The same method on other meshes of some phases; `bounded`: with controls that stay within their bounds between nodes, too, where
         the method has such."""
         return replace(self, mesh={**self.meshes, **meshes})  # type: ignore[type-var]
+
+    def settled(self, trajectory: Trajectory) -> Self:
+        """The same method on the meshes of a trajectory that it made: moving edges begin where they are there, and can move as far
+        again. To hold them there, see `PhaseMesh.moving`."""
+        meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
+        return self.remeshed(meshes) if meshes else self
+
+    def alternatives(self) -> tuple[Self, ...]:
+        """Other methods on much the same meshes, to be tried where solves with this one fail."""
+        return ()
 
     def check_phases(self, problem: CompiledProblem) -> None:
         """Raise ValueError if a mesh is given for a phase that the problem does not have."""

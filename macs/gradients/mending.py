@@ -1,4 +1,4 @@
-"""Points that a simulation does not confirm, solved again: on finer meshes, or inside of the limits that they exceed."""
+"""Points that a simulation does not confirm, solved again on finer meshes."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import numpy as np
 
 from transcription import from_dict
 from transcription.base import Meshed
+from transcription.meshes.verdict import Wanted
 
 from ..evaluation.evaluator import CONVERGED
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.verified import verified
-from .mesh_refinement import LEAST_TOLERANCE, MeshRefinement
+from ..io.console import working
+from .mesh_refinement import FrontRefinement
 
-FINER = 1e-3
-"""Tolerance of the meshes, as a fraction of what a point may miss."""
+PART = 0.1
+"""What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
 
@@ -26,8 +28,10 @@ def mended(points: Points, time_limit: float | None, progress: bool) -> Points:
     rows = [i for i in np.flatnonzero(missing).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
     if rows:
         verify = points.stats["verify"]
-        tolerance = max(FINER * verify, LEAST_TOLERANCE)
-        refined = MeshRefinement(points, tolerance, MESHES, rows).go(time_limit, progress)
-        again = verified(refined, verify)
-        points = again.replace(message=points.message)
+        wanted = Wanted(PART * verify, feasible=PART * verify, leaving=PART * verify, objectives=PART * verify)
+        with working(time_limit, progress) as (show, interrupts):
+            job = FrontRefinement(points, wanted, MESHES, rows)
+            job.go(show)
+            elapsed, stopped = interrupts.elapsed, interrupts.reason
+        points = verified(job.points(elapsed, stopped), verify).replace(message=points.message)
     return points[best_rows(points)]

@@ -38,6 +38,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
@@ -226,7 +227,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|population|search|study", nargs="?", help="which one (default: all)")
+    bench.add_argument("what", metavar="inner|population|search|standard|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
