@@ -193,3 +193,11 @@ class MultistartSolver:
             if found[-1].status == CONVERGED:
                 break
         return self.better(found, reference, weights)
+
+
+def guessed_start(nlp: NLP) -> np.ndarray | None:
+    """The problem's guess as a full vector (1, n), in the middle of the bounds where there is none; None without any guess."""
+    if not np.isfinite(nlp.guess).any():
+        return None
+    middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
+    return nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None])
