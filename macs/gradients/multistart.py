@@ -58,6 +58,8 @@ class MultistartSolver:
         Generator of the random candidates.
     tolerance : float
         Largest scaled residual of a feasible point.
+    solves : GradientSolves, optional
+        Makes and counts the solves; by default its own, with this tolerance.
 
     Attributes
     ----------
@@ -65,9 +67,17 @@ class MultistartSolver:
         Gradient solves, iterations, failures by status.
     """
 
-    def __init__(self, nlp: NLP, given: np.ndarray | None, starts: int, rng: np.random.Generator, tolerance: float) -> None:
+    def __init__(
+        self,
+        nlp: NLP,
+        given: np.ndarray | None,
+        starts: int,
+        rng: np.random.Generator,
+        tolerance: float,
+        solves: GradientSolves | None = None,
+    ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, tolerance
-        self._solves = GradientSolves(tolerance)
+        self._solves = solves or GradientSolves(tolerance)
         self._rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
