@@ -31,7 +31,7 @@ from .fronts.points import Point
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.first_mesh import default_transcription
-from .gradients.multistart import MOST_ITERATIONS, MultistartSolver
+from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
 from .io.console import working
 from .io.interrupts import NO_TIME, Interrupts
 from .pareto.directions import divisions_below, simplex_lattice
@@ -233,7 +233,8 @@ class _Job:
         self._began = time.perf_counter()
         self._interrupts: Interrupts | None = None
         rng = np.random.default_rng(self._seed)
-        self.solver = MultistartSolver(self.nlp, given, int(terms.starts), rng, float(terms.tolerance), int(terms.max_iterations))
+        self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
+        self.solver = MultistartSolver(self.nlp, given, int(terms.starts), rng, self.solves)
         self._about = {"name": name, "settings": {**settings, "starts": int(terms.starts)}}
 
     @contextmanager
@@ -241,7 +242,7 @@ class _Job:
         """Within, the time limit and Ctrl-C ask the work to end, and its progress is shown."""
         with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
             self._interrupts = interrupts
-            self.solver.tell(lambda: show(f"{self._about['name']}: {self.solver.counts.gradient_solves} gradient solves done"))
+            self.solves.before = lambda: show(f"{self._about['name']}: {self.solver.counts.gradient_solves} gradient solves done")
             yield
 
     @property

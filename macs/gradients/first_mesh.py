@@ -20,7 +20,7 @@ from ..fronts.points import Points
 from ..fronts.verified import verified
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
-from .multistart import MultistartSolver, guessed_start
+from .multistart import GradientSolves, MultistartSolver, guessed_start
 
 COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
@@ -57,7 +57,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
     if not differentiable(problem):
         return COARSE, Counts()
     nlp, m = COARSE.nlp(problem), len(problem.goals)
-    solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), tolerance)
+    solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
     Z = np.array([one.z for one in solved if one.status == CONVERGED]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)

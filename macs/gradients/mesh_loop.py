@@ -12,6 +12,7 @@ from problems.peaks import refuse_peaks
 from transcription.base import NLP, Meshed
 from transcription.inner import Ipopt
 from transcription.meshes.adaptation import next_method
+from transcription.meshes.knots import switched
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.stopping import stopping
@@ -196,26 +197,25 @@ class MeshLoop:
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), DETOURS
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
-            proposals = self._proposals(present, waiting)
-            first = next(proposals, None)
-            if first is None:
-                found.trouble = "its mesh cannot be refined further"
-                break
-            reached, status = self._solved(first, present, task, others, least)
-            found.meshes.append(first)
-            while reached is None and detours and not self.ended and (other := next(proposals, None)) is not None:
+            reached, status = None, ""
+            for method, better in self._proposals(present, waiting, detours > 0):
+                reached, last = self._solved(method, present, task, others, least)
+                found.meshes.append(method)
+                if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
+                    reached = None
+                status = status or last
+                if reached is not None or self.ended or not detours:
+                    break
                 detours -= 1
-                reached, _ = self._solved(other, present, task, others, least)
-                found.meshes.append(other)
             if reached is None:
                 if not stopping():
-                    found.trouble = f"on the next finer mesh its status is '{status}'"
+                    found.trouble = f"on the next finer mesh its status is '{status}'" if status else "its mesh cannot be refined further"
                 break
             least = min(least, _achieved(reached, task))
             present = reached
             found.best = min((found.best, present), key=lambda one: (bool(one.complaints()), one.error))
             history.append(present.error)
-            if not present.complaints() and not waiting:
+            if not present.complaints():
                 break
             if len(history) > PATIENCE and min(history[-PATIENCE:]) > PROGRESS * min(history[:-PATIENCE]):
                 found.trouble = "finer meshes do not help"
@@ -224,19 +224,18 @@ class MeshLoop:
         found.worse = beyond if beyond > 2.0 * self.wanted.settled else 0.0
         return found
 
-    def _proposals(self, present: OnMesh, waiting: list[Meshed]) -> Iterator[Meshed]:
-        """The next mesh, and others to be tried where no solve converges on it."""
+    def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[tuple[Meshed, bool]]:
+        """The next mesh, and others to be tried where no solve converges on it; each with whether it must be an improvement to be taken."""
         seen = {present.method}
         while waiting:
-            hint = waiting.pop(0)
-            if hint not in seen:
-                seen.add(hint)
-                yield hint
-        finer = next_method(present.method, present.verdict, present.trajectory)
-        for method in (finer, *finer.alternatives()):
-            if method not in seen:
-                seen.add(method)
-                yield method
+            yield waiting.pop(0), False
+        knots = switched(present.method, self.problem, present.trajectory) if knotted else None
+        if knots is not None and knots not in seen:
+            yield knots, True
+        finer = next_method(present.method.settled(present.trajectory), present.verdict, present.trajectory)
+        if finer not in seen:
+            yield finer, False
+            yield from ((method, False) for method in finer.alternatives())
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""

@@ -35,6 +35,8 @@ MOVED = 0.05
 """Where the ends of a front move by more than this part of its range on finer meshes, the points between them move along."""
 NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
+HINTED = 1e2
+"""A point whose error is larger than this, in units of what it may be, begins on the meshes of its nearest neighbour."""
 NEIGHBOURS = 2
 """Number of neighbours whose trajectories are further starts of a point."""
 
@@ -61,7 +63,8 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
 class FrontRefinement:
     """Refinement of the meshes of a front's points: first of its ends, then of the points between them, from the nearest on.
 
-    A point that is the best in an objective on its own mesh remains that. Each point begins on the meshes of its nearest neighbour.
+    A point that is the best in an objective on its own mesh remains that. Points whose meshes are far too coarse begin on those of their nearest
+    neighbour.
 
     Parameters
     ----------
@@ -174,7 +177,7 @@ class FrontRefinement:
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        hints = self.found[done[0]].meshes[-2:] if done else []
+        hints = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
         # Rough controls would need finer meshes than optimal ones.
         hints = hints if known or hints else [self.methods[i]]
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
