@@ -107,7 +107,9 @@ class Assembly:
         for writer in self._declared:
             slots, places = writer.control_nodes()
             for control, own in zip(writer.phase.controls, slots.T, strict=True):
-                free = np.flatnonzero(own >= 0)  # a control whose bounds coincide is no variable
+                # A control whose bounds coincide is no variable, and one that is constant for a while only one.
+                free = np.sort(np.unique(own, return_index=True)[1])
+                free = free[own[free] >= 0]
                 if free.size:
                     columns = np.array([column[int(slot)] for slot in own[free]])
                     found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
