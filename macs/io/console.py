@@ -10,8 +10,6 @@ from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import Any, Self, TextIO
 
-from transcription.stopping import stopped_by
-
 from .interrupts import Interrupts
 
 EVERY = 10.0
@@ -169,9 +167,9 @@ class Steps(Display):
 
 
 @contextmanager
-def working(time_limit: float | None, progress: bool) -> Iterator[tuple[StatusLine, Interrupts]]:
+def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[StatusLine, Interrupts]]:
     """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
-    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, stopped_by(lambda: bool(interrupts.reason)):
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts:
         yield status, interrupts
 
 
