@@ -44,7 +44,7 @@ def polished(
     limit: int | None,
     verify: float | None,
     time_limit: float | None,
-    progress: bool,
+    progress: bool | None,
 ) -> Points:
     """The polished points; see `Front.polished`."""
     problem = front.compiled()

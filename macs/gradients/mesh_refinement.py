@@ -39,7 +39,7 @@ LEAST_TOLERANCE = 1e-10
 """Smallest tolerance that double precision and the integrator can resolve."""
 
 
-def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool) -> Points:
+def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None) -> Points:
     """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
@@ -114,7 +114,7 @@ class MeshRefinement:
         self.solver = PointSolver(self.ranges, front.F[self.good], 0.1 * tolerance)
         self.points = {i: self._begin(i) for i in self.good.tolist()}
 
-    def go(self, time_limit: float | None, progress: bool) -> Points:
+    def go(self, time_limit: float | None, progress: bool | None) -> Points:
         """The refined points; after Ctrl-C or the time limit, on the meshes reached by then."""
         with working(time_limit, progress) as (show, interrupts):
             self._polish()

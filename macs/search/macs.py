@@ -111,7 +111,7 @@ class MACS(Settings, Solver):
         if not solves.stopped:
             state.polishing = None
 
-    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
+    def finish(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
         """The front, polished on another transcription or with refined meshes if the settings ask for it."""
         if self.polish_on is not None:
             solves = front.stats["evaluations"] // self.polish_every

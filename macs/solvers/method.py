@@ -77,7 +77,7 @@ class SearchMethod(ABC):
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
-    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
+    def finish(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
         """The front after further work, of at most `time_limit` seconds, if the search was not stopped; for most solvers the same front."""
         return front
 

@@ -63,7 +63,7 @@ class SearchRun:
     def go(
         self,
         time_limit: float | None,
-        progress: bool,
+        progress: bool | None,
         callback: Callable[[Progress], Any] | None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:

@@ -44,7 +44,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -70,8 +70,8 @@ class Solver(SearchMethod):
         time_limit : float, optional
             Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
             batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
-        progress : bool
-            Show the progress of the search on the terminal.
+        progress : bool, optional
+            Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
             Function that is called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
@@ -153,7 +153,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
