@@ -47,7 +47,9 @@ class Front(Points):
     def __repr__(self) -> str:
         return f"<Front: {headline(self)}>"
 
-    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool | None = None) -> Front:
+    def refine_mesh(
+        self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool | None = None
+    ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
         Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, and by the

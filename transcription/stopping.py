@@ -7,9 +7,11 @@ use, it leaves out the rest (`stopping`); where half of the work is worth nothin
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 
 Asked = Callable[[], str | bool]
 """Returns the reason to end, or True; "" or False if there is none. It must not raise."""
@@ -19,7 +21,15 @@ def _never() -> bool:
     return False
 
 
+@dataclass
+class _Clock:
+    """When the end of the whole work was first seen to be asked for; None if it is not."""
+
+    since: float | None = None
+
+
 _ASKED: ContextVar[Asked] = ContextVar("stopping", default=_never)
+_CLOCK: ContextVar[_Clock | None] = ContextVar("stopping since", default=None)
 
 
 class Stopped(Exception):  # noqa: N818 - an end, not an error
@@ -29,12 +39,13 @@ class Stopped(Exception):  # noqa: N818 - an end, not an error
 @contextmanager
 def stopped_by(asked: Asked) -> Iterator[None]:
     """Within, the work is to end if `asked()` says so, or what it is a part of is to end."""
-    outer = _ASKED.get()
-    token = _ASKED.set(asked if outer is _never else lambda: asked() or outer())
+    outer, clock = _ASKED.get(), _CLOCK.get() or _Clock()
+    tokens = _ASKED.set(asked if outer is _never else lambda: asked() or outer()), _CLOCK.set(clock)
     try:
         yield
     finally:
-        _ASKED.reset(token)
+        _ASKED.reset(tokens[0])
+        _CLOCK.reset(tokens[1])
 
 
 def stopping() -> bool:
@@ -44,7 +55,10 @@ def stopping() -> bool:
 
 def reason_to_stop() -> str:
     """Reason to end the work at hand; "" if there is none."""
-    return in_words(_ASKED.get())
+    reason, clock = in_words(_ASKED.get()), _CLOCK.get()
+    if clock is not None and (clock.since is None) == bool(reason):
+        clock.since = time.monotonic() if reason else None
+    return reason
 
 
 def asked_now() -> Asked:
@@ -58,8 +72,8 @@ def in_words(asked: Asked) -> str:
     return reason if isinstance(reason, str) else "asked to end" * reason
 
 
-def check_stopping() -> None:
-    """Raise `Stopped` if the work at hand is to end."""
-    reason = reason_to_stop()
-    if reason:
+def check_stopping(grace: float = 0.0) -> None:
+    """Raise `Stopped` if the work at hand is to end, and was so for `grace` seconds: what is over by then may come to its end."""
+    reason, clock = reason_to_stop(), _CLOCK.get()
+    if reason and (not grace or clock is None or clock.since is None or time.monotonic() - clock.since >= grace):
         raise Stopped(reason)

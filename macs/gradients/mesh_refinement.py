@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,7 @@ from transcription.inner import Ipopt
 from transcription.meshes.adaptation import COST, Verdict, judge, next_method
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
@@ -112,28 +112,41 @@ class MeshRefinement:
         ranges = np.ptp(front.F[self.good], axis=0) if len(self.good) else np.zeros(len(front.goals))
         self.ranges = np.where(ranges > 0, ranges, objective_scales(front))
         self.solver = PointSolver(self.ranges, front.F[self.good], 0.1 * tolerance)
-        self.points = {i: self._begin(i) for i in self.good.tolist()}
+        self.points: dict[int, _Refined] = {}
 
     def go(self, time_limit: float | None, progress: bool | None) -> Points:
         """The refined points; after Ctrl-C or the time limit, on the meshes reached by then."""
         with working(time_limit, progress) as (show, interrupts):
-            self._polish()
-            for k in range(self.rounds):
-                active = sum(point.active for point in self.points.values())
-                show(f"meshes of the front: round {k + 1} of at most {self.rounds}, {active} of {len(self.front)} points")
-                if not active or stopping():
-                    break
-                self._round()
+            try:
+                self._begin()
+                self._polish()
+                self._rounds(show)
+            except Stopped:
+                pass  # in the middle of a point: it stays on the mesh that it had
+            reached = sum(not self._complaints(point) for point in self.points.values())
+            found = Points.concatenate([self._refined(i) for i in range(len(self.front))]).sorted()
             elapsed, stopped = interrupts.elapsed, interrupts.reason
-        reached = sum(not self._complaints(point) for point in self.points.values())
-        found = Points.concatenate([self._refined(i) for i in range(len(self.front))]).sorted()
         return found.replace(
             solver=dict(self.front.solver),
             stats=more_costs(self.front.stats, self.solver.counts, elapsed, stopped) | {"mesh_tolerance": self.tolerance},
             message=f"{reached} of {len(self.front)} points meet the mesh tolerance of {self.tolerance:.0e}.",
         )
 
-    def _begin(self, i: int) -> _Refined:
+    def _rounds(self, show: Callable[[str], None]) -> None:
+        """All rounds, until no point is active any more."""
+        for k in range(self.rounds):
+            active = sum(point.active for point in self.points.values())
+            show(f"meshes of the front: round {k + 1} of at most {self.rounds}, {active} of {len(self.front)} points")
+            if not active or stopping():
+                return
+            self._round()
+
+    def _begin(self) -> None:
+        """Judge all points on their present meshes."""
+        for i in self.good.tolist():
+            self.points[i] = self._begun(i)
+
+    def _begun(self, i: int) -> _Refined:
         point, F = self.front[i], self.front.F
         method = None if point.transcription is None else from_dict(point.transcription)
         if not isinstance(method, Meshed) or point.trajectory is None:
@@ -191,8 +204,9 @@ class MeshRefinement:
             point.active, point.trouble = False, "finer meshes do not help"
 
     def _take(self, point: _Refined, method: Meshed, solved: SolvedPoint) -> None:
-        point.method, point.solved, point.trajectory = method, solved, solved.nlp.unpack(solved.z)
-        point.verdict = self._judge(point.trajectory)
+        trajectory = solved.nlp.unpack(solved.z)
+        verdict = self._judge(trajectory)  # this may be stopped
+        point.method, point.solved, point.trajectory, point.verdict = method, solved, trajectory, verdict
 
     def _starts(self, i: int, nlp: NLP) -> Iterator[np.ndarray]:
         """Start vectors: the trajectory of point i, then those of the nearest points, all interpolated to the mesh of `nlp`."""
@@ -230,7 +244,7 @@ class MeshRefinement:
         solved = point.solved
         if solved is None:
             return front[[i]].replace(notes=[note or point.point.note])
-        certified = optimality(solved.nlp, solved.z, self.ranges) if solved.by_gradients else None
+        certified = optimality(solved.nlp, solved.z, self.ranges) if solved.by_gradients and not stopping() else None
         return vectors_points(solved.nlp, solved.z[None], front.solver, front.stats, optimality=[certified], notes=[note])
 
 

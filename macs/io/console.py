@@ -65,7 +65,7 @@ class Display(AbstractContextManager, ABC):
         return time.perf_counter() - self._began
 
     def refresh(self) -> None:
-        """Write a plain line, if there is no terminal and the last line is at least `EVERY` seconds old; begin a display that was delayed."""
+        """Begin a display that was delayed. Without a terminal, write a plain line, if the last one is at least `EVERY` seconds old."""
         if not self._due or self._live is not None:
             return
         if self._stream.isatty():

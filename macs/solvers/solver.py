@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from os import PathLike
@@ -15,11 +14,15 @@ from problems.problem import Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
+from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
+from ..evaluation.evaluator import Counts
 from ..front import Front
-from ..fronts.builders import black_box_points, trajectory_points
+from ..fronts.builders import black_box_points, no_points, trajectory_points
+from ..fronts.provenance import costs, more_costs
+from ..io.interrupts import Interrupts
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
@@ -68,8 +71,8 @@ class Solver(SearchMethod):
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
             guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
         time_limit : float, optional
-            Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
-            batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
+            Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
+            doing. A run that this ends is recorded as not reproducible. If nothing was evaluated yet, the front is empty.
         progress : bool, optional
             Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
@@ -105,39 +108,66 @@ class Solver(SearchMethod):
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_problem(problem, transcription)
         solver = inner_solver(inner)
+        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
+        with Interrupts(time_limit) as interrupts:
+            try:
+                run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
+            except Stopped as reason:
+                costs_so_far = costs(
+                    Counts(), wall_time=interrupts.elapsed, seed=seed, tolerance=tolerance, stopped=str(reason), reproducible=False
+                )
+                return Front.of(no_points(compiled.goals, compiled, about, costs_so_far | level))
+            front = run.go(None, progress, callback, checkpoint)
+            if front.stats["stopped"] not in ENDED:
+                return front
+            left = interrupts.left
+            try:
+                return self.finish(front, left if left is None else max(left, NO_TIME), progress)
+            except Stopped as reason:
+                return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
+
+    def _search_run(
+        self,
+        problem: CompiledProblem,
+        transcription: Transcription,
+        inner: InnerSolver,
+        level: dict[str, str],
+        evaluations: int,
+        seed: int | None,
+        tolerance: float,
+        start: Any,
+    ) -> SearchRun:
+        """The run of a search on an optimal control problem, ready to go."""
         nlp = transcription.nlp(problem)
-        self.check_transcription(transcription, nlp.problem)
+        self.check_transcription(transcription, problem)
         check_freedom(nlp)
-        self.check_objectives(len(nlp.problem.goals))
-        about = self.about()
-        level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        drawn = drawing(start)
-        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
+        self.check_objectives(len(problem.goals))
+        about, drawn = self.about(), drawing(start)
+        evaluator = Bilevel(nlp, inner, tolerance, drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
-        run = SearchRun(
+
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:
+                return Front.of(no_points(problem.goals, problem, about, stats | level))
+            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified))
+
+        return SearchRun(
             self,
             evaluator,
-            goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: Front.of(
-                trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified)
-            ),
+            goals=lambda: problem.goals,
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
             what={
                 "solver": about,
-                "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
+                "problem": {"name": problem.name, "fingerprint": problem.fingerprint},
                 "transcription": transcription.to_dict(),
                 "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
                 **level,
             },
         )
-        began = time.perf_counter()
-        front = run.go(time_limit, progress, callback, checkpoint)
-        if front.stats["stopped"] not in ENDED:
-            return front
-        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
-        return self.finish(front, left, progress)
 
     def minimize(
         self,
@@ -197,11 +227,16 @@ class Solver(SearchMethod):
         def goals() -> tuple[Objective, ...]:
             return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
 
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:  # the function itself asked whether to end
+                return Front.of(no_points(() if box.m_known is None else goals(), None, about, stats))
+            return Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats))
+
         run = SearchRun(
             self,
             box,
             goals=goals,
-            make_front=lambda state, stats: Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats)),
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),

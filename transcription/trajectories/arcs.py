@@ -26,6 +26,8 @@ MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which the integration counts as broken down."""
 EVERY = 100
 """Evaluations of the dynamics after which an integration asks whether to end early: some hundredths of a second."""
+GRACE = 1.0
+"""Seconds that integrations have left when the work is asked to end: most are over by then, so that what was found is still checked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +85,9 @@ class Arcs:
         Raises
         ------
         Stopped
-            If the work is to end early.
+            If the work is to end early, and has been for `GRACE`.
         """
-        check_stopping()
+        check_stopping(GRACE)
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
         able = np.flatnonzero(np.isfinite(y).all(axis=1))
         if len(able):
@@ -137,7 +139,7 @@ class Arcs:
             if calls > MOST_CALLS:
                 raise ArithmeticError("too many evaluations of the dynamics")
             if not calls % EVERY:
-                check_stopping()
+                check_stopping(GRACE)
             x[:] = y.reshape(n, -1)[:, :nx]
             time[:] = self.begins + (tau + 1.0) * half[:, 0]
             values = (basis_matrix(self.basis, degree, np.array([tau])) @ laws).reshape(n, nu) if degree else laws.reshape(n, nu)
