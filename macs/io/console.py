@@ -148,18 +148,22 @@ class Steps(Display):
     total : int
     stream : text stream, optional
         Default: stderr.
+    at_once : bool
+        True: the first Ctrl-C interrupts at once, where nothing is gained by the end of a step.
     """
 
     transient = True
 
-    def __init__(self, title: str, total: int, stream: TextIO | None = None) -> None:
+    def __init__(self, title: str, total: int, stream: TextIO | None = None, at_once: bool = False) -> None:
         super().__init__(True, stream)
+        self._at_once = at_once
         self._title, self._total, self._done = title, total, 0
         self._what = ""
         self._interrupts = Interrupts()
 
     def __enter__(self) -> Self:
-        self._interrupts.__enter__()
+        if not self._at_once:
+            self._interrupts.__enter__()
         return super().__enter__()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:

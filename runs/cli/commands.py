@@ -19,6 +19,7 @@ from macs.fronts.style import label
 from macs.fronts.verification import Check, missed, objective_scales
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
+from macs.io.interrupts import Interrupts, Stopped
 from macs.io.text import text_table
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
@@ -30,7 +31,7 @@ from transcription.inner import NAMED
 
 from ..batch import file as studyfile
 from . import study_commands
-from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 
 MESHES = ("fixed", "adaptive")
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
@@ -64,36 +65,50 @@ def solve(arguments: Namespace) -> int:
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
     if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
-    with wrong_call_on_value_error():
-        front = solver.solve(
-            problem,
-            scheme,
-            evaluations=arguments.evaluations or problem.default_evaluations,
-            seed=arguments.seed,
-            inner=inner,
-            start=start,
-            checkpoint=arguments.checkpoint,
-            progress=True,
-        )
-    try:
-        front.save(out)
-    except OSError:
-        # The disk filled up while the search went on: its result is at least shown.
-        print(front.table())
-        raise
-    scales = objective_scales(front)
-    simulated = [as_simulated(point, scales) for point in front]
-    defects = [defect for defect, _ in simulated]
-    print(front.table(defects=defects, columns={"objectives off": [off for _, off in simulated]}))
-    missing = sum(not max(pair) <= problem.verify_tolerance for pair in simulated)
-    if missing:
-        named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-        print(f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}:", end=" ")
-        print(f"see `macs verify {out}{named}`.")
-    print(f"\nfront saved in {out}")
-    if arguments.plot:
-        draw(front, arguments.plot)
+    with Interrupts() as interrupts:
+        with wrong_call_on_value_error():
+            front = solver.solve(
+                problem,
+                scheme,
+                evaluations=arguments.evaluations or problem.default_evaluations,
+                seed=arguments.seed,
+                inner=inner,
+                start=start,
+                checkpoint=arguments.checkpoint,
+                progress=True,
+            )
+        if interrupts.reason and not front.stats["evaluations"]:
+            complain(front.message, "macs solve")
+            return INTERRUPTED
+        try:
+            front.save(out)
+        except OSError:
+            # The disk filled up while the search went on: its result is at least shown.
+            print(front.table())
+            raise
+        print(simulated_table(front, problem.verify_tolerance, arguments.problem, problem.address, out))
+        print(f"\nfront saved in {out}")
+        if arguments.plot:
+            draw(front, arguments.plot)
+        if interrupts.reason:
+            return INTERRUPTED
     return DONE if len(front) else FAILED
+
+
+def simulated_table(front: Front, tolerance: float, given: str, address: str, out: Path) -> str:
+    """The table of a front with a defect for each point, and what to do if some are too large; without them if Ctrl-C was pressed."""
+    scales = objective_scales(front)
+    try:
+        simulated = [as_simulated(point, scales) for point in front]
+    except Stopped:
+        return f"{front.table()}\nThe points were not simulated."
+    defects = [defect for defect, _ in simulated]
+    table = front.table(defects=defects, columns={"objectives off": [off for _, off in simulated]})
+    missing = sum(not max(pair) <= tolerance for pair in simulated)
+    if not missing:
+        return table
+    named = "" if is_catalogued(address) else f" --problem {given}"
+    return f"{table}\n{missing} of {len(front)} points, simulated, differ by more than {tolerance:g}: see `macs verify {out}{named}`."
 
 
 def check_is_front(path: Path) -> None:
