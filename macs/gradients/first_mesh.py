@@ -40,6 +40,15 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
     return COARSE if word is None else parse(word)
 
 
+def search_transcription(
+    problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float
+) -> tuple[Transcription, Counts]:
+    """The problem's own default, or the transcription of `found_mesh`; and what it cost."""
+    if isinstance(problem, Problem) and problem.default_transcription is not None:
+        return parse(problem.default_transcription), Counts()
+    return found_mesh(compiled, verify, tolerance)
+
+
 def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Transcription, Counts]:
     """DFET on a mesh for a search, and what it cost to find.
 
