@@ -63,8 +63,8 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
 class FrontRefinement:
     """Refinement of the meshes of a front's points: first of its ends, then of the points between them, from the nearest on.
 
-    A point that is the best in an objective on its own mesh remains that. Points whose meshes are far too coarse begin on those of their nearest
-    neighbour.
+    A point that is the best in an objective on its own mesh remains that. Points whose meshes are far too coarse begin on those of their
+    nearest neighbour.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ class FrontRefinement:
         return ends
 
     def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at the
-        same place between these."""
+        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at
+        the same place between these."""
         F = self.front.F
         if len(ends) < len(self.units) or len(self.units) == 1:
             return {i: F[i] for i in between}, self.units
