@@ -157,8 +157,8 @@ class FrontRefinement:
         return ends
 
     def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at the
-        same place between these."""
+        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at
+        the same place between these."""
         F = self.front.F
         if len(ends) < len(self.units) or len(self.units) == 1:
             return {i: F[i] for i in between}, self.units

@@ -15,13 +15,11 @@ from .verdict import ElementScores, Verdict
 Method = TypeVar("Method", bound=Meshed)
 
 
-def next_method(method: Method, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = True) -> Method:
-    """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes.
-
-    `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
-    """
+def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
+    """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes. The same method where no
+    mesh can be refined further."""
     finer = {}
-    for name, errors, scores in zip(trajectory, verdict.errors, verdict.scores(integrals=integrals), strict=True):
+    for name, errors, scores in zip(trajectory, verdict.errors, verdict.scores(), strict=True):
         old = method.mesh_of(name)
         mesh = _finer(method, old, trajectory[name], errors, scores)
         if mesh != old:
@@ -36,15 +34,18 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
     apart = method.orders_controls and degree < old.order and bool(trajectory.control_variables)
     # Controls whose degree is that of the states get a higher one with them.
     rate = errors.rate if apart else np.minimum(errors.rate, errors.control_rate)
-    poor = scores.controls >= min(1.0, WORST_SHARE * max(scores.controls.max(initial=0.0), scores.states.max(initial=0.0)))
+    rate = np.where(scores.integrals > scores.states, np.minimum(rate, errors.integrand_rate), rate)
+    poor = scores.controls >= min(1.0, WORST_SHARE * scores.all.max(initial=0.0))
     smooth = np.isnan(errors.steep) & (errors.control_rate >= SMOOTH)
     # Where a higher degree of the controls alone mends what is wrong, elements need not be cut for it.
-    error = np.where(apart & poor & smooth, scores.states, np.maximum(scores.states, scores.controls))
+    error = np.where(apart & poor & smooth, scores.others, scores.all)
     if apart and (poor & smooth).any() and error.max(initial=0.0) < 1.0:
         edges, order = np.array(old.edges), old.order
     else:
         kept = np.isin(np.arange(len(old.edges)), old.moving)
-        remain = merged(np.array(old.edges), old.order, np.maximum(scores.states, scores.controls), kept)
+        # Where nothing is wrong, a finer mesh is to confirm that: it has all that this one has.
+        kept |= scores.all.max(initial=0.0) <= 1.0
+        remain = merged(np.array(old.edges), old.order, scores.all, kept)
         before = np.array(old.edges)
         edges, order = refine(
             before, old.order, error, rate, errors.steep, most=most + int(np.count_nonzero(~remain)), highest=method.highest_order
@@ -122,7 +123,9 @@ def refine(
     error = np.where(np.isnan(error), np.inf, error)
     marked = error >= min(1.0, WORST_SHARE * error.max(initial=0.0))
     more = np.array([degrees(e, r) for e, r in zip(error, rate, strict=True)])
-    smooth = marked & np.isnan(steep) & (rate >= SMOOTH) & (order + more <= highest)
+    # Where no rate can be told and much is wrong, nothing says that one degree more would be enough.
+    told = np.isfinite(rate) | (error < GRADED)
+    smooth = marked & np.isnan(steep) & (rate >= SMOOTH) & told & (order + more <= highest)
     extra = int(min(more[smooth].max(initial=0.0), max(2, order // 2 + 1)))
     shorter = {int(j): pieces(error[j], 2 * order) for j in np.flatnonzero(smooth)}
     room = most - (len(edges) - 1)

@@ -46,6 +46,8 @@ class PhaseErrors:
         Share of each element in what happens: in the time, or in the way of a state, whichever is larger.
     rate, control_rate : array (N,)
         How fast Legendre coefficients of the states, and of the controls, decay: by a factor exp(-rate) with each degree, at the slowest.
+    integrand_rate : array (N,)
+        The same for integrands.
     steep : array (N,)
         Where a control is steepest or leaves a bound, in (-1, 1), if it does so much more than elsewhere on the element; else NaN.
     """
@@ -58,6 +60,7 @@ class PhaseErrors:
     weight: np.ndarray
     rate: np.ndarray
     control_rate: np.ndarray
+    integrand_rate: np.ndarray
     steep: np.ndarray
 
 
@@ -73,15 +76,17 @@ def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseT
     values, scales = trajectory.control.on_elements(DENSE), control_scales(trajectory)
     nothing = np.zeros(len(values))
     controls, states = _coefficients(trajectory)
+    share, integrand_rate = _quadrature(phase, trajectory, parameters)
     return PhaseErrors(
         defect=_local_defects(trajectory, simulated),
-        integral=_quadrature_shares(phase, trajectory, parameters),
+        integral=share,
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
         tail=_tails(controls),
         weight=_weights(trajectory),
         rate=decay_rates(states),
         control_rate=decay_rates(controls),
+        integrand_rate=integrand_rate,
         steep=np.array([_steepest(one, phase.controls, scales) for one in values]),
     )
 
@@ -93,25 +98,27 @@ def _local_defects(trajectory: PhaseTrajectory, simulated: PhaseTrajectory) -> n
     return np.where(np.isfinite(worst), worst, np.inf)
 
 
-def _quadrature_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
-    """See `PhaseErrors.integral`."""
+def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """See `PhaseErrors.integral` and `PhaseErrors.integrand_rate`."""
     s = np.array([trajectory.t0, trajectory.tf, *parameters])
     nodes = trajectory.state.coefficients.shape[1]
-    few, many = (_integrals(phase, trajectory, s, count) for count in (nodes, 2 * nodes + 4))
+    (few, _), (many, values) = (_integrals(phase, trajectory, s, count) for count in (nodes, 2 * nodes + 4))
     total = np.abs(many).sum(axis=0)
     error = (np.abs(few - many) / np.where(total > 0, total, 1.0)).max(axis=1, initial=0.0)
     error = np.where(np.isfinite(error), error, 0.0)
-    return error / max(error.sum(), np.finfo(float).tiny)
+    size = np.abs(values).max(axis=(0, 1))
+    rate = decay_rates(legendre_coefficients(np.nan_to_num(values / np.where(size > 0, size, 1.0))))
+    return error / max(error.sum(), np.finfo(float).tiny), rate
 
 
-def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, nodes: int) -> np.ndarray:
-    """Integrals (N, k) over each element by Gauss-Legendre's rule."""
+def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Integrals (N, k) over each element by Gauss-Legendre's rule, and the integrands (N, nodes, k) there."""
     lengths = np.diff(trajectory.state.edges)
     tau, weights = gauss_legendre(nodes)
     times = trajectory.state.times(tau)
     x, u = (values.reshape(times.size, -1) for values in (trajectory.state.on_elements(tau), trajectory.controls_on_elements(tau)))
     values = np.array(phase.integrands(x.T, u.T, times.reshape(1, -1), s)).reshape(-1, *times.shape)
-    return (0.5 * lengths[:, None] * values @ weights).T
+    return (0.5 * lengths[:, None] * values @ weights).T, np.moveaxis(values, 0, 2)
 
 
 def _tails(controls: np.ndarray) -> np.ndarray:

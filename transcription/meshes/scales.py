@@ -6,6 +6,7 @@ all of the solution.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,8 +31,8 @@ def own_scales(low: np.ndarray, high: np.ndarray, span: np.ndarray) -> np.ndarra
 
 
 def _of(piece: PiecewisePolynomial, variables: Sequence[Variable]) -> np.ndarray:
-    values = piece.on_elements(DENSE).reshape(-1, len(variables))
-    return own_scales(values.min(axis=0), values.max(axis=0), np.array([v.span for v in variables]))
+    values = piece.on_elements(DENSE)
+    return own_scales(values.min(axis=(0, 1)), values.max(axis=(0, 1)), np.array([v.span for v in variables]))
 
 
 def state_scales(trajectory: PhaseTrajectory) -> np.ndarray:
@@ -58,8 +59,9 @@ def objective_variations(nlp: NLP, z: np.ndarray) -> np.ndarray:
 
 
 def _ranges(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """The ranges (n,) of the quantities that the entries of a vector belong to: all that have the same name but for an index."""
-    names = np.array([v.name.split("[")[0] for v in nlp.variables])
+    """The ranges (n,) of the quantities that the entries of a vector belong to: all that have the same name but for
+    an index, or the end of the phase, in brackets."""
+    names = np.array([re.split(r"[\[(]", v.name)[0] for v in nlp.variables])
     _, member = np.unique(names, return_inverse=True)
     low, high = np.full(member.max() + 1, np.inf), np.full(member.max() + 1, -np.inf)
     np.minimum.at(low, member, z)

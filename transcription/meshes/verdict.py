@@ -18,7 +18,8 @@ from .scales import state_scales
 SAFETY = 0.5
 """Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
 COST = 10.0
-"""Multiple of the tolerance by which objectives may be off unless it is stated: their loss by poorly described controls is of second order."""
+"""Multiple of the tolerance by which objectives may be off, unless that is stated: their loss by poorly described controls is of second
+order."""
 ATTAINABLE = 1e-11
 """Error of an element, in scales, that cannot be undercut: where that, grown along the trajectory, is more than the tolerance, no mesh
 helps."""
@@ -122,7 +123,7 @@ class Verdict:
 
     @property
     def error(self) -> float:
-        """The largest of all errors, in units of what they may be; that of controls between their nodes by the same measure as constraints."""
+        """The largest of all errors, in units of what they may be; controls that leave their bounds count like constraints."""
         wanted = self.wanted
         defect, violation = (self.local, 0.0) if self.unstable else (self.defect, self.simulation.violation)
         limits = max(self.excess, violation, self.leaving) / wanted.feasible
@@ -155,7 +156,7 @@ class Verdict:
             found.append(f"when simulated, its objectives differ by {self.off:.1e} of the front's range")
         return found
 
-    def scores(self, *, integrals: bool = True) -> list[ElementScores]:
+    def scores(self) -> list[ElementScores]:
         """For each phase the errors of its elements, in units of what they may be."""
         wanted = self.wanted
         total = sum(float(phase.defect.sum()) for phase in self.errors)
@@ -165,16 +166,17 @@ class Verdict:
         count = sum(len(phase.defect) for phase in self.errors)
         found = []
         for phase in self.errors:
-            parts = [grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible]
-            if integrals and not self.missed_by_elements <= SAFETY * wanted.settled:
-                parts.append(phase.integral * count * self.missed_by_elements / (SAFETY * wanted.settled))
+            states = np.maximum(grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible)
             controls = phase.weight * phase.tail**2 * count / wanted.settled
-            found.append(ElementScores(np.nan_to_num(np.max(parts, axis=0), nan=np.inf, posinf=np.inf), controls))
+            sums = np.zeros(len(states))
+            if not self.missed_by_elements <= SAFETY * wanted.settled:
+                sums = phase.integral * count * self.missed_by_elements / (SAFETY * wanted.settled)
+            found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))
         return found
 
     def worst_place(self, method: Meshed, trajectory: Trajectory) -> str:
         """The place of the largest error, in words."""
-        scores = [np.maximum(score.states, score.controls) for score in self.scores()]
+        scores = [score.all for score in self.scores()]
         names = list(trajectory)
         i = int(np.argmax([score.max() for score in scores]))
         j = int(np.argmax(scores[i]))
@@ -186,11 +188,22 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class ElementScores:
-    """Errors (N,) of the elements of a phase in units of what they may be: of states, limits and integrals; of controls that polynomials
-    of their degree describe poorly."""
+    """Errors (N,) of the elements of a phase in units of what they may be: of states and limits; of controls that polynomials of their
+    degree describe poorly; of integrals."""
 
     states: np.ndarray
     controls: np.ndarray
+    integrals: np.ndarray
+
+    @property
+    def others(self) -> np.ndarray:
+        """All but those of controls."""
+        return np.maximum(self.states, self.integrals)
+
+    @property
+    def all(self) -> np.ndarray:
+        """The largest of all."""
+        return np.maximum(self.others, self.controls)
 
 
 def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray) -> Verdict:
