@@ -31,6 +31,7 @@ from .fronts.points import Point
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.first_mesh import default_transcription
+from .gradients.mending import mended
 from .gradients.multistart import MOST_ITERATIONS, MultistartSolver
 from .io.console import working
 from .io.interrupts import NO_TIME, Interrupts
@@ -144,7 +145,7 @@ def payoff(
     with job.working():
         ends = job.ends()
         found = job.front(ends, job.ranges(ends), sort=False)
-    return job.settled(found)
+    return job.settled(found, sifted=False)
 
 
 def sweep(
@@ -249,14 +250,15 @@ class _Job:
         """The reason why the work was ended early; empty if it was not."""
         return "" if self._interrupts is None else self._interrupts.reason
 
-    def settled(self, front: Front) -> Front:
-        """The front, simulated; unless its transcription was given, with points that are not verified solved again."""
+    def settled(self, front: Front, sifted: bool = True) -> Front:
+        """The front, simulated; unless its transcription was given, with points that are not verified solved again. All of its points,
+        unless it is to be `sifted`."""
         marked = front.verify(self._terms.verify)
         if self._fixed or self._stopped or self._terms.verify is None:
             return marked
         limit = self._terms.time_limit
         left = None if limit is None else max(limit - (time.perf_counter() - self._began), NO_TIME)
-        return marked.mended(time_limit=left, progress=self._terms.progress)
+        return Front.of(mended(marked, left, self._terms.progress, sifted))
 
     def swept(self, points: int, method: str) -> Front:
         """The front of a sweep; its ends alone if one of them was not found."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -27,6 +28,8 @@ from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
 from .start import beginning, check_run, decisions, drawing
+
+log = logging.getLogger(__name__)
 
 Callback = Callable[[Progress], Any]
 
@@ -100,6 +103,8 @@ class Solver(SearchMethod):
 
         Notes
         -----
+        If what follows the search fails, the front is returned as the search left it, not simulated: `message` says why.
+
         A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
         the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search; only an
         adaptive mesh, or a polish on another transcription, is made again.
@@ -144,10 +149,14 @@ class Solver(SearchMethod):
         )
         began = time.perf_counter()
         front = run.go(time_limit, progress, callback, checkpoint)
-        if front.stats["stopped"] not in ENDED:
-            return front.verify(verify)
         left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
-        return self.finish(front, verify, left, progress)
+        try:
+            return self.finish(front, verify, left, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
+        except Exception as error:
+            # A search may have taken hours: its front is not lost by what follows it, and says what failed.
+            log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
+            failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
+            return front.replace(message="; ".join(filter(None, [front.message, failed])))
 
     def minimize(
         self,
