@@ -112,7 +112,8 @@ class Front(Points):
         verify : float, optional
             Largest violation, in the constraints' scales, of a point when simulated. A point with more is solved again, at most three
             times, with its limits tightened by the excess; these solves are additional, and `Point.note` reports them. Points that are
-            still infeasible when simulated are left out, also those of the front itself. Default: points are not simulated.
+            still infeasible when simulated are left out, also those of the front itself, and the others are marked as `verify` does.
+            Default: no point is left out; points are marked if those of the front were.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool
@@ -129,7 +130,8 @@ class Front(Points):
         ValueError
             For a black box, a problem that cannot be found, peaks without derivatives, and invalid arguments.
         """
-        return Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
+        found = Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
+        return found.verify(self.stats.get("verify") if verify is None else verify)
 
     def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +35,7 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
         raise ValueError(f"point {missing[0].index} has no trajectory to simulate: its status is '{missing[0].status}'")
     planned = [trajectory for trajectory in front.trajectories if trajectory is not None]
     found = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
-    violations = [{**one.violations, **_decided(plan, compiled)} for one, plan in zip(found, planned, strict=True)]
+    violations = [_larger(one.violations, _decided(plan, compiled)) for one, plan in zip(found, planned, strict=True)]
     F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(compiled.signs)) * compiled.signs
     violation = np.array([max(one.values(), default=0.0) for one in violations])
     plain = unmarked(front)
@@ -49,6 +49,11 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
         problem=compiled,
         stats={**plain.stats, "tolerance": float(tolerance)},
     )
+
+
+def _larger(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+    """The entries of both; the larger where both have one: a control may leave its bounds at the nodes, or between them."""
+    return {**one, **{label: max(amount, one.get(label, 0.0)) for label, amount in other.items()}}
 
 
 def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:

@@ -117,7 +117,7 @@ class MACS(Settings, Solver):
         settings ask for it."""
         if self.polish_on is not None:
             solves = front.stats["evaluations"] // self.polish_every
-            found = front.polished(
+            return front.polished(
                 parse(self.polish_on),
                 solves=solves,
                 limit=self.archive,
@@ -125,7 +125,6 @@ class MACS(Settings, Solver):
                 time_limit=time_limit,
                 progress=progress,
             )
-            return found.verify(verify)
         if self.mesh == "adaptive" and len(front):
             refined = front.refine_mesh(tolerance=self.mesh_tolerance, time_limit=time_limit, progress=progress).verify(verify)
             return refined[best_rows(refined)]
