@@ -15,7 +15,7 @@ from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
 from .fronts.tables import front_table, headline
-from .fronts.verified import VERIFY, verified
+from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
 from .gradients.mending import mended
 from .gradients.mesh_refinement import refine_mesh
@@ -75,15 +75,16 @@ class Front(Points):
         Returns
         -------
         Front
-            The same number of points. `Point.note` says why a point does not meet the tolerance; `message` says how many do. Costs are
-            added to those of the front. After Ctrl-C, points are on the meshes reached by then.
+            The same number of points, simulated if those of the front were. `Point.note` says why a point does not meet the tolerance;
+            `message` says how many do. Costs are added to those of the front. After Ctrl-C, points are on the meshes reached by then.
 
         Raises
         ------
         ValueError
             For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, and invalid arguments.
         """
-        return Front.of(refine_mesh(self, tolerance, limit, time_limit, progress))
+        refined = Front.of(refine_mesh(unmarked(self), tolerance, limit, time_limit, progress))
+        return refined.verify(self.stats.get("verify"))
 
     def polished(
         self,
@@ -113,7 +114,8 @@ class Front(Points):
         verify : float, optional
             Largest violation, in the constraints' scales, of a point when simulated. A point with more is solved again, at most three
             times, with its limits tightened by the excess; these solves are additional, and `Point.note` reports them. Points that are
-            still infeasible when simulated are left out, also those of the front itself. Default: points are not simulated.
+            still infeasible when simulated are left out, also those of the front itself, and the others are marked as `verify` does.
+            Default: no point is left out; points are marked if those of the front were.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool, optional
@@ -130,7 +132,8 @@ class Front(Points):
         ValueError
             For a black box, a problem that cannot be found, peaks without derivatives, and invalid arguments.
         """
-        return Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
+        found = Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
+        return found.verify(self.stats.get("verify") if verify is None else verify)
 
     def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
@@ -228,7 +231,7 @@ class Front(Points):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates."""
-        from .fronts.pictures.front_plot import draw_front
+        from .fronts.front_plot import draw_front
 
         return draw_front(self, ax)
 
@@ -248,7 +251,7 @@ class Front(Points):
         return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write objectives, violation, status and decisions, one row a point, under a header that names units."""
+        """Write objectives, violation, status, what a simulation found, and decisions, one row a point, under a header that names units."""
         files.save_csv(self, path)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -295,8 +298,8 @@ class Front(Points):
     def merge(fronts: Sequence[Front]) -> Front:
         """The non-dominated feasible points of several fronts of one problem; costs are summed.
 
-        Points are compared by the objectives on their own meshes. On a coarse mesh these may be too good, so that such a point removes
-        others; `simulate` first to compare simulated objectives.
+        Verified points are compared by their simulated objectives, and none is removed by a point that is not verified. Points that are
+        not verified are compared by the objectives on their own meshes, which on a coarse mesh may be too good; `verify` first.
 
         Raises
         ------

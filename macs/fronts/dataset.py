@@ -293,6 +293,9 @@ def root_columns(root: Labelled) -> dict[str, Any]:
     own = [_own_columns(row) for row in root["place"]]
     rows = {column.rows: root[name] for name, column in ROOT.items() if column.rows and name in root.arrays}
     signs = np.where(senses == "minimize", 1.0, -1.0)
+    stats = read_stats(root.attrs)
+    if "verify" not in stats and not np.isnan(rows.get("defect", np.nan)).all():
+        raise ValueError("the attribute 'stats' does not say what its simulated points may miss")
     return rows | {
         "F": root["objectives"] * signs,
         "simulated_F": root["simulated_objectives"] * signs if "simulated_objectives" in root.arrays else None,
@@ -307,7 +310,7 @@ def root_columns(root: Labelled) -> dict[str, Any]:
         "transcriptions": read_documents(root["transcription"], "transcription", _is_transcription),
         "problem": read_source(root.attrs),
         "solver": read_document(root.attrs, "solver"),
-        "stats": read_stats(root.attrs),
+        "stats": stats,
         "message": read_attribute(root.attrs, "message", str),
         "sort": False,
     }

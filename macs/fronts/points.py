@@ -36,10 +36,8 @@ class Points:
         Scaled residual by constraint.
     trajectories : n Trajectories, optional
         None for black boxes, and for a point without a trajectory.
-    excursions : n dicts or None, optional
-        Excess, scaled, of quantities that leave their bounds between nodes, by name.
-    optimality : n floats or None, optional
-        Scaled residual of the conditions of Pareto optimality.
+    excursions, optimality : n dicts or None, n floats or None, optional
+        Excess, scaled, of quantities that leave their bounds between nodes; scaled residual of the conditions of Pareto optimality.
     notes : n str, optional
         Remarks, for example why a mesh could not be refined enough.
     defect, simulated_violation, simulated_F, verified : (n,), (n,), (n, m), (n,), optional
@@ -53,10 +51,8 @@ class Points:
         `{"name": ..., "settings": {...}}`.
     stats : dict, optional
         Costs of the points; missing entries of `STATS` are added.
-    message : str
-        For an empty front: the reason, with the most violated constraint.
-    closest : Point, optional
-        The least infeasible point of a search that found no feasible one.
+    message, closest : str and Point, optional
+        For an empty front: the reason, with the most violated constraint, and the least infeasible point.
     sort : bool
         Sort by the first objective, in the user's value; otherwise keep the order.
 
@@ -64,9 +60,9 @@ class Points:
     ----------
     F, violation, status, defect, simulated_violation, simulated_F, verified : read-only arrays
     violations, trajectories, excursions, optimality, notes, transcriptions : tuples of n
-        As above. Points on one mesh share one dict of `transcriptions`.
-    goals, solver, stats, message, source
-        As above; `source` identifies the problem, None for a black box.
+        Points on one mesh share one dict of `transcriptions`.
+    source : Source or None
+        Identity of the problem, None for a black box.
     variables : tuple of Variable (D)
         All variables of all points. Those of one point, in the order of its decision vector, are `Point.variables`.
     decision : array (n, D)
@@ -343,7 +339,7 @@ class Point:
 
     @property
     def verified(self) -> bool | None:
-        """Whether a simulation agrees with this point within the front's `stats["verify"]`; None if it was not simulated."""
+        """Whether a simulation agrees with this point within `stats["verify"]` of its front; None if it was not simulated."""
         return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
 
     @property
@@ -417,10 +413,8 @@ class Point:
 
         Parameters
         ----------
-        rtol, atol : float
-            Tolerances of the integrator; `atol` is relative to the scales of the states.
-        method : str
-            Method of `scipy.integrate.solve_ivp`.
+        rtol, atol, method
+            Of `scipy.integrate.solve_ivp`; `atol` is relative to the scales of the states.
 
         Returns
         -------

@@ -79,6 +79,19 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
     )
 
 
+def unmarked(points: Kind) -> Kind:
+    """The same points as if they had not been simulated."""
+    nothing = np.full(len(points), np.nan)
+    return points.replace(
+        defect=nothing,
+        simulated_violation=nothing,
+        simulated_F=np.full(points.F.shape, np.nan),
+        verified=np.zeros(len(points), dtype=bool),
+        notes=[_without_misses(note) for note in points.notes],
+        stats={key: value for key, value in points.stats.items() if key != "verify"},
+    )
+
+
 def check_verify(tolerance: float | None) -> None:
     """Raise ValueError if what points may miss is neither None nor positive."""
     if tolerance is not None:

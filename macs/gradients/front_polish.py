@@ -28,6 +28,7 @@ from ..fronts.merging import merge
 from ..fronts.points import Point, Points
 from ..fronts.provenance import more_costs
 from ..fronts.simulated import simulated
+from ..fronts.verified import unmarked
 from ..io.console import working
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
@@ -51,6 +52,8 @@ def polished(
     """The polished points; see `Front.polished`."""
     problem = front.compiled()
     check_problem(problem, transcription)
+    # Compared with new points by the objectives on their meshes: no new point has been simulated yet.
+    front = unmarked(front)
     known = front[[point.index for point in front if point.status == CONVERGED and point.trajectory is not None]]
     count = max(len(known), 1)
     solves, limit = count if solves is None else solves, count if limit is None else limit

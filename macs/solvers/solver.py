@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from os import PathLike
@@ -29,6 +30,8 @@ from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
 from .start import beginning, check_run, decisions, drawing
+
+log = logging.getLogger(__name__)
 
 Callback = Callable[[Progress], Any]
 
@@ -102,6 +105,8 @@ class Solver(SearchMethod):
 
         Notes
         -----
+        If what follows the search fails, the front is returned as the search left it, not simulated: `message` says why.
+
         A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
         the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search; only an
         adaptive mesh, or a polish on another transcription, is made again.
@@ -136,6 +141,11 @@ class Solver(SearchMethod):
                 return self.finish(front, verify, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
+            except Exception as error:
+                # A search may have taken hours: its front is not lost by what follows it, and says what failed.
+                log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
+                failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
+                return front.replace(message="; ".join(filter(None, [front.message, failed])))
 
     def _search_run(
         self,

@@ -11,7 +11,7 @@ from typing import Any
 import problems
 import transcription
 from macs.front import Front
-from macs.fronts.pictures.front_plot import save_picture
+from macs.fronts.front_plot import save_picture
 from macs.fronts.pictures.style import label
 from macs.fronts.points import Point
 from macs.fronts.verification import Check
@@ -242,6 +242,7 @@ def describe(front: Front, point: Point) -> str:
     excursions = {name: f"{value:.2g}" for name, value in (point.excursions or {}).items()}
     groups = {
         f"point {point.index} of {len(front)}, {point.status}": objectives,
+        _verdict(front, point): _simulated(front, point),
         "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,
@@ -253,6 +254,20 @@ def describe(front: Front, point: Point) -> str:
     for name, phase in (point.trajectory or {}).items():
         lines += [f"phase {name}: {phase.t0:.6g} to {phase.tf:.6g} {phase.time_unit}", _ends(phase), ""]
     return "\n".join(lines).rstrip()
+
+
+def _verdict(front: Front, point: Point) -> str:
+    """Whether a point is verified, and within what."""
+    return f"{'verified' if point.verified else 'not verified'}: simulated, against {front.stats.get('verify', 0.0):g}"
+
+
+def _simulated(front: Front, point: Point) -> dict[str, str]:
+    """What the simulation of a point found; nothing if it was not simulated."""
+    if point.simulated is None:
+        return {}
+    values = {label(goal.name, goal.unit): f"{point.simulated[goal.name]:.10g}" for goal in front.goals}
+    errors = {"defect": f"{point.defect:.1e}", "violation": f"{point.simulated_violation:.1e}"}
+    return {**values, **errors, **({"note": point.note} if point.note else {})}
 
 
 def _ends(phase: Any) -> str:

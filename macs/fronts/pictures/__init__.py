@@ -1,1 +1,1 @@
-"""Figures of fronts and flights. matplotlib is imported only where one is drawn."""
+"""Figures of trajectories, and the style of all figures. matplotlib is imported only where one is drawn."""
