@@ -160,6 +160,10 @@ class Meshed(Transcription):
         meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
         return self.remeshed(meshes) if meshes else self
 
+    def alternatives(self) -> tuple[Self, ...]:
+        """Other methods on much the same meshes, to be tried where solves with this one fail."""
+        return ()
+
     def check_phases(self, problem: CompiledProblem) -> None:
         """Raise ValueError if a mesh is given for a phase, or names a control, that the problem does not have."""
         controls = {phase.name: [v.name for v in phase.controls] for phase in problem.phases}
@@ -372,11 +376,11 @@ def largest(residuals: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(violation), violation, np.inf)
 
 
-def check_problem(problem: Any, transcription: Any) -> None:
-    """Raise ValueError if these are no problem and no transcription."""
+def check_problem(problem: Any, transcription: Any = None) -> None:
+    """Raise ValueError if these are no problem and, unless it is None, no transcription."""
     if not isinstance(problem, Problem | CompiledProblem):
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
-    if not isinstance(transcription, Transcription):
+    if transcription is not None and not isinstance(transcription, Transcription):
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
 
 
