@@ -32,7 +32,7 @@ def test_a_mesh_that_is_given_is_kept_and_points_are_only_marked(marked):
 
 
 def test_the_least_time_is_mended_to_the_closed_form(marked, mended):
-    assert LEAST == pytest.approx(109.10894511799619, rel=1e-12)
+    assert abs(LEAST - 109.10894511799619) < 1e-9
     assert len(mended) == 3 and mended.verified.all() and mended.violation.max() < 1e-6
     assert LEAST - 1e-6 * 141 < mended.objectives[0, 0] < LEAST + 1e-3 * 141
     assert mended.simulated_F[0, 0] == pytest.approx(LEAST, rel=1e-5)
