@@ -49,7 +49,9 @@ class Front(Points):
     def __repr__(self) -> str:
         return f"<Front: {headline(self)}>"
 
-    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool = False) -> Front:
+    def refine_mesh(
+        self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool | None = None
+    ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
         Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, and by the
@@ -67,8 +69,8 @@ class Front(Points):
             Largest number of meshes for each point.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
-        progress : bool
-            Show the progress on the terminal.
+        progress : bool, optional
+            Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
         Returns
         -------
@@ -92,7 +94,7 @@ class Front(Points):
         limit: int | None = None,
         verify: float | None = None,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
     ) -> Front:
         """The front moved to the Pareto front by gradient solves on another transcription.
 
@@ -116,8 +118,8 @@ class Front(Points):
             Default: no point is left out; points are marked if those of the front were.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
-        progress : bool
-            Show the progress on the terminal.
+        progress : bool, optional
+            Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
         Returns
         -------
@@ -157,7 +159,7 @@ class Front(Points):
         """
         return verified(self, tolerance)
 
-    def mended(self, *, time_limit: float | None = None, progress: bool = False) -> Front:
+    def mended(self, *, time_limit: float | None = None, progress: bool | None = None) -> Front:
         """The front with those points solved again that a simulation did not confirm.
 
         Each is solved where it misses: on finer meshes of its own. The others stay as they are. Points that are verified are compared by

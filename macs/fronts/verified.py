@@ -10,8 +10,7 @@ import numpy as np
 from problems.checks import check_positive
 from problems.compiled import CompiledProblem
 from problems.sanity import objective_spreads
-from transcription.meshes.errors import phase_errors
-from transcription.trajectories.simulate import Simulation, simulate_all, worst_violation
+from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
@@ -141,7 +140,7 @@ def _misses(
 def _growing(problem: CompiledProblem, trajectory: Trajectory, tolerance: float) -> str:
     """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
     rtol, atol = accuracy(PART * tolerance)
-    own = max(float(errors.defect.max()) for errors in phase_errors(problem, trajectory, rtol=rtol, atol=atol))
+    own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
     if not own <= PART * tolerance:
         return ""
     return f", though on each element by at most {own:.0e}: the dynamics are unstable, and no simulation without feedback can follow them"

@@ -70,8 +70,8 @@ class MultistartSolver:
         Number of starts for each problem.
     rng : numpy.random.Generator
         Generator of the random candidates.
-    tolerance, max_iterations : float, int
-        See `GradientSolves`.
+    solves : GradientSolves
+        Makes and counts the solves.
 
     Attributes
     ----------
@@ -85,11 +85,10 @@ class MultistartSolver:
         given: np.ndarray | None,
         starts: int,
         rng: np.random.Generator,
-        tolerance: float,
-        max_iterations: int = MOST_ITERATIONS,
+        solves: GradientSolves,
     ) -> None:
-        self.nlp, self.starts, self.tolerance = nlp, starts, tolerance
-        self._solves = GradientSolves(tolerance, max_iterations)
+        self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
+        self._solves = solves
         self._rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -101,10 +100,6 @@ class MultistartSolver:
     def counts(self) -> Counts:
         """Gradient solves, iterations, failures by status."""
         return self._solves.counts
-
-    def tell(self, before: Callable[[], None]) -> None:
-        """Call a function before each solve, to show the progress."""
-        self._solves.before = before
 
     def solve(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
@@ -193,3 +188,11 @@ class MultistartSolver:
             if found[-1].status == CONVERGED:
                 break
         return self.better(found, reference, weights)
+
+
+def guessed_start(nlp: NLP) -> np.ndarray | None:
+    """The problem's guess as a full vector (1, n), in the middle of the bounds where there is none; None without any guess."""
+    if not np.isfinite(nlp.guess).any():
+        return None
+    middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
+    return nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None])

@@ -112,7 +112,7 @@ class MACS(Settings, Solver):
         if not solves.stopped:
             state.polishing = None
 
-    def finish(self, front: Front, verify: float | None, time_limit: float | None, progress: bool) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
         if self.polish_on is not None:
@@ -122,16 +122,15 @@ class MACS(Settings, Solver):
                 solves=solves,
                 limit=self.archive,
                 verify=verify,
-                time_limit=time_limit,
                 progress=progress,
             )
         if self.mesh == "adaptive" and len(front):
-            refined = front.refine_mesh(tolerance=self.mesh_tolerance, time_limit=time_limit, progress=progress).verify(verify)
+            refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
             return refined[best_rows(refined)]
         marked = front.verify(verify)
         if self.mesh == "fixed" or not self.refines or verify is None:
             return marked
-        return marked.mended(time_limit=time_limit, progress=progress)
+        return marked.mended(progress=progress)
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from os import PathLike
@@ -16,14 +15,17 @@ from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
+from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
+from ..evaluation.evaluator import Counts
 from ..front import Front
-from ..fronts.builders import black_box_points, trajectory_points
+from ..fronts.builders import black_box_points, no_points, trajectory_points
+from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
-from ..gradients.first_mesh import default_transcription
-from ..io.interrupts import NO_TIME
+from ..gradients.first_mesh import search_transcription
+from ..io.interrupts import Interrupts
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
@@ -49,7 +51,7 @@ class Solver(SearchMethod):
         start: Any = None,
         verify: float | None = VERIFY,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -77,10 +79,10 @@ class Solver(SearchMethod):
             How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
             simulated.
         time_limit : float, optional
-            Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
-            batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
-        progress : bool
-            Show the progress of the search on the terminal.
+            Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
+            doing. A run that this ends is recorded as not reproducible. If nothing was evaluated yet, the front is empty.
+        progress : bool, optional
+            Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
             Function that is called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
@@ -119,44 +121,73 @@ class Solver(SearchMethod):
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_verify(verify)
         solver = inner_solver(inner)
-        transcription = transcription or default_transcription(problem)
+        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
+        earlier = Counts()
+        with Interrupts(time_limit) as interrupts:
+            try:
+                if transcription is None:
+                    transcription, earlier = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
+                run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
+            except Stopped as reason:
+                costs_so_far = costs(
+                    earlier, wall_time=interrupts.elapsed, seed=seed, tolerance=tolerance, stopped=str(reason), reproducible=False
+                )
+                return Front.of(no_points(compiled.goals, compiled, about, costs_so_far | level))
+            before = interrupts.elapsed
+            front = run.go(None, progress, callback, checkpoint)
+            front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
+            try:
+                return self.finish(front, verify, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
+            except Stopped as reason:
+                return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
+            except Exception as error:
+                # A search may have taken hours: its front is not lost by what follows it, and says what failed.
+                log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
+                failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
+                return front.replace(message="; ".join(filter(None, [front.message, failed])))
+
+    def _search_run(
+        self,
+        problem: CompiledProblem,
+        transcription: Transcription,
+        inner: InnerSolver,
+        level: dict[str, str],
+        evaluations: int,
+        seed: int | None,
+        tolerance: float,
+        start: Any,
+    ) -> SearchRun:
+        """The run of a search on an optimal control problem, ready to go."""
         nlp = transcription.nlp(problem)
-        self.check_transcription(transcription, nlp.problem)
+        self.check_transcription(transcription, problem)
         check_freedom(nlp)
-        self.check_objectives(len(nlp.problem.goals))
-        about = self.about()
-        level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        drawn = drawing(start)
-        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
+        self.check_objectives(len(problem.goals))
+        about, drawn = self.about(), drawing(start)
+        evaluator = Bilevel(nlp, inner, tolerance, drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
-        run = SearchRun(
+
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:
+                return Front.of(no_points(problem.goals, problem, about, stats | level))
+            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified))
+
+        return SearchRun(
             self,
             evaluator,
-            goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: Front.of(
-                trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified)
-            ),
+            goals=lambda: problem.goals,
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
             what={
                 "solver": about,
-                "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
+                "problem": {"name": problem.name, "fingerprint": problem.fingerprint},
                 "transcription": transcription.to_dict(),
                 "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
                 **level,
             },
         )
-        began = time.perf_counter()
-        front = run.go(time_limit, progress, callback, checkpoint)
-        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
-        try:
-            return self.finish(front, verify, left, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
-        except Exception as error:
-            # A search may have taken hours: its front is not lost by what follows it, and says what failed.
-            log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
-            failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
-            return front.replace(message="; ".join(filter(None, [front.message, failed])))
 
     def minimize(
         self,
@@ -172,7 +203,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -216,11 +247,16 @@ class Solver(SearchMethod):
         def goals() -> tuple[Objective, ...]:
             return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
 
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:  # the function itself asked whether to end
+                return Front.of(no_points(() if box.m_known is None else goals(), None, about, stats))
+            return Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats))
+
         run = SearchRun(
             self,
             box,
             goals=goals,
-            make_front=lambda state, stats: Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats)),
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),

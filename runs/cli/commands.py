@@ -17,6 +17,7 @@ from macs.fronts.points import Point
 from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
+from macs.io.interrupts import Interrupts
 from macs.io.text import text_table
 from macs.search.settings import MESHES
 from macs.solvers.catalogue import solver_class
@@ -29,7 +30,7 @@ from transcription.inner import NAMED
 
 from ..batch import file as studyfile
 from . import study_commands
-from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
@@ -64,31 +65,37 @@ def solve(arguments: Namespace) -> int:
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
     if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
-    with wrong_call_on_value_error():
-        front = solver.solve(
-            problem,
-            scheme,
-            evaluations=arguments.evaluations or problem.default_evaluations,
-            seed=arguments.seed,
-            inner=inner,
-            start=start,
-            verify=verify,
-            checkpoint=arguments.checkpoint,
-            progress=True,
-        )
-    try:
-        front.save(out)
-    except OSError:
-        # The disk filled up while the search went on: its result is at least shown.
+    with Interrupts() as interrupts:
+        with wrong_call_on_value_error():
+            front = solver.solve(
+                problem,
+                scheme,
+                evaluations=arguments.evaluations or problem.default_evaluations,
+                seed=arguments.seed,
+                inner=inner,
+                start=start,
+                verify=verify,
+                checkpoint=arguments.checkpoint,
+                progress=True,
+            )
+        if interrupts.reason and not front.stats["evaluations"]:
+            complain(front.message, "macs solve")
+            return INTERRUPTED
+        try:
+            front.save(out)
+        except OSError:
+            # The disk filled up while the search went on: its result is at least shown.
+            print(front.table())
+            raise
         print(front.table())
-        raise
-    print(front.table())
-    if front.was_simulated.any() and not front.verified.all():
-        named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-        print(f"See `macs verify {out}{named}`.")
-    print(f"\nfront saved in {out}")
-    if arguments.plot:
-        draw(front, arguments.plot)
+        if front.was_simulated.any() and not front.verified.all():
+            named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
+            print(f"See `macs verify {out}{named}`.")
+        print(f"\nfront saved in {out}")
+        if arguments.plot:
+            draw(front, arguments.plot)
+        if interrupts.reason:
+            return INTERRUPTED
     return DONE if len(front) else FAILED
 
 

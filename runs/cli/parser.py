@@ -1,7 +1,8 @@
 """The parser of the command line, and the end of a call.
 
 Exit codes: 0 done; 1 failed (nothing feasible, a point that does not verify, runs missing); 2 the call was wrong: one line on stderr with
-the reason, and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
+the reason, and no file is left; 130 ended by Ctrl-C, with what there was by then. The commands themselves are in `commands`, which is only
+imported to run one: help is instant.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from .answers import DONE, INTERRUPTED, WRONG, WrongCall
+from .answers import DONE, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
 
 EPILOG = """\
 examples:
@@ -29,7 +30,7 @@ examples:
   macs study status out/goddard-table3
   macs bench inner --quick
 
-exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong"""
+exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong, 130 ended by Ctrl-C"""
 
 
 BENCH = """\
@@ -38,6 +39,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
@@ -89,7 +91,18 @@ class Version(argparse.Action):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns its exit code."""
+    """Run a command, by default that of this process, which then ends; returns its exit code."""
+    try:
+        return _answer(argv)
+    except KeyboardInterrupt:
+        complain("interrupted", "macs")
+        return INTERRUPTED
+    finally:
+        if argv is None:
+            deaf()
+
+
+def _answer(argv: Sequence[str] | None) -> int:
     parser = build_parser()
     arguments, unknown = parser.parse_known_args(argv)
     if unknown:
@@ -100,7 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A warning, such as that of an old file, is one line, without the place in our code.
     warnings.formatwarning = lambda message, *_: f"{arguments.parser.prog}: {message}\n"
     try:
-        from . import commands
+        with ended_at_once(arguments.parser.prog):
+            from . import commands
 
         code = commands.COMMANDS[arguments.command](arguments)
         sys.stdout.flush()
@@ -112,16 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return complain(str(error), arguments.parser.prog)
     except OSError as error:
         return complain(error.strerror or str(error), arguments.parser.prog)
-    except KeyboardInterrupt:
-        complain("interrupted", arguments.parser.prog)
-        return INTERRUPTED
     return int(code)
-
-
-def complain(message: str, program: str) -> int:
-    """One line on stderr."""
-    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
-    return WRONG
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -226,7 +231,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|population|search|study", nargs="?", help="which one (default: all)")
+    bench.add_argument("what", metavar="inner|population|search|standard|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )

@@ -105,6 +105,29 @@ def simulate_all(
     return [found[k] for k in range(len(trajectories))]
 
 
+def simulate_elements(problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10) -> Simulation:
+    """The simulation of a trajectory's controls on each element by itself, from the state that the trajectory has at its beginning.
+
+    Errors do not grow from element to element, so that it follows dynamics too, which are so unstable that no simulation of the whole can.
+    `trajectory` is discontinuous: the end of an element differs from the beginning of the next by the local error. Objectives are those of
+    the planned states at the ends of phases, and of the simulated integrals and peaks. See `simulate` for the arguments.
+    """
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    simulated: dict[int, _SimulatedPhase] = {}
+    violations: dict[str, float] = {}
+    for i in problem.order_in_time:
+        phase = problem.phases[i]
+        planned = trajectory[phase.name]
+        nx, integrals = len(phase.states), np.zeros((len(planned.state.coefficients), phase.integrands.size1_out(0)))
+        tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+        arcs = Arcs.of(phase, [(planned, j, parameters) for j in range(len(integrals))])
+        elements = arcs.integrate(np.hstack([planned.edge_states[:-1], integrals]), rtol, tolerances, "DOP853")
+        elements[1:, :, nx:] += np.cumsum(elements[:-1, -1:, nx:], axis=0)
+        simulated[i] = _simulated_phase(phase, planned, elements, parameters)
+        violations |= simulated[i].violations(phase)
+    return _simulation(problem, simulated, violations, trajectory, parameters)
+
+
 def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
     """Simulations of trajectories of one shape."""
     parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]

@@ -92,9 +92,10 @@ def test_known_points_are_simulated_only_if_it_matters(rough, monkeypatch):
 
     monkeypatch.setattr(front_polish, "simulated", counted)
     dominating = rough.F.min(axis=0)[None] - 1.0
-    assert len(feasible_when_simulated(dominating, rough, VERIFY)) == len(rough) and not counts
+    assert len(feasible_when_simulated(dominating, rough, VERIFY)[0]) == len(rough) and not counts
     nothing = np.empty((0, 2))
-    kept = feasible_when_simulated(nothing, rough, VERIFY)
+    kept, unseen = feasible_when_simulated(nothing, rough, VERIFY)
+    assert not unseen
     assert sum(counts) == len(rough)
     actual = rough.simulate(tolerance=VERIFY)
     assert np.array_equal(kept.F, rough.F[actual.status == "converged"])
