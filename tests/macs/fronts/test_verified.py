@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from synthetic_fronts import black_box
@@ -178,6 +179,18 @@ def test_an_error_that_grows_by_itself_is_called_unstable():
     assert fine.status == coarse.status == "converged" and fine.verified is coarse.verified is False
     assert "the dynamics are unstable, and no simulation without feedback can follow them" in fine.note
     assert "its states differ by" in coarse.note and "unstable" not in coarse.note
+
+
+def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
+    """A wind that changes too fast for the first element, while the second, without thrust, is exact."""
+    problem = Problem("gust")
+    phase = problem.phase("run", t0=0.0, tf=2.0)
+    x = phase.state("x", bounds=(-5, 5), initial=0)
+    u = phase.control("u", bounds=(0, 2))
+    phase.dynamics(x=u * ca.sin(9.0 * phase.time))
+    problem.maximize("distance", phase.final(x))
+    (point,) = points(problem, [2.0, 2.0, 0.0, 0.0]).verify()
+    assert not point.verified and "its states differ by" in point.note and "unstable" not in point.note
 
 
 # What is not simulated
