@@ -147,19 +147,19 @@ class MeshLoop:
     wanted : Wanted
     limit : int
         Largest number of meshes for each point.
-    most_solves : int, optional
-        Number of gradient solves, of those that `solves` counts, after which no new mesh is begun.
+    most_work : float, optional
+        Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
     """
 
-    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_solves: int | None = None) -> None:
-        self.programs, self.solves, self.wanted, self.limit, self.most_solves = programs, solves, wanted, limit, most_solves
+    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_work: float | None = None) -> None:
+        self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
     @property
     def ended(self) -> bool:
         """Whether no new mesh is to be begun."""
-        return stopping() or (self.most_solves is not None and self.solves.counts.gradient_solves >= self.most_solves)
+        return stopping() or (self.most_work is not None and self.solves.work >= self.most_work)
 
     def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
