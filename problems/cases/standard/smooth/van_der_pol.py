@@ -1,8 +1,8 @@
 """Van der Pol's oscillator, brought to rest by a control with limits.
 
 Vassiliadis, "Computational solution of dynamic optimization problems with general differential-algebraic constraints", 1993; case study 6.1
-of Balsa-Canto, Banga, Alonso and Vassiliadis, "Restricted second order information for the solution of optimal control problems using control
-vector parameterization", Journal of Process Control 12, 2002.
+of Balsa-Canto, Banga, Alonso and Vassiliadis, "Restricted second order information for the solution of optimal control problems using
+control vector parameterization", Journal of Process Control 12, 2002.
 """
 
 from __future__ import annotations

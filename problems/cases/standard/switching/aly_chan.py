@@ -1,7 +1,7 @@
 """Aly and Chan: a control that is singular all along.
 
-Aly and Chan, "Application of a modified quasilinearization technique to totally singular optimal control problems", International Journal of
-Control 17, 1973. The optimum is u = -sin t, x = sin t, and its cost is nothing.
+Aly and Chan, "Application of a modified quasilinearization technique to totally singular optimal control problems", International Journal
+of Control 17, 1973. The optimum is u = -sin t, x = sin t, and its cost is nothing.
 """
 
 from __future__ import annotations
