@@ -31,7 +31,7 @@ def layers(start: float, end: float | None, duration: float, span: float) -> Pro
 
 
 def layer_costs(x: float) -> tuple[float, float]:
-    """Costs of the layers from x to 0 and from 0 to x, where the Hamiltonian vanishes: u = x^3 -+ sqrt(x^6 + x^2), cost = integral of |u|."""
+    """Costs of the layers from x to 0 and from 0 to x: the Hamiltonian is zero, u = x^3 -+ sqrt(x^6 + x^2), the cost the integral of |u|."""
     root = 0.25 * (x**2 * np.sqrt(x**4 + 1) + np.arcsinh(x**2))
     return root - 0.25 * x**4, root + 0.25 * x**4
 
