@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import Objective, Variable
+from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
 from transcription.nlp.optimality import optimality
 from transcription.stopping import stopping
@@ -34,6 +34,21 @@ def trajectory_points(
         return vectors_points(nlp, archive.Z, solver, stats, optimality=found)
     nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
+
+
+def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Points:
+    """No points, of a search that was ended before its first population was evaluated."""
+    return Points(
+        F=np.empty((0, len(goals))),
+        decision=np.empty((0, 0)),
+        violation=(),
+        status=(),
+        goals=goals,
+        problem=problem,
+        solver=solver,
+        stats=stats,
+        message=f"nothing was evaluated yet: {stats['stopped']}",
+    )
 
 
 def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:

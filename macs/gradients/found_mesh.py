@@ -89,7 +89,7 @@ def found_optimum(
     found: list[Found] = []
     for method in coarse:
         nlp = loop.programs(method)
-        solver = MultistartSolver(nlp, given(nlp), starts, rng, loop.solves.tolerance, loop.solves)
+        solver = MultistartSolver(nlp, given(nlp), starts, rng, loop.solves)
         solved = solver.solve(reference, weights)
         if solved.status == CONVERGED:
             units = loop.units(solved.F[None], nlp, solved.z)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from transcription import from_dict
 from transcription.base import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.optimality import optimality
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
@@ -41,7 +42,7 @@ NEIGHBOURS = 2
 """Number of neighbours whose trajectories are further starts of a point."""
 
 
-def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool) -> Points:
+def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None) -> Points:
     """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
@@ -57,7 +58,7 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
         job = FrontRefinement(front, wanted, int(limit))
         job.go(show)
         elapsed, stopped = interrupts.elapsed, interrupts.reason
-    return job.points(elapsed, stopped)
+    return job.points(elapsed, stopped).sorted()
 
 
 class FrontRefinement:
@@ -93,6 +94,11 @@ class FrontRefinement:
 
     def go(self, show: Any = lambda words: None) -> None:
         """Refine all chosen points, or as many as the limits allow."""
+        # Asked to end in the middle of a point, it stays as it was.
+        with suppress(Stopped):
+            self._go(show)
+
+    def _go(self, show: Any) -> None:
         if not self.chosen:
             return
         first = self.chosen[0]
@@ -113,20 +119,16 @@ class FrontRefinement:
             self._refine(i, Along(references[i], weights, self.units))
 
     def points(self, elapsed: float, stopped: str) -> Points:
-        """The front with the refined points, and what they cost."""
+        """The front with the refined points, in the same order, and what they cost."""
         front = self.front
         rows = [self._rows.get(i, front[[i]]) for i in range(len(front))]
         for i in set(self.chosen) - set(self.found):
             rows[i] = rows[i].replace(notes=[NOT_BEGUN])
         reached = sum(not found.complaints() for found in self.found.values())
-        return (
-            Points.concatenate(rows)
-            .sorted()
-            .replace(
-                solver=dict(front.solver),
-                stats=more_costs(front.stats, self.solves.counts, elapsed, stopped) | {"mesh_tolerance": self.wanted.tolerance},
-                message=f"{reached} of {len(front)} points meet the mesh tolerance of {self.wanted.tolerance:.0e}.",
-            )
+        return Points.concatenate(rows).replace(
+            solver=dict(front.solver),
+            stats=more_costs(front.stats, self.solves.counts, elapsed, stopped) | {"mesh_tolerance": self.wanted.tolerance},
+            message=f"{reached} of {len(front)} points meet the mesh tolerance of {self.wanted.tolerance:.0e}.",
         )
 
     def _method(self, point: Point) -> Meshed:

@@ -223,7 +223,7 @@ def test_ctrl_c_keeps_what_was_found(here):
         process.stderr.readline()
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
+    assert process.returncode == 130
     assert "ended early (interrupted)" in out and "front saved in front.nc" in out
     assert Front.load("front.nc").stats["stopped"] == "interrupted"
 

@@ -154,6 +154,59 @@ def test_a_switch_is_where_it_belongs(basis, control_order):
     assert method.settled(point.trajectory).mesh_of("run").edges[1] == pytest.approx(place, abs=1e-8)
 
 
+def test_a_constant_control_is_one_variable_on_its_arc():
+    mesh = PhaseMesh(EDGES, 3, 2, MOVING, {"u": [1, 0], "v": (2,)})
+    assert mesh.constant == (("u", (0, 1)), ("v", (2,))) and mesh.arcs.tolist() == [0, 1, 1, 2]
+    assert PhaseMesh.of(json.loads(json.dumps(mesh.to_dict()))) == mesh
+    assert "u constant on 2 of 3 arcs" in repr(mesh)
+    for basis in ("lobatto", "bernstein"):
+        nlp = DFET(2, 2, basis=basis, mesh={"swing": mesh}).transcribe(oscillator())
+        names = [nlp.variables[i].name for i in nlp.free]
+        assert [name for name in names if name.startswith("swing.u[")] == [
+            "swing.u[arc 0]",
+            "swing.u[arc 1]",
+            *(f"swing.u[3,{k}]" for k in range(3)),
+        ]
+        assert sum(name.startswith("swing.v[") for name in names) == 1 + 3 * 3
+        assert [len(profile.columns) for profile in nlp.profiles] == [5, 10]
+        (z,) = propagated(nlp, k=1)
+        flight = nlp.unpack(z)
+        assert np.abs((nlp.interpolate(flight) - z) / nlp.span).max() < 1e-9
+        control = flight["swing"].control.coefficients
+        assert np.ptp(control[1:3, :, 0]) == 0 == np.ptp(control[3, :, 1]) and np.ptp(control[3, :, 0]) > 0.1
+        # The same as where it is free, with the same coefficients.
+        free = DFET(2, 2, basis=basis, mesh={"swing": (EDGES, 3, 2, MOVING)}).transcribe(oscillator())
+        again = free.interpolate(flight)
+        assert np.abs(free.evaluate(again[None])[0] - nlp.evaluate(z[None])[0]).max() < 1e-10 and free.evaluate(again[None])[1] < 1e-9
+        rows = np.arange(len(nlp.reduced.scale))
+        derivatives = nlp.reduced.derivatives(nlp.reduced.propagate(z[None]), rows)[0]
+        column, step = names.index("swing.u[arc 1]"), 1e-6
+        two = np.tile(z, (2, 1))
+        two[:, nlp.free[column]] += [-step, step]
+        low, high = nlp.reduced.propagate(two).values
+        assert derivatives[:, column] == pytest.approx((high - low) / (2 * step), rel=1e-5, abs=1e-5)
+
+
+def test_a_coarse_trajectory_is_constant_at_its_median():
+    coarse = DFET(5, 3).transcribe(oscillator())
+    z = coarse.propagate(coarse.first_guess(candidates(coarse, 1)))[0]
+    flight = coarse.unpack(z)
+    nlp = DFET(2, 2, mesh={"swing": PhaseMesh((0, 0.2, 1), 3, 2, (1,), {"u": (0,)})}).transcribe(oscillator())
+    own = flight["swing"].control.on_element(0, np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]))[:, 0]
+    assert nlp.interpolate(flight)[slot(nlp, "swing.u[arc 0]")] == pytest.approx(np.median(own))
+
+
+@pytest.mark.parametrize("constant", [3, {"u": 3}, {"u": (3,)}, {"u": (0, 0)}, {"u": (-1,)}, "u"])
+def test_what_is_no_constant_control_is_refused(constant):
+    with pytest.raises(ValueError, match="DFET: phase 'swing'"):
+        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, constant)})
+
+
+def test_a_constant_control_that_the_phase_does_not_have_is_refused():
+    with pytest.raises(ValueError, match="phase 'swing' has no control 'w'; its controls are u, v"):
+        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, {"w": (0,)})}).transcribe(oscillator())
+
+
 def test_searches_begin_with_their_edges_and_files_keep_them(tmp_path):
     method = DFET(2, 2, mesh={"run": ((0, 0.5, 1), 2, 0, (1,))})
     problem = least_time()

@@ -33,7 +33,7 @@ class DFETPhase(PhaseWriter):
         self.mesh, self.tables = mesh, tables
         self.n = elements = mesh.elements
         prefix = f"{phase.name}."
-        self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
+        self.U = self._controls(prefix)
         moving = zip(mesh.moving, mesh.ranges().tolist(), strict=True)
         places = [Variable(f"{prefix}edge[{j}]", low, high, "", high - low) for j, (low, high) in moving]
         self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
@@ -47,6 +47,23 @@ class DFETPhase(PhaseWriter):
         self.S = layout.add_table(prefix, self._sizes, elements, len(tables.tau))
         self.magnitudes = self.S.ravel()
         self._element = expanded(element_function(tables, phase))
+
+    def _controls(self, prefix: str) -> np.ndarray:
+        """Slots (N, q + 1, nu) of the controls; where one is constant, all of an arc are the same."""
+        shape, arcs, constant = (self.n, self.tables.control_order + 1), self.mesh.arcs, dict(self.mesh.constant)
+        if not constant:
+            return self.layout.add_table(prefix, self.phase.controls, *shape, free=True)
+        one: dict[tuple[str, int], int] = {}
+
+        def slot(v: Variable, j: int, k: int) -> int:
+            arc = int(arcs[j])
+            if arc not in constant.get(v.name, ()):
+                return self.layout.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=True)
+            if (v.name, arc) not in one:
+                one[v.name, arc] = self.layout.add(replace(v, name=f"{prefix}{v.name}[arc {arc}]"), free=True)
+            return one[v.name, arc]
+
+        return np.array([[[slot(v, j, k) for v in self.phase.controls] for k in range(shape[1])] for j in range(self.n)])
 
     @cached_property
     def _propagation(self) -> Propagation:
@@ -163,7 +180,13 @@ class DFETPhase(PhaseWriter):
         at_edges = trajectory.state(t0 + length * np.array(mesh.edges[1:-1]))
         self.layout.write(extended, self.E, np.array(mesh.edges)[None, list(mesh.moving)])
         self.layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
-        self.layout.write(extended, self.U, wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)[None])
+        U = wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)
+        for name, arcs in self.mesh.constant:
+            i = [v.name for v in phase.controls].index(name)
+            for arc in arcs:
+                # Not the mean: near a switch, a trajectory of a coarser mesh is on its way to the other bound.
+                U[mesh.arcs == arc, :, i] = np.median(controls[mesh.arcs == arc, :, i])
+        self.layout.write(extended, self.U, U[None])
         self.layout.write(extended, self.B[1:-1], at_edges[None])
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:

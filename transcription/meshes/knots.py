@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ from problems.problem import Problem
 from ..base import Meshed
 from ..phases.mesh import PhaseMesh
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
-from .switches import INSIDE, Switch, labels, switches
+from .switches import INSIDE, LOWER, UPPER, Switch, stretches, switches
 
 Method = TypeVar("Method", bound=Meshed)
 
@@ -29,17 +29,23 @@ PRESSED = 0.01
 ORDER, LESS = 4, 2
 """Least degree of the states on a mesh with knots, and how much lower the degree of the controls is. On singular arcs, where controls enter
 linearly and hardly matter, those of the degree of the states oscillate; two degrees lower they do not."""
-BANG = 0.5
-"""Elements of arcs on which all controls are on bounds, for each of the mesh before: nothing but the states has to be described there."""
+ENOUGH = 4
+"""An arc on which all controls are constant keeps so many elements of the mesh before, but of more only half, if that is more: nothing but
+the states has to be described there."""
 MOSTLY = 0.9
-"""Share of an arc on which all controls have to be on bounds for that."""
+"""Share of a phase on which a control without switches is on a bound, to count as being there."""
 
 
 def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Trajectory) -> Method | None:
-    """The method on meshes whose edges lie at the switches of a trajectory's controls, and move.
+    """The next method to try, on meshes whose edges lie at the switches of a trajectory's controls, and move.
 
-    Controls stay within their bounds there between nodes, too. Elements between the switches are as fine as before, and fewer where all
-    controls are on bounds. A phase whose moving edges are at its switches already keeps its mesh.
+    First, each control is constant on each arc on which it is on a bound. A control that is free there has local optima of its own, in
+    which it leaves its bound gradually while the edge stays behind. Called again with what that method found: the switches that came or
+    went, and edges that could move no further, begin anew; once they stay, all controls are free, so that an arc on which none should be
+    constant shows. Called with what that method found: None, unless there are other switches now.
+
+    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, and fewer where all controls
+    are on bounds. Not every proposal is better: compare.
 
     Parameters
     ----------
@@ -60,28 +66,38 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
     return method.settled(trajectory).remeshed(found, bounded=True) if found else None
 
 
-def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
-    """The switches of each control of a phase by its name; periodic controls have no bounds, and none."""
-    places, values = _samples(phase)
-    bounded = [(i, v) for i, v in enumerate(phase.control_variables) if v.span > 0 and not v.period]
-    return {v.name: switches(places, (values[:, :, i] - v.lower) / v.span) for i, v in bounded}
-
-
 def next_mesh(method: Meshed, phase: PhaseTrajectory) -> PhaseMesh | None:
-    """The mesh of one phase with knots at its switches; None if it has these, or there are none."""
+    """The mesh of one phase that `switched` proposes, if any."""
     given = method.mesh_of(phase.name)
     mesh = given.found_in(phase.state.edges)
     known = np.array(mesh.edges)[list(mesh.moving)]
     low, high = given.ranges().T
     slack = PRESSED * (high - low)
     pressed = np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0))
-    places = knots(phase_switches(phase), mesh, pressed)
+    found = phase_switches(phase)
+    places = knots(found, mesh, pressed)
     # Within the ranges the solver has moved the edges itself: where a control comes near a bound slowly, it knows better.
     if len(places) == len(known) and (low <= places).all() and (places <= high).all():
-        return mesh if pressed.any() else None
+        return mesh if pressed.any() else replace(mesh, constant=()) if mesh.constant else None
     if len(places) >= max(method.most_elements, 2 * method.elements):
         return None
-    return with_knots(mesh, places, [_on_bounds(phase, *arc) for arc in pairwise([0.0, *places, 1.0])])
+    return with_knots(mesh, places, on_bounds(phase, found, places))
+
+
+def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
+    """The switches of each control of a phase by its name; periodic controls have no bounds, and none."""
+    return {name: switches(*values) for name, values in _samples(phase).items()}
+
+
+def on_bounds(phase: PhaseTrajectory, found: Mapping[str, Sequence[Switch]], places: Sequence[float]) -> dict[str, list[int]]:
+    """On which of the arcs between `places` each control is on a bound, from its switches; a periodic one never is."""
+    middles = 0.5 * (np.array([0.0, *places]) + np.array([*places, 1.0]))
+    arcs: dict[str, list[int]] = {v.name: [] for v in phase.control_variables if v.period}
+    for name, own in found.items():
+        between = [one.before if one.before == other.after else INSIDE for other, one in pairwise(own)]
+        sides = [own[0].before, *between, own[-1].after] if own else [_mostly(*_samples(phase)[name])]
+        arcs[name] = [j for j, k in enumerate(np.searchsorted([one.place for one in own], middles)) if sides[int(k)] != INSIDE]
+    return arcs
 
 
 @dataclass
@@ -143,36 +159,38 @@ def knots(found: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.nd
     return [one.place for one in groups if one.real and NEAREST < one.place < 1.0 - NEAREST]
 
 
-def with_knots(mesh: PhaseMesh, places: Sequence[float], bang: Sequence[bool]) -> PhaseMesh:
-    """A mesh with moving edges at `places`; which of the arcs between these have all controls on their bounds is given by `bang`.
+def with_knots(mesh: PhaseMesh, places: Sequence[float], constant: Mapping[str, Sequence[int]]) -> PhaseMesh:
+    """A mesh with moving edges at `places`; between these, controls are `constant` on arcs.
 
     Each arc has as many elements as the mesh has there, spread likewise. Where the mesh has no moving edges, its degrees become those of a
-    mesh with knots, and on bang arcs the elements fewer.
+    mesh with knots, and arcs on which all controls are constant have fewer.
     """
     first = not mesh.moving
     index = np.arange(mesh.elements + 1.0)
     ends = np.interp([0.0, *places, 1.0], mesh.edges, index)
     edges, moving = [0.0], []
-    for (low, high), end, on_bounds in zip(pairwise(ends), [*places, 1.0], bang, strict=True):
-        count = max(1, round((high - low) * (BANG if on_bounds and first else 1.0)))
+    for j, ((low, high), end) in enumerate(zip(pairwise(ends), [*places, 1.0], strict=True)):
+        bang = bool(constant) and all(j in arcs for arcs in constant.values())
+        count = max(1, round(high - low))
+        count = max(min(count, ENOUGH), round(0.5 * count)) if bang and first else count
         edges += [*np.interp(np.linspace(low, high, count + 1)[1:-1], index, mesh.edges).tolist(), end]
         moving.append(len(edges) - 1)
     order = max(mesh.order, ORDER) if first else mesh.order
-    return PhaseMesh(tuple(edges), order, order - LESS if first else mesh.control_order, tuple(moving[:-1]))
+    held = tuple((name, tuple(arcs)) for name, arcs in constant.items())
+    return PhaseMesh(tuple(edges), order, order - LESS if first else mesh.control_order, tuple(moving[:-1]), held)
 
 
-def _samples(phase: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, k), relative to the phase, and controls (N, k, nu) there."""
+def _samples(phase: PhaseTrajectory) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Of each control with bounds: places (N, k), relative to the phase, and its values there, as fractions of the way between them."""
     edges = (phase.control.edges - phase.t0) / (phase.tf - phase.t0)
-    return edges[:-1, None] + 0.5 * (1.0 + TAU) * np.diff(edges)[:, None], phase.controls_on_elements(TAU)
+    places, values = edges[:-1, None] + 0.5 * (1.0 + TAU) * np.diff(edges)[:, None], phase.controls_on_elements(TAU)
+    bounded = [(i, v) for i, v in enumerate(phase.control_variables) if v.span > 0 and not v.period]
+    return {v.name: (places, (values[:, :, i] - v.lower) / v.span) for i, v in bounded}
 
 
-def _on_bounds(phase: PhaseTrajectory, low: float, high: float) -> bool:
-    """Whether all controls are on their bounds on most of an arc of a phase, given relative to it."""
-    if any(v.period for v in phase.control_variables):
-        return False
-    places, values = _samples(phase)
-    spans = np.array([v.span or 1.0 for v in phase.control_variables])
-    on = (labels((values - [v.lower for v in phase.control_variables]) / spans) != INSIDE).all(axis=2)
-    there = (low < places) & (places < high)
-    return bool(there.any() and on[there].mean() >= MOSTLY)
+def _mostly(places: np.ndarray, values: np.ndarray) -> int:
+    """The bound on which a control is nearly all of the time; INSIDE if there is none."""
+    parts = stretches(places, values)
+    share = {side: sum(part.length for part in parts if part.label == side) for side in (LOWER, UPPER)}
+    side = max(share, key=lambda one: share[one])
+    return side if share[side] >= MOSTLY else INSIDE

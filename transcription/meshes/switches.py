@@ -16,8 +16,8 @@ LOWER, INSIDE, UPPER = -1, 0, 1
 """Labels of a stretch: on the lower bound, on none, on the upper bound."""
 ON_BOUND = 1e-2
 """A value is on a bound if it is nearer than this, in spans."""
-SMEARED = 2.25
-"""Elements over which a switch, or a pulse, may be smeared; what takes longer is an arc of its own."""
+SMEARED, PULSE = 1.25, 2.25
+"""Elements over which a switch, and a pulse, may be smeared; what takes longer is an arc of its own."""
 BRIEF = 0.1
 """Contact with a bound of less than so many elements, between two stretches inside, is a touch of one stretch."""
 HUMP = 0.25
@@ -105,14 +105,14 @@ def _passages(part: Stretch, t: np.ndarray, u: np.ndarray, before: int | None, a
     bound = after if before is None else before
     if bound is None:
         return []
-    if elements > SMEARED:
+    if elements > (SMEARED if after == -bound else PULSE):
         ends = [Switch(part.start, before, INSIDE, 0.5)] if before is not None else []
         return ends + ([Switch(part.end, INSIDE, after, 0.5)] if after is not None else [])
     distance = u if bound == LOWER else 1.0 - u
     away = min(float(np.trapezoid(distance, t)), part.length)
     certainty = 1.0 / max(1.0, elements)
-    if before is not None and after == -before:
-        return [Switch(part.end - away, before, after, certainty)]
+    if after == -bound:
+        return [Switch(part.end - away, bound, after, certainty)]
     if not distance.max() >= HUMP:
         return []
     if before is None:

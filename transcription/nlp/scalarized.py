@@ -20,8 +20,9 @@ from problems.derived import remembered
 from problems.peaks import refuse_peaks
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
-from ..stopping import stopping
+from ..stopping import Stopped, check_stopping, stopping
 from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, nlp_scales, origin, scaled_bounds, symbol
+from .watched import Watched
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
@@ -178,11 +179,11 @@ def scalarize(
         than minimised or bounded above.
     """
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
+    if stopping():
+        return _not_begun(nlp, start)
     task = _task(nlp, start, reference, weights, ceiling, margin)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
-    if stopping():
-        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     first = _unstuck(nlp, task, start, settings, ADAPTIVE)
@@ -193,6 +194,12 @@ def scalarize(
     second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
     best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
     return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
+
+
+def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
+    """The start itself, where the work is to end before IPOPT begins."""
+    F, violation = nlp.evaluate(start[None])
+    return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
 
 
 def _task(
@@ -243,7 +250,10 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    solver = _program(nlp, settings, strategy.options)
+    try:
+        solver = _program(nlp, settings, strategy.options)
+    except Stopped:
+        return _not_begun(nlp, start), False
     y = np.clip((start - origin(nlp)) / nlp.scale, *scaled_bounds(nlp))
     lower, upper, made_up = _box(nlp, y, strategy.radius)
     none = np.full(2 * len(task.used), -np.inf)
@@ -267,7 +277,7 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
         F, violation = nlp.evaluate(z[None])
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
-    return Solved(z, F[0], float(violation[0]), status, iterations, "Time" in outcome), stuck
+    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT), stuck
 
 
 def _box(nlp: NLP, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -288,7 +298,7 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
 
 
 @remembered
-def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> ca.Function:
+def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> Watched:
     """The program of `_parts` for IPOPT, with these settings and options."""
     parts, derivatives = _parts(nlp)
     options = ipopt_options(settings.seconds, settings.max_iterations) | {
@@ -298,7 +308,7 @@ def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], 
         "ipopt.nlp_scaling_method": "none",
         "ipopt.bound_relax_factor": 0.0,
     }
-    return ca.nlpsol("scalarized", "ipopt", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
+    return Watched("scalarized", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
 
 
 @remembered
@@ -314,6 +324,7 @@ def _parts(nlp: NLP) -> tuple[dict[str, Any], dict[str, ca.Function]]:
     rows = ca.vertcat(*blocks)
     # Block by block: a row of an integral is dense, and one sweep for many columns is lost where there is such a row among sparse ones.
     jacobian = ca.Function("jac_g", [x, p], [rows, ca.vertcat(*(ca.jacobian(block, x) for block in blocks))], ["x", "p"], ["g", "jac_g_x"])
+    check_stopping()
     lam_f, lam_g = symbol(nlp, "lam_f", 1), symbol(nlp, "lam_g", rows.numel())
     # The objective is linear.
     curvature = ca.triu(ca.hessian(ca.dot(lam_g, rows), x)[0])

@@ -33,17 +33,21 @@ class PhaseMesh:
     moving : sequence of int
         Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them. The edges between
         two of these, or one and an end of the phase, share the distance as they do here.
+    constant : mapping or pairs of a name and a sequence of int
+        Controls that have one value on some arcs: which of these, 0 to m, where m moving edges part m + 1 arcs.
 
     Raises
     ------
     ValueError
-        If the edges are not such, an order is no whole number of at least 0, or a moving edge is no inner one or given twice.
+        If the edges are not such, an order is no whole number of at least 0, a moving edge is no inner one, an arc none of these, or one of
+        them given twice.
     """
 
     edges: tuple[float, ...]
     order: int
     control_order: int | None = None
     moving: tuple[int, ...] = ()
+    constant: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         try:
@@ -58,12 +62,14 @@ class PhaseMesh:
         if self.control_order is not None:
             check_count("control_order of a mesh", self.control_order, 0)
             object.__setattr__(self, "control_order", int(self.control_order))
-        object.__setattr__(self, "moving", self._inner_edges(self.moving))
+        object.__setattr__(self, "moving", _indices("moving edges", self.moving, 1, self.elements - 1))
+        object.__setattr__(self, "constant", self._arcs(self.constant))
 
     def __repr__(self) -> str:
         controls = "" if self.control_order is None else f", controls of order {self.control_order}"
         moving = f", {len(self.moving)} of {self.elements - 1} inner edges moving" if self.moving else ""
-        return f"PhaseMesh({self.elements} elements of order {self.order}{controls}{moving})"
+        constant = "".join(f", {name} constant on {len(arcs)} of {len(self.moving) + 1} arcs" for name, arcs in self.constant)
+        return f"PhaseMesh({self.elements} elements of order {self.order}{controls}{moving}{constant})"
 
     @classmethod
     def uniform(cls, elements: int, order: int) -> PhaseMesh:
@@ -72,8 +78,8 @@ class PhaseMesh:
 
     @classmethod
     def of(cls, given: Any) -> PhaseMesh:
-        """From what a user writes, (edges, order) and perhaps control_order and moving, or a file, a mapping of these names. Raises
-        ValueError for anything else."""
+        """From what a user writes, (edges, order) and perhaps more, or a file, a mapping of these names. Raises ValueError for anything
+        else."""
         if isinstance(given, PhaseMesh):
             return given
         try:
@@ -106,6 +112,11 @@ class PhaseMesh:
         """Indices (m + 2,) of the moving edges and the two ends."""
         return (0, *self.moving, self.elements)
 
+    @property
+    def arcs(self) -> np.ndarray:
+        """The arc (N,) in which each element lies."""
+        return np.searchsorted(self.moving, np.arange(self.elements), side="right")
+
     def ranges(self) -> np.ndarray:
         """Bounds (m, 2) of the places of the moving edges, relative to the phase.
 
@@ -131,11 +142,11 @@ class PhaseMesh:
         return replace(self, edges=tuple(edges.tolist()))
 
     def with_elements(self, edges: Sequence[float], order: int, control_order: int | None) -> PhaseMesh:
-        """Other elements, and degrees on them, with the same moving edges. Raises ValueError if these are not among `edges`."""
+        """Other elements, and degrees on them, with the same moving edges and arcs. Raises ValueError if these are not among `edges`."""
         j = np.searchsorted(edges, [self.edges[k] - SHORTEST for k in self.moving])
         if any(k >= len(edges) or abs(edges[k] - self.edges[one]) > SHORTEST for k, one in zip(j, self.moving, strict=True)):
             raise ValueError("a moving edge of a mesh has to stay one of its edges")
-        return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()))
+        return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()), self.constant)
 
     def found_in(self, edges: np.ndarray) -> PhaseMesh:
         """This mesh as it lies in a trajectory of it, from the ends (N + 1,) of the trajectory's elements, in time: with its moving edges
@@ -152,21 +163,31 @@ class PhaseMesh:
         plain: dict[str, Any] = {"edges": list(self.edges), "order": self.order}
         if self.control_order is not None:
             plain["control_order"] = self.control_order
-        return plain | {"moving": list(self.moving)} if self.moving else plain
+        if self.moving:
+            plain["moving"] = list(self.moving)
+        return plain | {"constant": {name: list(arcs) for name, arcs in self.constant}} if self.constant else plain
 
-    def _inner_edges(self, given: Any) -> tuple[int, ...]:
-        """Indices of inner edges, sorted. Raises ValueError if they are not such, or one is given twice."""
-        if not isinstance(given, Iterable) or isinstance(given, str | bytes):
-            raise ValueError(f"moving edges of a mesh must be a sequence of their indices, not {given!r}")
-        indices = tuple(given)
-        for one in indices:
-            if isinstance(one, bool) or not isinstance(one, int | np.integer) or not 1 <= one < self.elements:
-                raise ValueError(
-                    f"a moving edge of a mesh of {self.elements} elements must be one of 1 to {self.elements - 1}, not {one!r}"
-                )
-        if len(set(indices)) < len(indices):
-            raise ValueError(f"moving edges of a mesh must differ, not {given!r}")
-        return tuple(sorted(map(int, indices)))
+    def _arcs(self, given: Any) -> tuple[tuple[str, tuple[int, ...]], ...]:
+        """The controls that are constant, sorted by name, and on which arcs. Raises ValueError if they are not such."""
+        try:
+            named = {str(name): arcs for name, arcs in dict(given).items()}
+        except (TypeError, ValueError):
+            raise ValueError(f"constant controls of a mesh must be a mapping of their names to arcs, not {given!r}") from None
+        arcs = {name: _indices(f"arcs on which '{name}' is constant", named[name], 0, len(self.moving)) for name in sorted(named)}
+        return tuple((name, those) for name, those in arcs.items() if those)
+
+
+def _indices(what: str, given: Any, least: int, most: int) -> tuple[int, ...]:
+    """Different whole numbers within a range, sorted. Raises ValueError if they are not such."""
+    if not isinstance(given, Iterable) or isinstance(given, str | bytes):
+        raise ValueError(f"{what} must be a sequence of whole numbers, not {given!r}")
+    indices = tuple(given)
+    for one in indices:
+        if isinstance(one, bool) or not isinstance(one, int | np.integer) or not least <= one <= most:
+            raise ValueError(f"{what} must be among {least} to {most}, not {one!r}")
+    if len(set(indices)) < len(indices):
+        raise ValueError(f"{what} must differ, not {given!r}")
+    return tuple(sorted(map(int, indices)))
 
 
 def as_meshes(given: Any) -> tuple[tuple[str, PhaseMesh], ...]:

@@ -185,7 +185,7 @@ def test_states_may_have_any_name(tmp_path):
     phase.dynamics(**dict.fromkeys(names, 1))
     problem.minimize("time", phase.tf)
     problem.maximize("end", phase.final(phase["node"]))
-    front = MACS().solve(problem, DFET(2, 1), evaluations=30, seed=1)
+    front = MACS(mesh="fixed").solve(problem, DFET(2, 1), evaluations=30, seed=1)
     front.save(tmp_path / "front.nc")
     assert_same(front, Front.load(tmp_path / "front.nc"))
     data = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group="a_b")

@@ -11,8 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights
 
-from macs.fronts.flight_plot import _dense
-from macs.fronts.style import blank_figure
+from macs.fronts.pictures.flight_plot import _dense
+from macs.fronts.pictures.style import blank_figure
 
 
 @pytest.fixture(autouse=True)
