@@ -15,7 +15,7 @@ from transcription.meshes.adaptation import next_method
 from transcription.meshes.knots import switched
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
@@ -199,7 +199,11 @@ class MeshLoop:
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
             for method, better in self._proposals(present, waiting, detours > 0):
-                reached, last = self._solved(method, present, task, others, least)
+                try:
+                    reached, last = self._solved(method, present, task, others, least)
+                except Stopped:
+                    # In the middle of it: the point stays on its best mesh so far.
+                    break
                 found.meshes.append(method)
                 if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
                     reached = None
