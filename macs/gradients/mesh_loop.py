@@ -18,7 +18,7 @@ from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objec
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, TIMEOUT
 from .multistart import GradientSolves
 from .tasks import Task
 
@@ -243,11 +243,14 @@ class MeshLoop:
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
-        nlp = self.programs(method)
-        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-        if status != CONVERGED:
-            return None, status
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        try:
+            nlp = self.programs(method)
+            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+            if status != CONVERGED:
+                return None, status
+            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        except Stopped:
+            return None, TIMEOUT
         return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
 
     def _from_starts(
