@@ -12,8 +12,8 @@ from ..numerics.periodic import unwrapped_law, wrapped_controls
 
 
 def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, paths where they are to be equal to something,
-    peaks, controls at both ends, sizes)."""
+    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, the same at the nodes of equalities, peaks,
+    controls at both ends, sizes)."""
     nx, nu = len(phase.states), len(phase.controls)
     X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
     left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
