@@ -256,7 +256,7 @@ class _Job:
                 self.begin(found)
             front = work()
             self._stopped = interrupts.reason
-            front = front.replace(stats=self._stats()).verify(verify)
+            front = front.replace(stats=front.stats | self._stats()).verify(verify)
             return front if self.fixed or verify is None else Front.of(again(front))
 
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
