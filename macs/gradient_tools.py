@@ -261,7 +261,7 @@ class _Job:
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             front = work()
             self._stopped = interrupts.reason
-            front = front.replace(stats=self._stats()).verify(verify)
+            front = front.replace(stats=front.stats | self._stats()).verify(verify)
             return front if self.fixed or verify is None else Front.of(again(front))
 
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
