@@ -278,8 +278,35 @@ def test_a_control_that_leaves_its_bound_gradually_is_no_optimum():
     assert worse.status == "converged" and worse.F[0] > 7580
 
 
+def flown(edges, moving, coefficients, places, constant=()):
+    """A method for the moon landing, and a trajectory of it: thrust by Bernstein coefficients of degree 2, moving edges at `places`."""
+    problem, *_ = moon_landing()
+    method = DFET(2, 2, basis="bernstein", mesh={"fall": PhaseMesh(edges, 4, 2, moving, constant)})
+    nlp = method.transcribe(problem)
+    values = {f"fall.u[{j},{k}]": value for j, row in enumerate(coefficients) for k, value in enumerate(row)}
+    values |= {f"fall.u[arc {j}]": row[0] for j, row in enumerate(coefficients)} | {"fall.tf": 4.0}
+    values |= {f"fall.edge[{j}]": place for j, place in zip(moving, places, strict=True)}
+    return problem, method, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[values[nlp.variables[i].name] for i in nlp.free]])))[0])
+
+
+def test_an_edge_that_can_go_no_further_begins_anew():
+    off, full = [0.0, 0.0, 0.0], [3.0, 3.0, 3.0]
+    for held in ((), {"u": (0, 1)}):
+        problem, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.95], held)
+        mesh = switched(method, problem, flight).mesh_of("fall")
+        assert mesh.edges == pytest.approx((0, 0.95, 1), abs=1e-12) and mesh.constant == method.mesh_of("fall").constant
+    # Elsewhere it does not, and where a control comes near its bound slowly, the solver has chosen the place.
+    problem, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8])
+    assert switched(method, problem, flight) is None
+    problem, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, [3.0, 1.5, 0.0], off], [0.5])
+    (found,) = phase_switches(flight["fall"])["u"]
+    assert found.place == pytest.approx(0.625, abs=0.01) and switched(method, problem, flight) is None
+
+
 def test_moving_edges_stay_when_elements_are_cut():
     mesh = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,))
     assert mesh.with_elements((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None) == PhaseMesh((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None, (4,))
+    held = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,), {"u": (1,)})
+    assert held.with_elements((0, 0.3, 0.6, 0.8, 1), 3, 2) == PhaseMesh((0, 0.3, 0.6, 0.8, 1), 3, 2, (2,), {"u": (1,)})
     with pytest.raises(ValueError, match="has to stay"):
         mesh.with_elements((0, 0.3, 0.61, 1), 4, None)
