@@ -68,20 +68,21 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
-    Z = np.array([one.z for one in solved if one.status == CONVERGED]).reshape(-1, len(nlp.variables))
+    own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
+    Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
     job.go()
     counts = solver.counts.joined(job.solves.counts)
     fine = [found.best.method for found in job.found.values()]
-    return (_common(fine, problem) if fine and not _enough(ends, job, limits) else COARSE), counts
+    return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
 
 
-def _enough(ends: Points, job: FrontRefinement, limits: float) -> bool:
-    """Whether a simulation confirms the ends on the coarse mesh, and finer ones changed nothing."""
-    moved = [np.abs(found.best.F - ends.F[i]) / job.units for i, found in job.found.items()]
-    return bool(verified(ends, limits).verified.all()) and (not moved or float(np.max(moved)) <= limits)
+def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:
+    """Whether a simulation confirms the ends on the coarse mesh, and finer ones changed nothing in the objectives that are their own."""
+    moved = [abs(found.best.F[own[i]] - ends.F[i, own[i]]) / job.units[own[i]] for i, found in job.found.items()]
+    return bool(verified(ends, limits).verified.all()) and max(moved, default=0.0) <= limits
 
 
 def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Transcription:

@@ -15,10 +15,10 @@ from transcription.meshes.adaptation import next_method
 from transcription.meshes.knots import switched
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, TIMEOUT
 from .multistart import GradientSolves
 from .tasks import Task
 
@@ -199,7 +199,11 @@ class MeshLoop:
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
             for method, better in self._proposals(present, waiting, detours > 0):
-                reached, last = self._solved(method, present, task, others, least)
+                try:
+                    reached, last = self._solved(method, present, task, others, least)
+                except Stopped:
+                    # In the middle of it: the point stays on its best mesh so far.
+                    break
                 found.meshes.append(method)
                 if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
                     reached = None
@@ -239,11 +243,14 @@ class MeshLoop:
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
-        nlp = self.programs(method)
-        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-        if status != CONVERGED:
-            return None, status
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        try:
+            nlp = self.programs(method)
+            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+            if status != CONVERGED:
+                return None, status
+            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        except Stopped:
+            return None, TIMEOUT
         return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
 
     def _from_starts(
