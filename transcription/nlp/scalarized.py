@@ -192,7 +192,10 @@ def scalarize(
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return _not_begun(nlp, start)
-    task = _task(nlp, start, reference, weights, ceiling, margin)
+    try:
+        task = _task(nlp, start, reference, weights, ceiling, margin)
+    except Stopped:  # while derivatives were built
+        return _not_begun(nlp, start)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
