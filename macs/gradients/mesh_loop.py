@@ -32,7 +32,7 @@ PROGRESS = 0.5
 """The error falls at least to this fraction where there is progress."""
 DETOURS = 4
 """Number of other meshes that are tried for a point where solves fail."""
-BLUNT = 1e-4
+BLUNT = 1e-3
 """Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
 DRIFT = 1e-2
 """If a point gets worse by more than this, in units, other starts are tried too."""
@@ -251,7 +251,9 @@ class MeshLoop:
             reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
         except Stopped:
             return None, TIMEOUT
-        return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
+        # On the same mesh nothing can be seen of what that has wrong.
+        same = method == present.method
+        return replace(reached, change=np.inf if same else _change(present, F, task, self.wanted.settled)), status
 
     def _from_starts(
         self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
