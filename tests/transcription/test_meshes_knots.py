@@ -164,6 +164,19 @@ def test_nothing_is_proposed_where_nothing_switches_or_moves():
     assert phase_switches(crude.trajectory["fall"])["u"] and switched(Euler(20), landing, crude.trajectory) is None
 
 
+def test_a_phase_of_no_length_and_one_that_switches():
+    problem, *_ = moon_landing()
+    wait = problem.phase("wait", t0=0.0, tf=(0.0, 5.0))
+    x, u = wait.state("x", bounds=(-1, 1), initial=0), wait.control("u", bounds=(0, 1))
+    wait.dynamics(x=u)
+    problem.constraint("no time", wait.tf, upper=0.0)
+    method = DFET(6, 4)
+    point = optimize(problem, method)
+    assert point.trajectory["wait"].tf == 0.0 and x is not None
+    proposed = switched(method, problem, point.trajectory)
+    assert list(proposed.meshes) == ["fall"] and len(proposed.mesh_of("fall").moving) == 1
+
+
 def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
     mesh = PhaseMesh.uniform(4, 3)
     found = {
@@ -202,7 +215,7 @@ def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, b
     mesh = with_knots(PhaseMesh(edges, order), places.tolist(), {"u": bang})
     assert [mesh.edges[j] for j in mesh.moving] == places.tolist()
     assert mesh.order == max(order, 4) and mesh.control_order == mesh.order - 2
-    assert mesh.elements <= len(widths) + len(places) + 1
+    assert mesh.elements <= len(widths) + (len(places) + 1) + (2 * (len(places) + 1 - len(bang)) if bang else 0)
     assert mesh.constant == ((("u", tuple(bang)),) if bang else ())
     again = with_knots(mesh, places.tolist(), {"u": range(len(places) + 1)})
     assert np.allclose(again.edges, mesh.edges) and (again.order, again.control_order) == (mesh.order, mesh.control_order)
@@ -212,10 +225,10 @@ def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, b
         assert length <= np.diff(edges).max() * (1.5 if few else 2.5) + 1e-12
 
 
-def test_long_arcs_of_constant_controls_have_half_the_elements():
+def test_long_arcs_of_constant_controls_have_half_the_elements_and_others_two_more():
     mesh = with_knots(PhaseMesh.uniform(40, 3), [0.25, 0.35], {"u": [0, 1], "v": [0, 1, 2]})
-    assert np.bincount(mesh.arcs).tolist() == [5, 4, 26]
-    assert np.bincount(with_knots(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 26]
+    assert np.bincount(mesh.arcs).tolist() == [5, 4, 28]
+    assert np.bincount(with_knots(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 28]
 
 
 def test_controls_are_constant_where_they_are_on_bounds():

@@ -32,9 +32,9 @@ PRESSED = 0.01
 ORDER, LESS = 4, 2
 """Least degree of the states on a mesh with knots, and how much lower the degree of the controls is. On singular arcs, where controls enter
 linearly and hardly matter, those of the degree of the states oscillate; two degrees lower they do not."""
-ENOUGH = 4
+ENOUGH, MORE = 4, 2
 """An arc on which all controls are constant keeps so many elements of the mesh before, but of more only half, if that is more: nothing but
-the states has to be described there."""
+the states has to be described there. Other arcs of controls that switch get so many more: there they are of a lower degree than before."""
 MOSTLY = 0.9
 """Share of a phase on which a control without switches is on a bound, to count as being there."""
 
@@ -47,8 +47,8 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
     went, and edges that could move no further, begin anew; once they stay, all controls are free, so that an arc on which none should be
     constant shows. Called with what that method found: None, unless there are other switches now.
 
-    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, and fewer where all controls
-    are on bounds. Not every proposal is better: compare.
+    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, or finer, and fewer where
+    all controls are on bounds. Not every proposal is better: compare.
 
     Parameters
     ----------
@@ -72,6 +72,8 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
 
 def next_mesh(method: Meshed, statement: CompiledPhase, phase: PhaseTrajectory, parameters: np.ndarray) -> PhaseMesh | None:
     """The mesh of one phase that `switched` proposes, if any; `parameters` are those of the problem."""
+    if not phase.tf > phase.t0:
+        return None
     given = method.mesh_of(phase.name)
     mesh = given.found_in(phase.state.edges)
     known = np.array(mesh.edges)[list(mesh.moving)]
@@ -190,16 +192,17 @@ def with_knots(mesh: PhaseMesh, places: Sequence[float], constant: Mapping[str, 
     """A mesh with moving edges at `places`; between these, controls are `constant` on arcs.
 
     Each arc has as many elements as the mesh has there, spread likewise. Where the mesh has no moving edges, its degrees become those of a
-    mesh with knots, and arcs on which all controls are constant have fewer.
+    mesh with knots, arcs on which all controls are constant have fewer elements, and the others more, if any are constant anywhere.
     """
-    first = not mesh.moving
+    first, switching = not mesh.moving, any(len(arcs) for arcs in constant.values())
     index = np.arange(mesh.elements + 1.0)
     ends = np.interp([0.0, *places, 1.0], mesh.edges, index)
     edges, moving = [0.0], []
     for j, ((low, high), end) in enumerate(zip(pairwise(ends), [*places, 1.0], strict=True)):
         bang = bool(constant) and all(j in arcs for arcs in constant.values())
         count = max(1, round(high - low))
-        count = max(min(count, ENOUGH), round(0.5 * count)) if bang and first else count
+        if first:
+            count = max(min(count, ENOUGH), round(0.5 * count)) if bang else count + (MORE if switching else 0)
         edges += [*np.interp(np.linspace(low, high, count + 1)[1:-1], index, mesh.edges).tolist(), end]
         moving.append(len(edges) - 1)
     order = max(mesh.order, ORDER) if first else mesh.order
