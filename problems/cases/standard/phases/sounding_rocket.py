@@ -1,6 +1,6 @@
 """Sounding rocket: Goddard's rocket in three phases, full thrust, a singular arc and none, each with what is known of it.
 
-Bryson and Ho, "Applied Optimal Control", 1975, section 8.3 and problems; Betts 2010, section 4.14; with the data of YAPSS, in feet and
+Bryson and Ho, "Applied Optimal Control", 1975, section 8.3 and problems; Betts 2010, chapter 4; with the data of YAPSS, in feet and
 slugs.
 """
 

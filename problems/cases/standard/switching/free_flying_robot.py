@@ -19,7 +19,7 @@ PUBLISHED = (
         "fuel",
         7.688928196,
         1e-8,
-        "nine arcs of full thrust, half of it and none, integrated: see tests; Betts 2010: 7.910154646",
+        "nine arcs of full thrust, half of it and none, integrated: see tests; Betts 2010: 7.91015",
         local=(7.910147051,),
         remark="the optimum of the literature is symmetric in time, and a local one",
     ),
