@@ -51,8 +51,8 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
     )
 
 
-def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
-    """Optimality of vectors (k, n), for objectives in `ranges` (m,); None for those left when the work is asked to end early."""
+def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> list[float | None]:
+    """Optimality of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left when the work is to end."""
     return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
 
 

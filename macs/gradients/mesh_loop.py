@@ -15,10 +15,10 @@ from transcription.meshes.adaptation import next_method
 from transcription.meshes.knots import switched
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, TIMEOUT
 from .multistart import GradientSolves
 from .tasks import Task
 
@@ -147,19 +147,19 @@ class MeshLoop:
     wanted : Wanted
     limit : int
         Largest number of meshes for each point.
-    most_solves : int, optional
-        Number of gradient solves, of those that `solves` counts, after which no new mesh is begun.
+    most_work : float, optional
+        Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
     """
 
-    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_solves: int | None = None) -> None:
-        self.programs, self.solves, self.wanted, self.limit, self.most_solves = programs, solves, wanted, limit, most_solves
+    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_work: float | None = None) -> None:
+        self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
     @property
     def ended(self) -> bool:
         """Whether no new mesh is to be begun."""
-        return stopping() or (self.most_solves is not None and self.solves.counts.gradient_solves >= self.most_solves)
+        return stopping() or (self.most_work is not None and self.solves.work >= self.most_work)
 
     def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
@@ -199,7 +199,11 @@ class MeshLoop:
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
             for method, better in self._proposals(present, waiting, detours > 0):
-                reached, last = self._solved(method, present, task, others, least)
+                try:
+                    reached, last = self._solved(method, present, task, others, least)
+                except Stopped:
+                    # In the middle of it: the point stays on its best mesh so far.
+                    break
                 found.meshes.append(method)
                 if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
                     reached = None
@@ -239,11 +243,14 @@ class MeshLoop:
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
-        nlp = self.programs(method)
-        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-        if status != CONVERGED:
-            return None, status
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        try:
+            nlp = self.programs(method)
+            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+            if status != CONVERGED:
+                return None, status
+            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        except Stopped:
+            return None, TIMEOUT
         return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
 
     def _from_starts(

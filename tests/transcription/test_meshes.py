@@ -134,7 +134,7 @@ def test_quadrature_is_held_against_the_flight():
     z = nlp.interpolate(flight)
     F = nlp.evaluate(z[None])[0][0]
     verdict = judge(nlp.problem, flight, Wanted(1e-6, 1e-6), F, np.ones(1))
-    assert found.defect.max() < 1e-10 and found.integral.sum() == pytest.approx(1.0)
+    assert found.defect.max() < 1e-10 and found.sums.sum() == pytest.approx(1.0)
     assert verdict.missed_by_elements == pytest.approx(abs(F[0] - exact), rel=1e-6) and verdict.missed_by_elements > 0.01
     assert "objectives differ" in " ".join(verdict.complaints())
     finer = next_method(nlp.transcription, verdict, flight)
@@ -142,6 +142,20 @@ def test_quadrature_is_held_against_the_flight():
     fine = judge(nlp.problem, flight, Wanted(1e-6, 1e-6), np.array([exact]), np.ones(1))
     confirming = next_method(nlp.transcription, fine, flight).mesh_of("run")
     assert confirming.elements >= 2 and confirming.order > 1, "where nothing is wrong, a mesh that has all of this one, and more"
+
+
+def test_a_peak_between_nodes_asks_for_its_element():
+    problem = Problem("hump")
+    phase = problem.phase("run", t0=0, tf=1)
+    x = phase.state("x", bounds=(0, 3), initial=0)
+    phase.dynamics(x=1)
+    problem.minimize("peak", phase.peak(ca.exp(-((20 * (x - 0.32)) ** 2))))
+    nlp = DFET(4, 1).transcribe(problem)
+    z = nlp.tighten(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))[0]
+    verdict = assessed(nlp, z)
+    assert verdict.missed_by_elements > 0.1 and errors(nlp, nlp.unpack(z)).sums.tolist() == [0.0, 1.0, 0.0, 0.0]
+    finer = next_method(nlp.transcription, verdict, nlp.unpack(z)).mesh_of("run")
+    assert finer.elements > 4 and set(np.linspace(0, 1, 5)) - set(finer.edges) <= {0.75}, "nothing but the second one is cut"
 
 
 def test_controls_that_switch_are_found():

@@ -34,7 +34,7 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
     apart = method.orders_controls and degree < old.order and bool(trajectory.control_variables)
     # Controls whose degree is that of the states get a higher one with them.
     rate = errors.rate if apart else np.minimum(errors.rate, errors.control_rate)
-    rate = np.where(scores.integrals > scores.states, np.minimum(rate, errors.integrand_rate), rate)
+    rate = np.where(scores.sums > scores.states, np.minimum(rate, errors.integrand_rate), rate)
     poor = scores.controls >= min(1.0, WORST_SHARE * scores.all.max(initial=0.0))
     smooth = np.isnan(errors.steep) & (errors.control_rate >= SMOOTH)
     # Where a higher degree of the controls alone mends what is wrong, elements need not be cut for it.

@@ -10,7 +10,7 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from ..numerics.polynomials import gauss_legendre, legendre_coefficients
-from ..trajectories.limits import DENSE, excess_by_element
+from ..trajectories.limits import DENSE, excess_by_element, paths_and_peaks
 from ..trajectories.simulate import Simulation
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
 from .scales import control_scales, state_scales
@@ -32,9 +32,9 @@ class PhaseErrors:
     defect : array (N,)
         Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with its
         controls, in scales; infinite where the integration breaks down.
-    integral : array (N,)
-        Share of each element in the error of the integrals, as a quadrature with a node more than the degree of the states would have it;
-        0 where none has any.
+    sums : array (N,)
+        Share of each element in the error of integrals, as a quadrature with a node more than the degree of the states would have it, or in
+        that of peaks, by which these are higher between the nodes than at any node; 0 where there is none.
     excess : array (N,)
         How far states and path constraints leave their limits between nodes, in the scales of these.
     leaving : array (N,)
@@ -47,13 +47,13 @@ class PhaseErrors:
     rate, control_rate : array (N,)
         How fast Legendre coefficients of the states, and of the controls, decay: by a factor exp(-rate) with each degree, at the slowest.
     integrand_rate : array (N,)
-        The same for integrands.
+        The same for integrands; 0 where a peak is higher between the nodes: there elements are to be shorter.
     steep : array (N,)
         Where a control is steepest or leaves a bound, in (-1, 1), if it does so much more than elsewhere on the element; else NaN.
     """
 
     defect: np.ndarray
-    integral: np.ndarray
+    sums: np.ndarray
     excess: np.ndarray
     leaving: np.ndarray
     tail: np.ndarray
@@ -77,16 +77,17 @@ def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseT
     nothing = np.zeros(len(values))
     controls, states = _coefficients(trajectory)
     share, integrand_rate = _quadrature(phase, trajectory, parameters)
+    peaks = _peak_shares(phase, trajectory, parameters)
     return PhaseErrors(
         defect=_local_defects(trajectory, simulated),
-        integral=share,
+        sums=np.maximum(share, peaks),
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
         tail=_tails(controls),
         weight=_weights(trajectory),
         rate=decay_rates(states),
         control_rate=decay_rates(controls),
-        integrand_rate=integrand_rate,
+        integrand_rate=np.where(peaks > 0.0, 0.0, integrand_rate),
         steep=np.array([_steepest(one, phase.controls, scales) for one in values]),
     )
 
@@ -99,7 +100,7 @@ def _local_defects(trajectory: PhaseTrajectory, simulated: PhaseTrajectory) -> n
 
 
 def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """See `PhaseErrors.integral` and `PhaseErrors.integrand_rate`."""
+    """Shares (N,) in the error of integrals, and `PhaseErrors.integrand_rate`."""
     s = np.array([trajectory.t0, trajectory.tf, *parameters])
     nodes = trajectory.state.coefficients.shape[1]
     (few, _), (many, values) = (_integrals(phase, trajectory, s, count) for count in (nodes, 2 * nodes + 4))
@@ -108,7 +109,25 @@ def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: n
     error = np.where(np.isfinite(error), error, 0.0)
     size = np.abs(values).max(axis=(0, 1))
     rate = decay_rates(legendre_coefficients(np.nan_to_num(values / np.where(size > 0, size, 1.0))))
-    return error / max(error.sum(), np.finfo(float).tiny), rate
+    return _shares(error), rate
+
+
+def _peak_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
+    """Shares (N,) in the error of peaks."""
+    s = np.array([trajectory.t0, trajectory.tf, *parameters])
+    times = trajectory.state.times(DENSE)
+    x, u = (
+        values.reshape(times.size, values.shape[2])
+        for values in (trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE))
+    )
+    between = paths_and_peaks(phase, x, u, times.ravel(), s)[1].reshape(*times.shape, -1)
+    at_nodes = paths_and_peaks(phase, trajectory.states, trajectory.controls, trajectory.time, s)[1]
+    higher = np.maximum(between.max(axis=1) - at_nodes.max(axis=0), 0.0) / np.maximum(np.abs(at_nodes).max(axis=0), np.finfo(float).tiny)
+    return _shares(np.nan_to_num(higher.max(axis=1, initial=0.0)))
+
+
+def _shares(errors: np.ndarray) -> np.ndarray:
+    return errors / max(errors.sum(), np.finfo(float).tiny)
 
 
 def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:

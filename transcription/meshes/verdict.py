@@ -74,7 +74,7 @@ class Verdict:
     missed : float
         Largest difference between the simulated objectives and those of the mesh, in their units.
     missed_by_elements : float
-        The same for the simulation of each element by itself: the error of the quadrature.
+        The same for the simulation of each element by itself: the error of quadratures and of peaks between nodes.
     growth : float
         How much errors grow along the trajectory, where that was worth finding out; else 1.
     narrow : float
@@ -170,7 +170,7 @@ class Verdict:
             controls = phase.weight * phase.tail**2 * count / wanted.settled
             sums = np.zeros(len(states))
             if not self.missed_by_elements <= SAFETY * wanted.settled:
-                sums = phase.integral * count * self.missed_by_elements / (SAFETY * wanted.settled)
+                sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
             found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))
         return found
 
@@ -189,16 +189,16 @@ class Verdict:
 @dataclass(frozen=True, eq=False)
 class ElementScores:
     """Errors (N,) of the elements of a phase in units of what they may be: of states and limits; of controls that polynomials of their
-    degree describe poorly; of integrals."""
+    degree describe poorly; of integrals and peaks."""
 
     states: np.ndarray
     controls: np.ndarray
-    integrals: np.ndarray
+    sums: np.ndarray
 
     @property
     def others(self) -> np.ndarray:
         """All but those of controls."""
-        return np.maximum(self.states, self.integrals)
+        return np.maximum(self.states, self.sums)
 
     @property
     def all(self) -> np.ndarray:
