@@ -275,10 +275,14 @@ def test_fishing_with_three_arcs():
 
 
 def test_a_flight_of_less_fuel_than_the_published_one():
-    """Nine arcs of the free-flying robot, and the nine symmetric ones of the literature, whose fuel is that of Betts."""
+    """Nine arcs of the free-flying robot, and the nine symmetric ones of the literature, whose fuel is that of Betts.
+
+    The former are not quite the optimum, whose sixth arc is singular.
+    """
+    assert value("free_flying_robot") < 7.688928196 and published("free_flying_robot")[0].met(7.688928196)
     right = {1: (1, 0), 0: (0, 0), -1: (0, 1)}
     flights = {
-        published("free_flying_robot")[0].value: (
+        7.688928196: (
             [(1, 1), (1, 0), (0, 0), (-1, 0), (0, 0), (0, 1), (0, 0), (0, -1), (1, -1)],
             [0.5249, 1.3652, 1.1554, 3.0168, 0.1705, 0.3028, 3.6994, 1.5755, 0.1894],
         ),
@@ -296,7 +300,7 @@ def test_a_flight_of_less_fuel_than_the_published_one():
 
         # The lengths are known to four digits: the nearest ones that end where they should cost the same to the second order.
         durations = np.array(durations)
-        for _ in range(4):
+        for _ in range(3):
             slopes = np.column_stack([(missed(durations + 1e-6 * e) - missed(durations)) / 1e-6 for e in np.eye(9)])
             durations = durations - np.linalg.pinv(slopes) @ missed(durations)
         assert np.abs(missed(durations)).max() < 1e-8 and (durations > 0).all()
