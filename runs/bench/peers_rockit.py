@@ -6,7 +6,6 @@ from math import pi
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 
 def _solved(ocp: Any, objective: Any, elements: int) -> float:
@@ -74,7 +73,7 @@ def isoperimetric() -> float:
         ocp.subject_to(ocp.integral(state) == 0)
     # The circle may be begun anywhere.
     ocp.subject_to(ocp.at_t0(angle) == 0)
-    ocp.set_initial(angle, -2 * pi * np.linspace(0, 1, 41))
+    ocp.set_initial(angle, -2 * pi * ocp.t)
     return -_solved(ocp, -ocp.integral((y * ux - x * uy) / 2), 40)
 
 
