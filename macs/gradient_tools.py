@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
-from itertools import product
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,18 +18,26 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
-from transcription.base import Transcription, check_freedom, check_problem
+from transcription.base import Meshed, Transcription, check_freedom, check_problem
+from transcription.meshes.verdict import Wanted
 from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
+from transcription.stopping import Stopped
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import nearest_violation, vectors_points
-from .fronts.points import Point
+from .fronts.builders import certificates, nearest_violation, no_points, vectors_points
+from .fronts.points import Point, Points
 from .fronts.provenance import costs
-from .gradients.multistart import MultistartSolver
-from .pareto.directions import divisions_below, simplex_lattice
+from .fronts.verified import VERIFY, check_verify
+from .gradients.first_mesh import default_transcription, search_transcription
+from .gradients.found_mesh import COARSE, found_optimum
+from .gradients.mending import MESHES, PART, mended, solved_again
+from .gradients.mesh_loop import MeshLoop, Programs
+from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
+from .gradients.targets import METHODS, check_points, targets
+from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
@@ -42,20 +51,26 @@ NO_RANGE, NOTHING = 1e-8, 1e-10
 
 def optimize(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     objective: str | None = None,
     start: Any = None,
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool | None = None,
 ) -> Point:
     """The local optimum of one objective; the others are ignored.
 
     Parameters
     ----------
     problem : Problem
-    transcription : Transcription
+    transcription : Transcription, optional
+        Default: the problem's own, or DFET on a coarse mesh; points that are not verified there are then solved again on meshes of their
+        own. On a transcription that is given, points are only marked.
     objective : str, optional
         Name of the objective. Default: the first one.
     start : Front, Points or array (k, n), optional
@@ -66,40 +81,53 @@ def optimize(
         Seed of the random starts. None draws one, which is recorded in `stats`.
     tolerance : float
         Largest scaled residual of a feasible point.
+    verify : float, optional
+        How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: it is not simulated.
+    max_iterations : int
+        Most iterations of IPOPT in one strategy of a solve.
+    time_limit : float, optional
+        Seconds after which the work ends with its results so far, as it does after Ctrl-C.
+    progress : bool, optional
+        Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
     Returns
     -------
     Point
-        With its `optimality`. If no solve converged, the least infeasible point, with its status.
+        With its `optimality`, simulated. If no solve converged, the least infeasible point, with its status.
 
     Raises
     ------
     ValueError
         If the problem is not stated correctly, an argument is not valid, or a peak is neither minimised nor bounded above; before any work.
     """
-    job = _Job("optimize", problem, transcription, start, starts, seed, tolerance, objective=objective)
-    names = [goal.name for goal in job.nlp.problem.goals]
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("optimize", problem, transcription, terms, objective=objective)
+    names = [goal.name for goal in job.problem.goals]
     if objective is not None and objective not in names:
         raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
     i = 0 if objective is None else names.index(objective)
     reference = np.where(np.arange(len(names)) == i, 0.0, np.inf)
-    return job.front([job.solver.solve(reference, np.eye(len(names))[i])], None)[0]
+    return job.optimum(reference, np.eye(len(names))[i])[0]
 
 
 def payoff(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     start: Any = None,
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool | None = None,
 ) -> Front:
     """The ends of the front: for each objective its best value, and for that the best values of the others, in their order.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
         As for `optimize`.
 
     Returns
@@ -112,14 +140,19 @@ def payoff(
     ValueError
         As for `optimize`.
     """
-    job = _Job("payoff", problem, transcription, start, starts, seed, tolerance)
-    ends = job.ends()
-    return job.front(ends, job.ranges(ends), sort=False)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("payoff", problem, transcription, terms)
+
+    def work() -> Front:
+        ends = job.ends()
+        return job.front(ends, job.ranges(ends), sort=False)
+
+    return job.run(work, solved_again)
 
 
 def sweep(
     problem: Problem | CompiledProblem,
-    transcription: Transcription,
+    transcription: Transcription | None = None,
     *,
     points: int,
     method: str = "pascoletti-serafini",
@@ -127,12 +160,16 @@ def sweep(
     starts: int = 1,
     seed: int | None = 0,
     tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool | None = None,
 ) -> Front:
     """A front by gradient solves along it, each from the best point found before.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
         As for `optimize`; each point is solved from so many `starts`.
     points : int
         Number of points, the ends included; with three or more objectives, the largest number.
@@ -154,44 +191,112 @@ def sweep(
     check_count("points", points, 2)
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; there are {', '.join(METHODS)}")
-    job = _Job("sweep", problem, transcription, start, starts, seed, tolerance, points=int(points), method=method)
-    check_points(points, len(job.nlp.problem.goals))
-    for _ in range(ROUNDS):
-        ends = job.ends()
-        if any(end.status != CONVERGED for end in ends):
-            return job.sifted(ends)
-        found = job.along(targets(np.array([end.F for end in ends]), job.ranges(ends), points, method))
-        if not job.surpassed(ends, found):
-            break
-    return job.sifted([*ends, *found], job.ranges(ends))
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
+    check_points(points, len(job.problem.goals))
+    return job.run(lambda: job.swept(points, method), partial(mended, time_limit=None, progress=None))
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The arguments that all gradient tools have; see `optimize`."""
+
+    start: Any
+    starts: int
+    seed: int | None
+    tolerance: float
+    verify: float | None
+    max_iterations: int
+    time_limit: float | None
+    progress: bool | None
+
+    def __post_init__(self) -> None:
+        check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
+        check_count("starts", self.starts, 1)
+        check_count("max_iterations", self.max_iterations, 1)
+        check_verify(self.verify)
 
 
 class _Job:
     """One call of a gradient tool: its NLP, its solver, and the front made of its results."""
 
     def __init__(
-        self,
-        name: str,
-        problem: Problem | CompiledProblem,
-        transcription: Transcription,
-        start: Any,
-        starts: int,
-        seed: int | None,
-        tolerance: float,
-        **settings: Any,
+        self, name: str, problem: Problem | CompiledProblem, transcription: Transcription | None, terms: Terms, **settings: Any
     ) -> None:
-        check_run(1, seed, tolerance, None, None, None)
-        check_count("starts", starts, 1)
         check_problem(problem, transcription)
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
-        refuse_peaks(compiled)
-        self.nlp = transcription.transcribe(compiled)
-        check_freedom(self.nlp)
-        self._seed = secrets.randbits(63) if seed is None else int(seed)
-        given = beginning(start, self.nlp)
+        self._statement, self.problem = problem, problem.compile()
+        refuse_peaks(self.problem)
+        self._terms, self.fixed = terms, transcription is not None
+        self._seed = secrets.randbits(63) if terms.seed is None else int(terms.seed)
+        self._rng = np.random.default_rng(self._seed)
+        self._about = {"name": name, "settings": {**settings, "starts": int(terms.starts)}}
+        self._stopped = ""
+        self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
-        self.solver = MultistartSolver(self.nlp, given, int(starts), np.random.default_rng(self._seed), float(tolerance))
-        self._about = {"name": name, "settings": {**settings, "starts": int(starts)}}
+        if transcription is not None:
+            self.begin(transcription)
+
+    def begin(self, transcription: Transcription) -> None:
+        """Work on this transcription from now on."""
+        self.nlp = transcription.transcribe(self.problem)
+        check_freedom(self.nlp)
+        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), int(self._terms.starts), self._rng, self.solves)
+
+    def run(self, work: Callable[[], Front], again: Callable[[Points], Points]) -> Front:
+        """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
+
+        Within, the time limit and Ctrl-C ask the work to end, and its progress is shown. Unless the transcription was given, points that
+        are not verified are solved again by `again`.
+        """
+        verify = self._terms.verify
+        with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
+            self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
+            try:
+                if not self.fixed:
+                    found, costs_so_far = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
+                    self.solves.counts = costs_so_far
+                    self.begin(found)
+            except Stopped as reason:
+                self._stopped = str(reason)
+                return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
+            front = work()
+            self._stopped = interrupts.reason
+            front = front.replace(stats=front.stats | self._stats()).verify(verify)
+            return front if self.fixed or verify is None else Front.of(again(front))
+
+    def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
+        """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is
+        found for it."""
+        if self.fixed:
+            return self.run(lambda: self.front([self.solver.solve(reference, weights)], None), solved_again)
+        terms, verify = self._terms, self._terms.verify
+        limits = PART * (verify or VERIFY)
+        own = default_transcription(self._statement)
+        coarse = [own, *COARSE] if isinstance(own, Meshed) else COARSE
+        with working(terms.time_limit, terms.progress) as (show, interrupts):
+            self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
+            loop = MeshLoop(Programs(self.problem), self.solves, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+            try:
+                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), int(terms.starts), self._rng, coarse)
+            except Stopped as reason:
+                words = f"{self._about['name']}: {reason} before the first solve"
+                raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
+            self._stopped = interrupts.reason
+            points = vectors_points(
+                found.nlp, found.z[None], self._about, self._stats(), notes=[found.note], optimality=[optimality(found.nlp, found.z)]
+            )
+            return Front.of(points).verify(verify)
+
+    def swept(self, points: int, method: str) -> Front:
+        """The front of a sweep; its ends alone if one of them was not found."""
+        for _ in range(ROUNDS):
+            ends = self.ends()
+            if any(end.status != CONVERGED for end in ends):
+                return self.sifted(ends)
+            found = self.along(targets(np.array([end.F for end in ends]), self.ranges(ends), points, method))
+            if not self.surpassed(ends, found):
+                break
+        return self.sifted([*ends, *found], self.ranges(ends))
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
@@ -254,76 +359,17 @@ class _Job:
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
         """The results as a front, with their optimality; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
-        certificates = [optimality(self.nlp, z, ranges) for z in Z]
-        stats = costs(
-            self.solver.counts,
+        optimal = certificates(self.nlp, Z, ranges)
+        status = [solved.status for solved in found]
+        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, optimality=optimal, **more))
+
+    def _stats(self) -> dict[str, Any]:
+        counts = self.solves.counts
+        return costs(
+            counts,
             wall_time=time.perf_counter() - self._began,
             seed=self._seed,
-            tolerance=self.solver.tolerance,
-            reproducible=not self.solver.counts.clocked,
+            tolerance=self.solves.tolerance,
+            reproducible=not (counts.clocked or self._stopped),
+            **({"stopped": self._stopped} if self._stopped else {}),
         )
-        status = [solved.status for solved in found]
-        return Front.of(vectors_points(self.nlp, Z, self._about, stats, status=status, optimality=certificates, **more))
-
-
-METHODS = ("pascoletti-serafini", "epsilon")
-
-
-Task = tuple[np.ndarray, np.ndarray]
-"""Reference and weights, as `transcription.nlp.scalarized.scalarize` takes them."""
-
-
-def check_points(points: int, m: int) -> None:
-    """Raise ValueError if so many points are too few for a front of m objectives."""
-    if m == 1:
-        raise ValueError("a problem with one objective has no front to sweep; use optimize")
-    if points < m:
-        raise ValueError(f"points must be at least {m}, one for each objective, not {points}")
-
-
-def targets(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> list[Task]:
-    """Scalarised problems whose solutions, with the ends, make a front of at most `points` points.
-
-    Parameters
-    ----------
-    ends : array (m, m)
-        Objectives, all minimised; row i is the end that is best in objective i.
-    ranges : array (m,)
-        Ranges of the objectives between the ends; 0 for one that is in conflict with no other.
-    points : int
-        Number of points, the ends included.
-    method : "pascoletti-serafini" or "epsilon"
-
-    Returns
-    -------
-    list of (reference (m,), weights (m,))
-        With two objectives in the order along the front. Empty if the objectives are not in conflict.
-    """
-    if np.count_nonzero(ranges) < 2:
-        return []
-    return (_from_simplex if method == "pascoletti-serafini" else _at_limits)(ends, ranges, points)
-
-
-def _from_simplex(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
-    """Tasks from a lattice on the simplex between the ends, with the ranges as weights."""
-    m = len(ends)
-    inner = [share for share in simplex_lattice(m, divisions_below(m, points)) if share.max() < 1.0]
-    # An objective with zero range has weight 0: its reference is a hard limit.
-    level = np.where(ranges > 0, ends, ends.max(axis=0))
-    return [(share @ level, ranges) for share in inner]
-
-
-def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
-    """Tasks for the first objective that is in conflict, at all combinations of evenly spread limits of the others."""
-    m = len(ends)
-    first, *others = np.flatnonzero(ranges > 0)
-    levels = int((points - m) ** (1.0 / len(others)) + 1e-9)
-    # With two objectives the loosest limit gives an end; with more, combinations with it are new points.
-    shares = np.arange(1, levels + 1) / (levels + (len(others) == 1))
-    tasks = []
-    for combination in product(shares, repeat=len(others)):
-        reference = ends.max(axis=0)
-        reference[first] = 0.0
-        reference[others] -= (1.0 - np.array(combination)) * ranges[others]
-        tasks.append((reference, np.where(np.arange(m) == first, ranges, 0.0)))
-    return tasks

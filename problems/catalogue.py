@@ -11,8 +11,11 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+from .cases import standard
 from .problem import Problem
 
+STANDARD = "standard/"
+"""What the names of the published problems begin with."""
 CASES: dict[str, tuple[str, str]] = {
     "goddard": ("problems.cases.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
     "orbit_rise": ("problems.cases.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
@@ -23,6 +26,7 @@ CASES: dict[str, tuple[str, str]] = {
     "reentry_case3": ("problems.cases.reentry.case3:problem", "the same around three no-fly zones"),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
+    **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},
 }
 FILE = "_problem_file_"
 """Beginning of the names of modules that are read from files."""
@@ -71,7 +75,7 @@ def load(name: str, **data: Any) -> Problem:
     if not place or not function_name:
         near = difflib.get_close_matches(name, CASES, n=1)
         hint = f", did you mean '{near[0]}'?" if near else ";"
-        known = ", ".join(CASES)
+        known = ", ".join([*(case for case in CASES if not case.startswith(STANDARD)), f"the published problems {STANDARD}..."])
         raise ValueError(f"there is no problem '{name}'{hint} there are {known}; or give 'file.py:function' or 'package.module:function'")
     function = _builder(_file_module(place) if place.endswith(".py") else _named_module(place, name), function_name, name)
     try:

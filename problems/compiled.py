@@ -49,6 +49,14 @@ class Limit:
     scale: float = 1.0
 
 
+def verified_scale(limit: Variable | Limit) -> float:
+    """What counts as one where a value is verified to be within a limit: its scale, and for an equality or a limit on one side at least the
+    size of that, since a default scale knows nothing of it."""
+    if np.isfinite(limit.lower) and np.isfinite(limit.upper) and limit.lower < limit.upper:
+        return limit.scale
+    return max(limit.scale, *(abs(side) for side in (limit.lower, limit.upper) if np.isfinite(side)))
+
+
 @dataclass(frozen=True)
 class Objective:
     """A named objective as the user stated it; the compiled function returns `sign` times its value, which is always minimised."""

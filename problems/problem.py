@@ -16,6 +16,9 @@ from .peaks import with_sizes
 from .phase import Phase
 from .sanity import check_numbers
 
+DEFAULT_EVALUATIONS = 2_000
+"""Candidates that a search evaluates if neither the problem nor its user says how many."""
+
 
 class Problem:
     """A multi-objective optimal control problem: phases, parameters, objectives, constraints and links.
@@ -24,8 +27,8 @@ class Problem:
 
     Attributes
     ----------
-    default_transcription, default_evaluations, default_inner, default_start, verify_tolerance : str, int, str, str or None, float
-        What the command line and studies use by default. A case may set its own.
+    default_transcription, default_evaluations, default_inner, default_start, default_verify : str or None, int, str, str or None, float
+        What is used by default; a transcription of None: DFET on a mesh that is found. A case may set its own.
 
     Examples
     --------
@@ -42,11 +45,11 @@ class Problem:
         self.name = name
         self.address = ""
         self.data: Mapping[str, Any] = {}
-        self.default_transcription = "dfet:8x3:bernstein"
-        self.default_evaluations = 10_000
+        self.default_transcription: str | None = None
+        self.default_evaluations = DEFAULT_EVALUATIONS
         self.default_inner = "auto"
         self.default_start: str | None = None
-        self.verify_tolerance = 1e-2
+        self.default_verify = 1e-3
         self._phases: dict[str, Phase] = {}
         self._parameters: dict[str, Variable] = {}
         self._symbols: dict[str, ca.MX] = {}

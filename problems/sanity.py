@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from .compiled import CompiledPhase, CompiledProblem, Variable
+from .derived import remembered
 
 SAMPLES, FEW = 2048, 64
 Labels = Mapping[str, Sequence[str]]
@@ -33,6 +34,15 @@ def samples(problem: CompiledProblem) -> list[np.ndarray]:
     names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
     labels = [{name: [name] * getattr(phase, name).size1_out(0) for name in names} for phase in problem.phases]
     return [values[:, :FEW] for values in _sampled(problem, labels)]
+
+
+@remembered
+def objective_spreads(problem: CompiledProblem) -> np.ndarray:
+    """How much each objective (m,) varies within the bounds: the median distance from its median, 1 where that is 0."""
+    values = np.array(problem.objectives(*samples(problem)))
+    values = np.where(np.isfinite(values), values, 0.0)
+    spread = np.median(np.abs(values - np.median(values, axis=1, keepdims=True)), axis=1)
+    return np.where(spread > 0.0, spread, 1.0)
 
 
 def _sampled(problem: CompiledProblem, labels: Sequence[Labels]) -> list[np.ndarray]:

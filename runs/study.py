@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from macs.fronts.verified import VERIFY
 from problems.checks import short_repr
 from transcription import Smooth
 
@@ -80,9 +81,10 @@ class Study:
     start : "uniform", "smooth", Smooth or mapping, optional
         How the first candidates of a run are drawn, as for `solve`; a mapping has settings of `transcription.Smooth`. Default: the
         problem's own, or else each variable by itself, after the problem's guess.
-    verify : float, optional
-        Simulate the points of each run, see `Front.simulate`; reports count only those that violate nothing by more than this, in
-        the constraints' scales, with their objectives as simulated. Default: points count as the solver returns them.
+    verify : float or None, default 1e-3
+        How much a point may miss when it is simulated, in scales, and still be verified, as for `solve`; see `Front.verify`. Reports count
+        only verified points, with their objectives as simulated. None, in a file `false`: points are not simulated, and count as the
+        solver returns them.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -121,7 +123,7 @@ class Study:
     inner: str | None = field(metadata=_key(decides=True, record=lambda inner: inner or INNER), default=None)
     tolerance: float = field(metadata=_key(Positive, decides=True), default=1e-6)
     start: Any = field(metadata=_key(decides=True, record=written), default=None)
-    verify: float | None = field(metadata=_key(Positive | None, decides=True), default=None)
+    verify: float | None = field(metadata=_key(Positive | None, decides=True), default=VERIFY)
     time_limit: float | None = field(metadata=_key(Positive | None), default=None)
     description: str = field(metadata=_key(Text), default="")
     paper: Sequence[Mapping[str, Any]] = field(metadata=_key(), default=())

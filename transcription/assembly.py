@@ -20,6 +20,7 @@ from .phases.guess import along
 from .phases.layout import Layout
 from .phases.reduced import Reduced
 from .phases.writer import Ends, PhaseWriter, Rows
+from .stopping import check_stopping
 from .trajectories.trajectory import Trajectory
 
 PEAK_SAMPLES = 1024
@@ -41,6 +42,7 @@ class Assembly:
         self.parameters = np.array([self.layout.add(v, free=True) for v in problem.parameters], dtype=int)
         self._writers: dict[int, PhaseWriter] = {}
         for i in problem.order_in_time:
+            check_stopping()
             self._writers[i] = writer(problem.phases[i], self.layout, self._ends(i))
         self._declared = [self._writers[i] for i in range(len(problem.phases))]
         self._peaks = [self._add_peaks(phase) for phase in problem.phases]
@@ -107,7 +109,9 @@ class Assembly:
         for writer in self._declared:
             slots, places = writer.control_nodes()
             for control, own in zip(writer.phase.controls, slots.T, strict=True):
-                free = np.flatnonzero(own >= 0)  # a control whose bounds coincide is no variable
+                # A control whose bounds coincide is no variable, and one that is constant for a while only one.
+                free = np.sort(np.unique(own, return_index=True)[1])
+                free = free[own[free] >= 0]
                 if free.size:
                     columns = np.array([column[int(slot)] for slot in own[free]])
                     found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
@@ -124,6 +128,7 @@ class Assembly:
 
     def _filled(self, function: ca.Function) -> ca.Function:
         """A Function of the variables alone from one of these and the hidden quantities."""
+        check_stopping()
         if not self.layout.hidden:
             return expanded(function)
         z = ca.MX.sym("z", len(self.layout.variables))
@@ -221,6 +226,7 @@ class Assembly:
 
     def _write_phase(self, writer: PhaseWriter, peaks: np.ndarray, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Rows of one phase; its quantities q, the largest samples of its peaks, and its magnitudes."""
+        check_stopping()
         phase, pick, written = writer.phase, self.layout.pick, writer.write(extended, rows)
         s = pick(extended, writer.ends.statics)
         first, last = pick(extended, writer.ends.initial), pick(extended, writer.ends.final)

@@ -112,6 +112,9 @@ class Meshed(Transcription):
         Phases that have: name -> PhaseMesh, or what `PhaseMesh.of` takes; kept as pairs, sorted by name.
     highest_order, most_elements : int
         Limits of mesh refinement in each phase; of elements, there may be twice as many as it began with, if that is more.
+    orders_controls, moves_edges : bool
+        Whether the method uses the `control_order` of a mesh, and its `moving` edges and `constant` controls; what it does not use is
+        refused.
     """
 
     elements: int
@@ -119,6 +122,8 @@ class Meshed(Transcription):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None
     highest_order: ClassVar[int] = 10
     most_elements: ClassVar[int] = 40
+    orders_controls: ClassVar[bool] = False
+    moves_edges: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -129,6 +134,11 @@ class Meshed(Transcription):
                 object.__setattr__(self, "mesh", as_meshes(self.mesh) or None)
             except ValueError as error:
                 raise ValueError(f"{name}: {error}") from None
+        for phase, mesh in self.meshes.items():
+            if mesh.control_order is not None and not self.orders_controls:
+                raise ValueError(f"{name}: phase '{phase}': the order of its controls cannot be chosen")
+            if (mesh.moving or mesh.constant) and not self.moves_edges:
+                raise ValueError(f"{name}: phase '{phase}': the edges of its elements cannot move, nor its controls be held constant")
 
     @property
     def meshes(self) -> dict[str, PhaseMesh]:
@@ -144,14 +154,28 @@ class Meshed(Transcription):
         the method has such."""
         return replace(self, mesh={**self.meshes, **meshes})  # type: ignore[type-var]
 
+    def settled(self, trajectory: Trajectory) -> Self:
+        """The same method on the meshes of a trajectory that it made: moving edges begin where they are there, and can move as far
+        again. To hold them there, see `PhaseMesh.moving`."""
+        meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
+        return self.remeshed(meshes) if meshes else self
+
+    def alternatives(self) -> tuple[Self, ...]:
+        """Other methods on much the same meshes, to be tried where solves with this one fail."""
+        return ()
+
     def check_phases(self, problem: CompiledProblem) -> None:
-        """Raise ValueError if a mesh is given for a phase that the problem does not have."""
-        names = [phase.name for phase in problem.phases]
-        for name in self.meshes:
-            if name not in names:
+        """Raise ValueError if a mesh is given for a phase, or names a control, that the problem does not have."""
+        controls = {phase.name: [v.name for v in phase.controls] for phase in problem.phases}
+        for name, mesh in self.meshes.items():
+            if name not in controls:
                 raise ValueError(
-                    f"{type(self).__name__}: a mesh is given for phase '{name}'; the phases of '{problem.name}' are {', '.join(names)}"
+                    f"{type(self).__name__}: a mesh is given for phase '{name}'; the phases of '{problem.name}' are {', '.join(controls)}"
                 )
+            for control, _ in mesh.constant:
+                if control not in controls[name]:
+                    known = ", ".join(controls[name]) or "none"
+                    raise ValueError(f"{type(self).__name__}: phase '{name}' has no control '{control}'; its controls are {known}")
 
     def to_dict(self) -> dict[str, Any]:
         """See `Transcription.to_dict`."""
@@ -352,11 +376,11 @@ def largest(residuals: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(violation), violation, np.inf)
 
 
-def check_problem(problem: Any, transcription: Any) -> None:
-    """Raise ValueError if these are no problem and no transcription."""
+def check_problem(problem: Any, transcription: Any = None) -> None:
+    """Raise ValueError if these are no problem and, unless it is None, no transcription."""
     if not isinstance(problem, Problem | CompiledProblem):
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
-    if not isinstance(transcription, Transcription):
+    if transcription is not None and not isinstance(transcription, Transcription):
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,10 @@ class Counts:
         self.failures.update(one for one in status if one != CONVERGED)
         self.inner_iterations += iterations
         self.clocked += clocked
+
+    def joined(self, other: Counts) -> Counts:
+        """The sums of these and other costs."""
+        return Counts(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
 
 
 class Evaluator(ABC):

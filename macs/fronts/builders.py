@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import Objective, Variable
+from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
 from transcription.nlp.optimality import optimality
 from transcription.stopping import stopping
@@ -36,8 +36,23 @@ def trajectory_points(
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
 
 
-def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
-    """Optimality of vectors (k, n), for objectives in `ranges` (m,); None for those left when the work is asked to end early."""
+def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Points:
+    """No points, of a search that was ended before its first population was evaluated."""
+    return Points(
+        F=np.empty((0, len(goals))),
+        decision=np.empty((0, 0)),
+        violation=(),
+        status=(),
+        goals=goals,
+        problem=problem,
+        solver=solver,
+        stats=stats,
+        message=f"nothing was evaluated yet: {stats['stopped']}",
+    )
+
+
+def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> list[float | None]:
+    """Optimality of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left when the work is to end."""
     return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
 
 

@@ -12,7 +12,7 @@ that do not have it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,6 +62,16 @@ ROOT: dict[str, Column] = {
     "status": Column(("point",), TEXT, "converged, infeasible, failed or timeout", rows="status"),
     "optimality": Column(("point",), NUMBER, "scaled residual of Pareto optimality, NaN if not computed", rows="optimality"),
     "note": Column(("point",), TEXT, "remark on the point", rows="notes"),
+    "defect": Column(
+        ("point",), NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", rows="defect", optional=True
+    ),
+    "simulated_violation": Column(
+        ("point",), NUMBER, "largest scaled residual of any constraint as simulated", rows="simulated_violation", optional=True
+    ),
+    "simulated_objectives": Column(
+        ("point", "objective"), NUMBER, "objectives as simulated, in the user's senses", "see objective_unit", optional=True
+    ),
+    "verified": Column(("point",), COUNT, "1 if the simulation agrees with the point, else 0", rows="verified", optional=True),
     "transcription": Column(("point",), TEXT, "transcription of the point, as JSON"),
     **named_table("violations", "constraint", "scaled residual of the constraint", "constraint"),
     **named_table("excursions", "quantity", "by how much, scaled, the quantity leaves its bounds between nodes", "quantity"),
@@ -155,6 +165,7 @@ def root_dataset(front: Points) -> Labelled:
         "objective_unit": words(front.units),
         "objective_sense": words(front.senses),
         "objective_scale": _numbers([goal.scale for goal in front.goals]),
+        "simulated_objectives": front.simulated_F * front.signs,
         "transcription": words([document(transcription) for transcription in front.transcriptions]),
         "parameters": np.array(values, dtype=float).reshape(len(front), len(names)),
         "parameter": words(names),
@@ -166,8 +177,8 @@ def root_dataset(front: Points) -> Labelled:
         **variable_columns(front.variables, "variable"),
     }
     for name, column in ROOT.items():
-        if column.rows and not (column.optional and getattr(front, column.rows, None) is None):
-            arrays[name] = (words if column.kind == TEXT else _numbers)(getattr(front, column.rows))
+        if column.rows:
+            arrays[name] = CONVERSIONS[column.kind](getattr(front, column.rows))
     return labelled(ROOT, {name: arrays[name] for name in ROOT if name in arrays}, _attributes(front))
 
 
@@ -212,6 +223,14 @@ def split(arrays: Mapping[str, np.ndarray], names: Mapping[str, Iterable[str]]) 
 
 def _numbers(values: Sequence[float | None]) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values, dtype=np.int32)
+
+
+CONVERSIONS: dict[str, Callable[[Any], np.ndarray]] = {TEXT: words, NUMBER: _numbers, COUNT: _whole}
+"""From columns of `Points` to arrays of a file, by their kind."""
 
 
 def _padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
@@ -273,8 +292,13 @@ def root_columns(root: Labelled) -> dict[str, Any]:
     distinct(variables, "entries of the decision vector")
     own = [_own_columns(row) for row in root["place"]]
     rows = {column.rows: root[name] for name, column in ROOT.items() if column.rows and name in root.arrays}
+    signs = np.where(senses == "minimize", 1.0, -1.0)
+    stats = read_stats(root.attrs)
+    if "verify" not in stats and not np.isnan(rows.get("defect", np.nan)).all():
+        raise ValueError("the attribute 'stats' does not say what its simulated points may miss")
     return rows | {
-        "F": root["objectives"] * np.where(senses == "minimize", 1.0, -1.0),
+        "F": root["objectives"] * signs,
+        "simulated_F": root["simulated_objectives"] * signs if "simulated_objectives" in root.arrays else None,
         "decision": [row[columns] for row, columns in zip(root["decision"], own, strict=True)],
         "goals": [
             Objective(name, unit, sense, None if np.isnan(scale) else scale)
@@ -286,7 +310,7 @@ def root_columns(root: Labelled) -> dict[str, Any]:
         "transcriptions": read_documents(root["transcription"], "transcription", _is_transcription),
         "problem": read_source(root.attrs),
         "solver": read_document(root.attrs, "solver"),
-        "stats": read_stats(root.attrs),
+        "stats": stats,
         "message": read_attribute(root.attrs, "message", str),
         "sort": False,
     }

@@ -85,19 +85,39 @@ def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) ->
 
 
 def save_csv(front: Points, path: str | PathLike[str]) -> None:
-    """Write objectives, violation, status and decisions; see `Front.to_csv`."""
+    """Write objectives, violation, status, what a simulation found, and decisions; see `Front.to_csv`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     columns = [(goal.name, goal.unit) for goal in front.goals]
     decisions = [(variable.name, variable.unit) for variable in front.variables]
-    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in [*columns, ("violation", ""), ("status", ""), *decisions]])
+    simulated = _simulated_columns(front) if front.was_simulated.any() else {}
+    heads = [*columns, ("violation", ""), ("status", ""), *simulated, *decisions]
+    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in heads])
     for point, objectives, place in zip(front, front.objectives.tolist(), front.places, strict=True):
         # Of a variable that the point, on a mesh of its own, does not have, the cell is empty.
         cells = [""] * len(front.variables)
         for column, value in zip(place.tolist(), point.decision.tolist(), strict=True):
             cells[column] = repr(value)
-        writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *cells])
+        found = [values[point.index] for values in simulated.values()]
+        writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *found, *cells])
     write_whole(path, text.getvalue().encode())
+
+
+def _simulated_columns(front: Points) -> dict[tuple[str, str], list[str]]:
+    """What a simulation found, as text by name and unit; empty for a point that was not simulated."""
+    values = {
+        ("defect", ""): front.defect,
+        **{
+            (f"{goal.name}, simulated", goal.unit): column
+            for goal, column in zip(front.goals, (front.simulated_F * front.signs).T, strict=True)
+        },
+        ("violation, simulated", ""): front.simulated_violation,
+    }
+    verified = {True: "yes", False: "no", None: ""}
+    return {
+        **{name: ["" if np.isnan(value) else repr(value) for value in column.tolist()] for name, column in values.items()},
+        ("verified", ""): [verified[point.verified] for point in front],
+    }
 
 
 def to_bytes(front: Points) -> bytes:

@@ -11,14 +11,19 @@ import numpy as np
 
 from problems.compiled import Objective
 
+from ..evaluation.evaluator import CONVERGED
 from ..io.atomic import write_whole
+from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
 from .points import Point
-from .style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .points import Points
+
+
+NOT_VERIFIED, NOT_FEASIBLE = "not verified", "not feasible"
+"""Words of the legend."""
 
 
 def save_picture(what: Points | Point, path: str | PathLike[str]) -> None:
@@ -46,7 +51,8 @@ def draw_front(front: Points, ax: Axes | None = None) -> Axes:
     """Axes with the objectives of a front.
 
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
-    Axes), more as parallel coordinates. Points that did not converge are hollow.
+    Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
+    lines; none of them is marked as best.
 
     Parameters
     ----------
@@ -74,11 +80,18 @@ def _title(front: Points) -> str:
     return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
 
 
+def _kinds(front: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Masks (n,) of the points that are drawn in full, of those that were simulated and are not verified, and of those not feasible."""
+    feasible = front.status == CONVERGED
+    apart = feasible & front.was_simulated & ~front.verified
+    return feasible & ~apart, apart, ~feasible
+
+
 def _scatter(front: Points, ax: Any) -> None:
     if not len(front):
         ax.text(0.5, 0.9, front.message, transform=ax.transAxes, ha="center", va="center", wrap=True, color=GREY)
         front = front if front.closest is None else front.closest.alone()
-    values, good = front.objectives, front.status == "converged"
+    values, (good, apart, infeasible) = front.objectives, _kinds(front)
     if values.shape[1] == 1:
         values = np.column_stack([np.arange(len(values)), values])
     goals = front.goals if len(front.goals) > 1 else (Objective("point"), *front.goals)
@@ -86,9 +99,10 @@ def _scatter(front: Points, ax: Any) -> None:
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
     drawn = ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color)
-    if (~good).any():
-        ax.scatter(*axes[:, ~good], s=26, facecolors="none", edgecolors=GREY, linewidths=0.9, zorder=2, label="not feasible")
-        ax.legend(frameon=False)
+    for rows, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
+        if rows.any():
+            ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
+            ax.legend(frameon=False)
     if third and good.any():
         ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
@@ -99,7 +113,7 @@ def _scatter(front: Points, ax: Any) -> None:
 
 def _mark_extremes(front: Points, ax: Any) -> None:
     """Mark the best point of each of two objectives, with a legend."""
-    F = np.where((front.status == "converged")[:, None], front.F, np.inf)
+    F = np.where(_kinds(front)[0][:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
@@ -110,20 +124,25 @@ def _mark_extremes(front: Points, ax: Any) -> None:
 
 
 def _parallel(front: Points, ax: Any) -> None:
-    """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point."""
+    """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
+    feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
     import matplotlib
 
-    F, values = front.F, front.objectives
-    finite = np.where(np.isfinite(F), F, np.nan)
+    F, values, (good, apart, infeasible) = front.F, front.objectives, _kinds(front)
+    finite = np.where(np.isfinite(F) & (good | (not good.any()))[:, None], F, np.nan)
     if len(front) and not np.isnan(finite).all():
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:
         best = worst = np.zeros(F.shape[1])
     height = 1.0 - (F - best) / np.where(worst > best, worst - best, 1.0)
     shade = matplotlib.colormaps["viridis"]
-    for i, row in enumerate(height):
-        good = front.status[i] == "converged"
-        ax.plot(row, color=shade(0.85 * row[0]) if good else GREY, lw=1.0, alpha=0.85, ls="-" if good else ":")
+    for row in height[good]:
+        ax.plot(row, color=shade(0.85 * row[0]), lw=1.0, alpha=0.85)
+    for rows, name, look in ((apart, NOT_VERIFIED, "--"), (infeasible, NOT_FEASIBLE, ":")):
+        for k, row in enumerate(height[rows]):
+            ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
+    if apart.any() or infeasible.any():
+        ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     signs = np.array([goal.sign for goal in front.goals])
     for k in range(values.shape[1]):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)

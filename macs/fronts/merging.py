@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.dominance import nondominated
 from .builders import nearest_violation
@@ -20,7 +22,7 @@ def merge(fronts: Sequence[Points]) -> Points:
     for front in fronts[1:]:
         _check(fronts[0], front)
     union = Points.concatenate([front[front.status == CONVERGED] for front in fronts])
-    kept = union[nondominated(union.F)].sorted()
+    kept = union[best_rows(union)].sorted()
     closest = _closest(fronts)
     reasons = (front.message for front in fronts if front.closest is closest and front.message)
     return kept.replace(
@@ -29,6 +31,21 @@ def merge(fronts: Sequence[Points]) -> Points:
         message="" if len(kept) else next(reasons, _nearest(closest)),
         closest=None if len(kept) else closest,
     )
+
+
+def best_rows(points: Points) -> np.ndarray:
+    """Rows (k,) of the points that belong to a front, in their order.
+
+    Points that were not simulated are compared by their objectives. Verified points are compared among themselves, by their simulated
+    objectives. A point that is not verified never displaces one that is: it belongs to the front as long as no verified point, and no
+    other that is not, is as good.
+    """
+    good = np.flatnonzero(points.verified)
+    good = good[nondominated(points.simulated_F[good])]
+    others = np.flatnonzero(~points.verified)
+    others = others[nondominated(points.F[others])]
+    as_good = (points.simulated_F[good] <= points.F[others][:, None]).all(axis=2).any(axis=1)
+    return np.sort(np.concatenate([good, others[~as_good]]))
 
 
 def _nearest(closest: Point | None) -> str:

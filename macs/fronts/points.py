@@ -12,6 +12,7 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.text import counted
+from .columns import by_first, column, frozen, number, shared
 from .decision_table import Decisions
 from .provenance import STATS, Source, versions
 
@@ -35,12 +36,13 @@ class Points:
         Scaled residual by constraint.
     trajectories : n Trajectories, optional
         None for black boxes, and for a point without a trajectory.
-    excursions : n dicts or None, optional
-        Excess, scaled, of quantities that leave their bounds between nodes, by name.
-    optimality : n floats or None, optional
-        Scaled residual of the conditions of Pareto optimality.
+    excursions, optimality : n dicts or None, n floats or None, optional
+        Excess, scaled, of quantities that leave their bounds between nodes; scaled residual of the conditions of Pareto optimality.
     notes : n str, optional
         Remarks, for example why a mesh could not be refined enough.
+    defect, simulated_violation, simulated_F, verified : (n,), (n,), (n, m), (n,), optional
+        By a simulation: largest difference of a state from the transcription, in spans of its bounds; largest scaled residual of any
+        constraint; objectives, all minimised; whether these agree with the point within `stats["verify"]`. NaN and False without it.
     transcriptions : dict, or n of them, optional
         `{"method": ..., "settings": {...}}`: the transcription of all points, or one for each; None for black boxes.
     problem : CompiledProblem or Source, optional
@@ -49,27 +51,28 @@ class Points:
         `{"name": ..., "settings": {...}}`.
     stats : dict, optional
         Costs of the points; missing entries of `STATS` are added.
-    message : str
-        For an empty front: the reason, with the most violated constraint.
-    closest : Point, optional
-        The least infeasible point of a search that found no feasible one.
+    message, closest : str and Point, optional
+        For an empty front: the reason, with the most violated constraint, and the least infeasible point.
     sort : bool
         Sort by the first objective, in the user's value; otherwise keep the order.
 
     Attributes
     ----------
-    F, violation, status : read-only arrays
+    F, violation, status, defect, simulated_violation, simulated_F, verified : read-only arrays
     violations, trajectories, excursions, optimality, notes, transcriptions : tuples of n
-        As above. Points on one mesh share one dict of `transcriptions`.
-    goals, solver, stats, message, source
-        As above; `source` identifies the problem, None for a black box.
+        Points on one mesh share one dict of `transcriptions`.
+    source : Source or None
+        Identity of the problem, None for a black box.
     variables : tuple of Variable (D)
         All variables of all points. Those of one point, in the order of its decision vector, are `Point.variables`.
     decision : array (n, D)
         A column for each of `variables`; NaN if the point, on a mesh of its own, does not have the variable. `Point.decision` has no NaN.
     """
 
-    ROWS = ("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions")
+    ROWS = (
+        *("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions"),
+        *("defect", "simulated_violation", "simulated_F", "verified"),
+    )
     """Columns with one entry for each point, besides the decision vectors."""
 
     def __init__(
@@ -87,6 +90,10 @@ class Points:
         optimality: Sequence[float | None] | None = None,
         notes: Sequence[str | None] | None = None,
         transcriptions: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
+        defect: Any = None,
+        simulated_violation: Any = None,
+        simulated_F: Any = None,
+        verified: Any = None,
         problem: CompiledProblem | Source | None = None,
         solver: Mapping[str, Any] | None = None,
         stats: Mapping[str, Any] | None = None,
@@ -105,14 +112,17 @@ class Points:
 
         rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
         n = len(rows)
-        order = by_first(rows * self._signs) if sort else np.arange(n)
+        order = by_first(rows * self.signs) if sort else np.arange(n)
 
         def ordered(values: Any, name: str) -> list[Any]:
             entries = column(values, n, name)
             return [entries[i] for i in order]
 
+        def numbers(values: Any, name: str) -> np.ndarray:
+            return frozen(np.asarray(ordered(np.full(n, np.nan) if values is None else values, name), dtype=float))
+
         self.F = frozen(rows[order])
-        self.violation = frozen(np.asarray(ordered(violation, "violation"), dtype=float))
+        self.violation = numbers(violation, "violation")
         self.status = frozen(np.asarray(ordered(status, "status"), dtype=str))
         common = not len(variables) or isinstance(variables[0], Variable)
         self._decisions = Decisions.of(ordered(decision, "decision"), variables if common else ordered(variables, "variables"))
@@ -123,9 +133,14 @@ class Points:
         self.excursions: tuple[Mapping[str, float] | None, ...] = tuple(ordered(excursions, "excursions"))
         self.optimality = tuple(number(value) for value in ordered(optimality, "optimality"))
         self.notes = tuple(note or "" for note in ordered(notes, "notes"))
+        self.defect = numbers(defect, "defect")
+        self.simulated_violation = numbers(simulated_violation, "simulated_violation")
+        self.simulated_F = numbers(np.full(rows.shape, np.nan) if simulated_F is None else simulated_F, "simulated_F").reshape(rows.shape)
+        self.verified = frozen(np.asarray(ordered(np.zeros(n) if verified is None else verified, "verified"), dtype=bool))
 
     @property
-    def _signs(self) -> np.ndarray:
+    def signs(self) -> np.ndarray:
+        """+1 for a minimised, -1 for a maximised objective, (m,)."""
         return np.array([goal.sign for goal in self.goals])
 
     @property
@@ -146,7 +161,12 @@ class Points:
     @property
     def objectives(self) -> np.ndarray:
         """Objectives (n, m) in the user's units and senses."""
-        return self.F * self._signs
+        return self.F * self.signs
+
+    @property
+    def was_simulated(self) -> np.ndarray:
+        """Mask (n,) of the points that were simulated."""
+        return ~np.isnan(self.defect)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -318,6 +338,29 @@ class Point:
         return str(self._points.status[self.index])
 
     @property
+    def verified(self) -> bool | None:
+        """Whether a simulation agrees with this point within `stats["verify"]` of its front; None if it was not simulated."""
+        return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
+
+    @property
+    def defect(self) -> float | None:
+        """Largest difference between simulated states and those of the transcription, in spans of their bounds; None: not simulated."""
+        return number(self._points.defect[self.index])
+
+    @property
+    def simulated(self) -> dict[str, float] | None:
+        """Objectives by name as simulated, in the user's units and senses; None: not simulated."""
+        if not self._points.was_simulated[self.index]:
+            return None
+        values = self._points.simulated_F[self.index] * self._points.signs
+        return dict(zip(self._points.names, values.tolist(), strict=True))
+
+    @property
+    def simulated_violation(self) -> float | None:
+        """Largest scaled residual of any constraint of the simulated trajectory; None: not simulated."""
+        return number(self._points.simulated_violation[self.index])
+
+    @property
     def decision(self) -> np.ndarray:
         """Decision vector, in the user's units; `variables` are its entries."""
         return self._points._decisions.row(self.index)
@@ -370,10 +413,8 @@ class Point:
 
         Parameters
         ----------
-        rtol, atol : float
-            Tolerances of the integrator; `atol` is relative to the scales of the states.
-        method : str
-            Method of `scipy.integrate.solve_ivp`.
+        rtol, atol, method
+            Of `scipy.integrate.solve_ivp`; `atol` is relative to the scales of the states.
 
         Returns
         -------
@@ -392,7 +433,7 @@ class Point:
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Axes with the states, controls and path constraints over time, one for each of them."""
-        from .flight_plot import draw_flight
+        from .pictures.flight_plot import draw_flight
 
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
@@ -406,42 +447,3 @@ class Point:
 
     def __repr__(self) -> str:
         return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"
-
-
-def frozen(array: Any) -> np.ndarray:
-    """A read-only copy."""
-    copy = np.array(array)
-    copy.setflags(write=False)
-    return copy
-
-
-def by_first(objectives: np.ndarray) -> np.ndarray:
-    """Rows sorted by the first objective, ties by the next ones; NaN last."""
-    return np.lexsort(objectives.T[::-1])
-
-
-def number(value: Any) -> float | None:
-    """The value as a float; None for None and for NaN."""
-    return None if value is None or np.isnan(value) else float(value)
-
-
-def column(values: Any, n: int, name: str) -> Any:
-    """The `values`, which must be n; n times None for None."""
-    if values is None:
-        return [None] * n
-    if len(values) != n:
-        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
-    return values
-
-
-def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """The dicts, with equal ones as one object."""
-    distinct: list[dict[str, Any]] = []
-    found: list[dict[str, Any] | None] = []
-    for given in dicts:
-        known = next((one for one in distinct if one == given), None)
-        if known is None and given is not None:
-            known = dict(given)
-            distinct.append(known)
-        found.append(known)
-    return tuple(found)

@@ -141,11 +141,12 @@ def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopp
 
 
 def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """`stats` of merged fronts: costs are summed, seeds listed; the loosest tolerance and the least reproducible run count for all."""
+    """`stats` of merged fronts: costs are summed, seeds listed; the loosest tolerances and the least reproducible run count for all."""
     summed = {key: sum(s[key] for s in several) for key in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time")}
     failures: Counter[str] = Counter()
     found: dict[str, dict[str, None]] = {}
     seeds: list[Any] = []
+    verify = [stats["verify"] for stats in several if "verify" in stats]
     for stats in several:
         failures.update(stats["failures"])
         seeds += stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
@@ -158,6 +159,7 @@ def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "tolerance": max(stats["tolerance"] for stats in several),
         "reproducible": all(stats["reproducible"] for stats in several),
         "versions": {package: ", ".join(numbers) for package, numbers in found.items()},
+        **({"verify": max(verify)} if verify else {}),
     }
 
 
@@ -205,6 +207,9 @@ def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
     for name in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time", "tolerance"):
         if not isinstance(stats[name], int | float) or not stats[name] >= 0:
             raise ValueError(f"the attribute '{name}' is no number of at least 0")
+    verify = stats.get("verify", 1.0)
+    if isinstance(verify, bool) or not isinstance(verify, int | float) or not verify > 0:
+        raise ValueError("what its points may miss when simulated, 'verify', is no positive number")
     counts = [*stats["failures"].values()] if isinstance(stats["failures"], dict) else [None]
     if not all(isinstance(count, int) for count in counts) or not isinstance(stats["reproducible"], bool):
         raise ValueError("the attribute 'stats' is not what it should be")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +12,8 @@ from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.evaluator import CONVERGED, INFEASIBLE
-from ..pareto.dominance import nondominated
 from .points import Points
+from .verified import unmarked
 
 if TYPE_CHECKING:
     from problems import Problem
@@ -35,10 +35,25 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
         raise ValueError(f"point {missing[0].index} has no trajectory to simulate: its status is '{missing[0].status}'")
     planned = [trajectory for trajectory in front.trajectories if trajectory is not None]
     found = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
-    violations = [{**one.violations, **_decided(plan, compiled)} for one, plan in zip(found, planned, strict=True)]
+    violations = [_larger(one.violations, _decided(plan, compiled)) for one, plan in zip(found, planned, strict=True)]
     F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(compiled.signs)) * compiled.signs
-    judged_points = judged(front, F, np.array([max(one.values(), default=0.0) for one in violations]), tolerance)
-    return judged_points.replace(violations=violations, trajectories=[one.trajectory for one in found], problem=compiled)
+    violation = np.array([max(one.values(), default=0.0) for one in violations])
+    plain = unmarked(front)
+    return plain.replace(
+        F=F,
+        violation=violation,
+        violations=violations,
+        status=np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE),
+        trajectories=[one.trajectory for one in found],
+        optimality=[None] * len(front),
+        problem=compiled,
+        stats={**plain.stats, "tolerance": float(tolerance)},
+    )
+
+
+def _larger(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+    """The entries of both; the larger where both have one: a control may leave its bounds at the nodes, or between them."""
+    return {**one, **{label: max(amount, one.get(label, 0.0)) for label, amount in other.items()}}
 
 
 def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
@@ -59,20 +74,6 @@ def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
         look(trajectory.controls[:, free], [phase.controls[k] for k in free], f"bounds of {phase.name}.")
     look([planned.parameters[v.name] for v in problem.parameters], problem.parameters, "bounds of ")
     return found
-
-
-def judged(front: Points, F: np.ndarray, violation: np.ndarray, tolerance: float) -> Points:
-    """The points with other objectives F (n, m) and violations (n,), and with their status for this tolerance."""
-    status = np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE)
-    stats = {**front.stats, "tolerance": float(tolerance)}
-    return front.replace(F=F, violation=violation, status=status, optimality=[None] * len(front), stats=stats)
-
-
-def best(front: Points) -> np.ndarray:
-    """Rows (k,) of the points that converged and are non-dominated among these, sorted by the first objective."""
-    converged = np.flatnonzero(front.status == CONVERGED)
-    kept = converged[nondominated(front.F[converged])]
-    return kept[np.argsort(front.objectives[kept, 0], kind="stable")]
 
 
 def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:

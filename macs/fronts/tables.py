@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, numbers, text_table
+from .verified import MISSES, objective_scales
 
 if TYPE_CHECKING:
     from .points import Point, Points
 
 
-def front_table(front: Points, defects: Sequence[float] | None = None, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
-    """Text with a headline, a row for each point and a footer; see `Front.table`."""
-    more = {**({} if defects is None else {"defect": defects}), **(columns or {})}
-    for header, values in more.items():
+def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+    """Text with a headline, a row for each point and a footer; see `Front.table`.
+
+    Points that were simulated and are not verified stand apart, below the others.
+    """
+    for header, values in (columns or {}).items():
         if len(values) != len(front):
             raise ValueError(f"column '{header}' has {len(values)} entries, the front has {len(front)} points")
     if not len(front):
         return "\n".join([headline(front), "", *_nothing(front)])
+    simulated = front.was_simulated
     titles, units, cells, left = ["#"], [""], [[str(i) for i in range(len(front))]], [False]
 
     def add(title: str, unit: str, column: list[str], flush: bool = False) -> None:
@@ -29,19 +36,41 @@ def front_table(front: Points, defects: Sequence[float] | None = None, columns: 
 
     for goal, values in zip(front.goals, front.objectives.T, strict=True):
         add(goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", numbers(values))
-    add("violation", "", [f"{value:.1e}" for value in front.violation])
-    for header, values in more.items():
+    add("violation", "", _small(front.violation))
+    if simulated.any():
+        off = np.abs(front.simulated_F - front.F) / objective_scales(front)
+        add("defect", "simulated", _small(front.defect))
+        add("violation", "simulated", _small(front.simulated_violation))
+        add("objectives", "off by", _small(off.max(axis=1)))
+    for header, values in (columns or {}).items():
         add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
     certified = [point.optimality for point in front]
     if any(value is not None for value in certified):
-        add("optimality", "", ["-" if value is None else f"{value:.1e}" for value in certified])
-    add("status", "", front.status.tolist(), True)
+        add("optimality", "", _small(certified))
+    add("status", "", [_status(point) for point in front], True)
     if len({id(one) for one in front.transcriptions}) > 1:
         add("elements", "", [_elements(point) for point in front])
-    if front.source is not None:
+    if front.source is not None and not simulated.all():
         add("between nodes", "leaves bounds", [_excursion(point.excursions) for point in front], True)
-    table = text_table([titles, units], list(zip(*cells, strict=True)), left)
-    return "\n".join([headline(front), "", table, "", *_footer(front)]).rstrip()
+    apart = np.flatnonzero(simulated & ~front.verified)
+    order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
+    rows = list(zip(*cells, strict=True))
+    lines = text_table([titles, units], [rows[i] for i in order], left).split("\n")
+    if len(apart) > 0:
+        lines.insert(len(lines) - len(apart), f"\nNot verified: simulated, these differ by more than {front.stats['verify']:g}.")
+    return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
+
+
+def _small(values: Iterable[float | None]) -> list[str]:
+    """Errors with two digits; - where there is none."""
+    return ["-" if value is None or np.isnan(value) else f"{value:.1e}" for value in values]
+
+
+def _status(point: Point) -> str:
+    """The status of a point; whether it is verified, if it converged and was simulated."""
+    if point.status != CONVERGED or point.verified is None:
+        return point.status
+    return "verified" if point.verified else "not verified"
 
 
 def headline(front: Points) -> str:
@@ -87,19 +116,13 @@ def _excursion(found: Mapping[str, float] | None) -> str:
     return f"{name} by {found[name]:.2g}{rest}"
 
 
+FEW = 5
+"""Number of points whose misses are given in words."""
+
+
 def _footer(front: Points) -> list[str]:
-    lines = []
-    leaving = [
-        (max(found.values()), max(found, key=lambda key: found[key]), i) for i, point in enumerate(front) if (found := point.excursions)
-    ]
-    if leaving:
-        amount, name, index = max(leaving)
-        verb = "leaves its" if len(leaving) == 1 else "leave their"
-        worst = f"{name} of point {index} by {amount:.2g} of its scale at most"
-        lines.append(f"{len(leaving)} of {counted(len(front), 'point')} {verb} bounds between nodes: {worst}.")
-    elif front.source is not None and all(point.excursions is not None for point in front):
-        lines.append("No point leaves its bounds between nodes.")
-    bad = int((front.status != "converged").sum())
+    lines = [] if front.source is None else _simulated(front) if front.was_simulated.all() else _between_nodes(front)
+    bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
     if front.stats["fallbacks"]:
@@ -108,10 +131,39 @@ def _footer(front: Points) -> list[str]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"
         lines.append(f"{ended}: the same seed may give another front.")
-    lines += [f"Point {point.index}: {point.note}" for point in front if point.note]
+    missing = [point.index for point in front if MISSES in point.note]
+    lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[FEW:]]
+    if len(missing) > FEW:
+        lines.append(f"The notes of {len(missing) - FEW} more points say what they miss.")
     if front.message:
         lines.append(front.message)
     return lines
+
+
+def _simulated(front: Points) -> list[str]:
+    """How many points are verified."""
+    count, verify = int(front.verified.sum()), front.stats["verify"]
+    points = "The point is" if len(front) == 1 else f"All {len(front)} points are"
+    if count == len(front):
+        return [f"{points} verified: simulated by an independent integrator, nothing differs by more than {verify:g}."]
+    if not count:
+        return ["The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified."]
+    return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified."]
+
+
+def _between_nodes(front: Points) -> list[str]:
+    """What leaves its bounds between nodes, for points that were not simulated."""
+    leaving = [
+        (max(found.values()), max(found, key=lambda key: found[key]), i) for i, point in enumerate(front) if (found := point.excursions)
+    ]
+    if leaving:
+        amount, name, index = max(leaving)
+        verb = "leaves its" if len(leaving) == 1 else "leave their"
+        worst = f"{name} of point {index} by {amount:.2g} of its scale at most"
+        return [f"{len(leaving)} of {counted(len(front), 'point')} {verb} bounds between nodes: {worst}."]
+    if all(point.excursions is not None for point in front):
+        return ["No point leaves its bounds between nodes."]
+    return []
 
 
 def _nothing(front: Points) -> list[str]:

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +17,12 @@ import numpy as np
 from problems.compiled import CompiledProblem
 from transcription import from_dict
 from transcription.base import NLP, Transcription
-from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.simulate import simulate, worst_violation
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
 from .points import Point, Points
+from .verified import missed, objective_scales
 
 EQUAL = 1e-9
 """Numbers that another run of the same arithmetic on another machine may give, in scales."""
@@ -138,20 +139,6 @@ def verify(
     return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
 
 
-def objective_scales(front: Points) -> np.ndarray:
-    """What counts as one in each objective (m,): its own scale, or the largest size or the range that it has on the front."""
-    largest = np.abs(front.F).max(axis=0, initial=0.0)
-    found = np.maximum(largest, np.ptp(front.F, axis=0) if len(front) else 0.0)
-    given = [goal.scale or 0.0 for goal in front.goals]
-    return np.where(np.array(given) > 0, given, np.where(found > 0, found, 1.0))
-
-
-def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
-    """The largest difference between a point's objectives, by name, and those of its simulation, divided by `scales` (m,)."""
-    difference = np.abs([simulation.objectives[name] - value for name, value in objectives.items()])
-    return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
-
-
 def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:
     """Largest scaled difference between the stored trajectory and that of the decision vector, and what differs."""
     stored, remade = point.trajectory, nlp.unpack(point.decision)
@@ -213,5 +200,5 @@ def _simulated(
     if point.trajectory is None:
         return np.inf, np.inf, "everything", np.inf
     found = simulate(problem, point.trajectory, rtol=rtol, atol=atol, method=method)
-    worst = max(found.violations, key=lambda key: found.violations[key], default="")
-    return found.max_defect, found.violation, worst, missed(found, point.objectives, scales)
+    worst, violation = worst_violation(problem, found)
+    return found.max_defect, violation, worst, missed(found, point.objectives, scales)

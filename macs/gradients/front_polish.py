@@ -10,6 +10,7 @@ Computers and Chemical Engineering 20(4), 1996.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -17,15 +18,17 @@ from problems.checks import check_count, check_positive
 from problems.peaks import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import Propagate
+from transcription.stopping import Stopped
 from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certificates, vectors_points
 from ..fronts.merging import merge
 from ..fronts.points import Point, Points
 from ..fronts.provenance import more_costs
 from ..fronts.simulated import simulated
+from ..fronts.verified import unmarked
 from ..io.console import working
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
@@ -44,11 +47,13 @@ def polished(
     limit: int | None,
     verify: float | None,
     time_limit: float | None,
-    progress: bool,
+    progress: bool | None,
 ) -> Points:
     """The polished points; see `Front.polished`."""
     problem = front.compiled()
     check_problem(problem, transcription)
+    # Compared with new points by the objectives on their meshes: no new point has been simulated yet.
+    front = unmarked(front)
     known = front[[point.index for point in front if point.status == CONVERGED and point.trajectory is not None]]
     count = max(len(known), 1)
     solves, limit = count if solves is None else solves, count if limit is None else limit
@@ -59,9 +64,12 @@ def polished(
     if time_limit is not None:
         check_positive("time_limit", time_limit)
     refuse_peaks(problem)
-    nlp = transcription.nlp(problem)
-    evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
     with working(time_limit, progress) as (show, interrupts):
+        try:
+            nlp = transcription.nlp(problem)
+        except Stopped as reason:
+            return front.replace(stats=more_costs(front.stats, Counts(), interrupts.elapsed, str(reason)))
+        evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
         evaluator.before_batch = lambda: show(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
         left = CountedSolves(evaluator, solves)
         begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
@@ -70,12 +78,12 @@ def polished(
         archive = polish(begun, left, limit)
         untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
-        moved = np.zeros(len(Z), dtype=bool)
+        moved, unseen = np.zeros(len(Z), dtype=bool), 0
         if verify is not None:
             evaluator.before_batch = lambda: show("polish: points that are infeasible when simulated are solved again")
             Z, feasible, moved = back_off(evaluator, Z, ranges(archive.F), verify)
             Z, moved = Z[feasible], moved[feasible]
-            known = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
+            known, unseen = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
         show(f"polish: optimality of {len(Z)} points")
         certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
         # A point that was moved inside its limits is no optimum of the problem as stated: it has no certificate.
@@ -86,6 +94,7 @@ def polished(
     found = merge([vectors_points(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
     message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
+    message = f"{stopped}: {unseen} points of the front before were not simulated" if unseen else message
     return found.replace(solver=dict(front.solver), stats=stats, message=message)
 
 
@@ -142,15 +151,18 @@ def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: floa
     margins = np.zeros((len(Z), len(nlp.g_scale)))
     feasible, moved = np.zeros((2, len(Z)), dtype=bool)
     waiting = np.arange(len(Z))
-    for _ in range(ROUNDS):
-        waiting = _infeasible(nlp, Z, waiting, margins, feasible, verify)
-        if not len(waiting):
-            return Z, feasible, moved
-        found = evaluator.descend(Z[waiting], F[waiting], np.tile(ranges, (len(waiting), 1)), margins[waiting])
-        good = found.status == CONVERGED
-        waiting = waiting[: len(good)][good]
-        Z[waiting], moved[waiting] = found.Z[good], True
-    _infeasible(nlp, Z, waiting, margins, feasible, verify)
+    # What was solved again, but not simulated when the work is to end, does not count as feasible.
+    with suppress(Stopped):
+        for _ in range(ROUNDS):
+            waiting = _infeasible(nlp, Z, waiting, margins, feasible, verify)
+            if not len(waiting):
+                break
+            found = evaluator.descend(Z[waiting], F[waiting], np.tile(ranges, (len(waiting), 1)), margins[waiting])
+            good = found.status == CONVERGED
+            waiting = waiting[: len(good)][good]
+            Z[waiting], moved[waiting] = found.Z[good], True
+        else:
+            _infeasible(nlp, Z, waiting, margins, feasible, verify)
     return Z, feasible, moved
 
 
@@ -170,18 +182,22 @@ def _by_row(violations: Mapping[str, float], labels: Sequence[str]) -> np.ndarra
     return np.where(np.isfinite(excess), np.maximum(excess, 0.0), 0.0)
 
 
-def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> Points:
-    """The known points without those that are infeasible when simulated; points that `found` (k, m) dominates are not simulated."""
+def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> tuple[Points, int]:
+    """The known points without those that are infeasible when simulated, and how many of them were not simulated because the work is to
+    end; points that `found` (k, m) dominates need not be."""
     feasible, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
     while True:
         rows = np.flatnonzero(feasible)
         apart = nondominated(np.vstack([found, known.F[rows]]))[len(found) :]
         look = rows[apart & ~seen[rows]]
         if not len(look):
-            return known[rows]
-        seen[look] = True
+            return known[rows], 0
         rtol, atol = _accuracy(verify)
-        feasible[look] = simulated(known[look], None, verify, rtol, atol, "DOP853").status == CONVERGED
+        try:
+            feasible[look] = simulated(known[look], None, verify, rtol, atol, "DOP853").status == CONVERGED
+        except Stopped:
+            return known[rows], len(look)
+        seen[look] = True
 
 
 def _accuracy(verify: float) -> tuple[float, float]:

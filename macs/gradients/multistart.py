@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from transcription.base import NLP
@@ -17,6 +20,10 @@ LIMIT, BETTER = 1e-8, 1e-7
 """Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
 
 
+MOST_ITERATIONS = 500
+"""Iterations of IPOPT after which a strategy of a solve is given up by default."""
+
+
 class GradientSolves:
     """Gradient solves with one tolerance, which are counted.
 
@@ -24,22 +31,32 @@ class GradientSolves:
     ----------
     tolerance : float
         Largest scaled residual of a feasible point.
+    max_iterations : int
+        Most iterations of IPOPT in one strategy of a solve.
 
     Attributes
     ----------
     counts : Counts
         Gradient solves, iterations, failures by status.
+    work : int
+        Iterations times variables, of all solves: what they cost, whatever the machine.
+    before : callable
+        Called before each solve.
     """
 
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance = tolerance
-        self.counts = Counts()
+    def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.counts, self.work = Counts(), 0
+        self.before: Callable[[], None] = lambda: None
 
     def __call__(
         self, nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None
     ) -> Solved:
         """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
-        solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, tolerance=self.tolerance)
+        self.before()
+        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
+        solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, **limits)
+        self.work += solved.iterations * len(nlp.variables)
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked)
         return solved
 
@@ -56,8 +73,8 @@ class MultistartSolver:
         Number of starts for each problem.
     rng : numpy.random.Generator
         Generator of the random candidates.
-    tolerance : float
-        Largest scaled residual of a feasible point.
+    solves : GradientSolves
+        Makes and counts the solves.
 
     Attributes
     ----------
@@ -65,9 +82,16 @@ class MultistartSolver:
         Gradient solves, iterations, failures by status.
     """
 
-    def __init__(self, nlp: NLP, given: np.ndarray | None, starts: int, rng: np.random.Generator, tolerance: float) -> None:
-        self.nlp, self.starts, self.tolerance = nlp, starts, tolerance
-        self._solves = GradientSolves(tolerance)
+    def __init__(
+        self,
+        nlp: NLP,
+        given: np.ndarray | None,
+        starts: int,
+        rng: np.random.Generator,
+        solves: GradientSolves,
+    ) -> None:
+        self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
+        self._solves = solves
         self._rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -167,3 +191,11 @@ class MultistartSolver:
             if found[-1].status == CONVERGED:
                 break
         return self.better(found, reference, weights)
+
+
+def guessed_start(nlp: NLP) -> np.ndarray | None:
+    """The problem's guess as a full vector (1, n), in the middle of the bounds where there is none; None without any guess."""
+    if not np.isfinite(nlp.guess).any():
+        return None
+    middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
+    return nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None])

@@ -1,4 +1,7 @@
-"""Displays of long work, on stderr: live on a terminal, a plain line every ten seconds elsewhere."""
+"""Displays of long work, on stderr: live on a terminal, a plain line every ten seconds elsewhere.
+
+A function of the library shows one by itself only where somebody looks on, and only of work that takes long; see `Display`.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,20 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar, Token
 from types import TracebackType
 from typing import Any, Self, TextIO
-
-from transcription.stopping import stopped_by
 
 from .interrupts import Interrupts
 
 EVERY = 10.0
 """Seconds between plain lines."""
+LONG = 2.0
+"""Seconds after which work is shown that nobody asked to show."""
+
+
+_INSIDE: ContextVar[bool] = ContextVar("inside a display", default=False)
+"""Whether the work is a part of other work that is shown, and need not be."""
 
 
 class Display(AbstractContextManager, ABC):
@@ -23,8 +31,9 @@ class Display(AbstractContextManager, ABC):
 
     Parameters
     ----------
-    shown : bool
-        False: nothing is written.
+    shown : bool, optional
+        False: nothing is written. None: shown on a terminal or in a notebook, once the work has taken `LONG`, unless it is a part of other
+        work that is shown.
     stream : text stream, optional
         Default: stderr.
     """
@@ -32,9 +41,12 @@ class Display(AbstractContextManager, ABC):
     transient = False
     """Whether the display is removed from a terminal at the end."""
 
-    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
-        self._shown, self._stream = shown, stream or sys.stderr
+    def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._shown = looked_at(self._stream) if shown is None else shown
+        self._delay = LONG if shown is None else 0.0
         self._live: Any = None
+        self._token: Token[bool] | None = None
         self._began, self._written = time.perf_counter(), -float("inf")
 
     @abstractmethod
@@ -53,9 +65,18 @@ class Display(AbstractContextManager, ABC):
         return time.perf_counter() - self._began
 
     def refresh(self) -> None:
-        """Write a plain line, if there is no terminal and the last line is at least `EVERY` seconds old."""
-        if self._shown and self._live is None and self.elapsed - self._written >= EVERY:
+        """Begin a display that was delayed. Without a terminal, write a plain line, if the last one is at least `EVERY` seconds old."""
+        if not self._due or self._live is not None:
+            return
+        if self._stream.isatty():
+            self._begin()
+        elif self.elapsed - self._written >= EVERY:
             self._write(self.line())
+
+    @property
+    def _due(self) -> bool:
+        """Whether the work is to be shown by now."""
+        return self._shown and time.perf_counter() - self._began >= self._delay
 
     def say(self, line: str) -> None:
         """Write a line now; on a terminal above the live display."""
@@ -65,16 +86,25 @@ class Display(AbstractContextManager, ABC):
             self._write(line)
 
     def __enter__(self) -> Self:
-        if self._shown and self._stream.isatty():
-            from rich.console import Console
-            from rich.live import Live
-
-            console = Console(file=self._stream)
-            self._live = Live(console=console, refresh_per_second=8, transient=self.transient, get_renderable=self.render)
-            self._live.start()
+        self._shown = self._shown and not (self._delay and _INSIDE.get())
+        if self._shown:
+            self._token = _INSIDE.set(True)
+            if not self._delay and self._stream.isatty():
+                self._begin()
         return self
 
+    def _begin(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        console = Console(file=self._stream)
+        self._live = Live(console=console, refresh_per_second=8, transient=self.transient, get_renderable=self.render)
+        self._live.start()
+
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._token is not None:
+            _INSIDE.reset(self._token)
+            self._token = None
         if self._live is not None:
             self._live.stop()
 
@@ -89,7 +119,7 @@ class StatusLine(Display):
 
     transient = True
 
-    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
+    def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
         super().__init__(shown, stream)
         self._words = ""
 
@@ -118,18 +148,22 @@ class Steps(Display):
     total : int
     stream : text stream, optional
         Default: stderr.
+    at_once : bool
+        True: the first Ctrl-C interrupts at once, where nothing is gained by the end of a step.
     """
 
     transient = True
 
-    def __init__(self, title: str, total: int, stream: TextIO | None = None) -> None:
+    def __init__(self, title: str, total: int, stream: TextIO | None = None, at_once: bool = False) -> None:
         super().__init__(True, stream)
+        self._at_once = at_once
         self._title, self._total, self._done = title, total, 0
         self._what = ""
         self._interrupts = Interrupts()
 
     def __enter__(self) -> Self:
-        self._interrupts.__enter__()
+        if not self._at_once:
+            self._interrupts.__enter__()
         return super().__enter__()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -169,10 +203,16 @@ class Steps(Display):
 
 
 @contextmanager
-def working(time_limit: float | None, progress: bool) -> Iterator[tuple[StatusLine, Interrupts]]:
+def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[StatusLine, Interrupts]]:
     """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
-    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, stopped_by(lambda: bool(interrupts.reason)):
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts:
         yield status, interrupts
+
+
+def looked_at(stream: TextIO) -> bool:
+    """Whether somebody sees at once what is written: on a terminal, or in a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return stream.isatty() or hasattr(shell, "kernel")
 
 
 def minutes(seconds: float) -> str:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from types import FrameType, TracebackType
-from typing import Any
 
+from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-class Stopped(Exception):  # noqa: N818 - an end, not an error
-    """Raised to end the work with its results so far. The text is the reason."""
+__all__ = ["Interrupts", "Stopped"]
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
-    """Clock and Ctrl-C handler of long work; a context manager.
+    """Clock and Ctrl-C handler of long work; a context manager, within which the work is asked to end (`transcription.stopping`).
 
-    In the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual.
+    In the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual. Work that is a part of other such
+    work ends with it, and what interrupts the part interrupts the whole.
 
     Parameters
     ----------
@@ -30,7 +30,9 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     def __init__(self, time_limit: float | None = None, earlier: float = 0.0) -> None:
         self._time_limit, self._earlier = time_limit, earlier
         self._interrupted = False
-        self._previous: Any = None
+        self._whole: Interrupts | None = None
+        self._outer: Asked | None = None
+        self._within = ExitStack()
         self._began = time.perf_counter()
 
     @property
@@ -39,15 +41,18 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         return self._earlier + self._here
 
     @property
+    def left(self) -> float | None:
+        """Seconds that are left of the time limit; None without one."""
+        return None if self._time_limit is None else max(self._time_limit - self._here, 0.0)
+
+    @property
     def _here(self) -> float:
         return time.perf_counter() - self._began
 
     @property
     def reason(self) -> str:
-        """Reason to end: "interrupted" or "time limit"; "" if there is none."""
-        if self._interrupted:
-            return "interrupted"
-        return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""
+        """Reason to end: "interrupted" or "time limit", or that of the work that this is a part of; "" if there is none."""
+        return self._own_reason() or ("" if self._outer is None else in_words(self._outer))
 
     def check(self) -> None:
         """Raise `Stopped` if there is a reason to end."""
@@ -55,15 +60,28 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             raise Stopped(self.reason)
 
     def __enter__(self) -> Interrupts:
+        self._outer = asked_now()
+        self._within.enter_context(stopped_by(self._own_reason))
         if threading.current_thread() is threading.main_thread():
-            self._previous = signal.signal(signal.SIGINT, self._interrupt)
+            previous = signal.getsignal(signal.SIGINT)
+            owner = getattr(previous, "__self__", None)
+            self._whole = owner if isinstance(owner, Interrupts) else None
+            signal.signal(signal.SIGINT, self._interrupt)
+            # A handler that was not set from Python cannot be set again from here.
+            self._within.callback(signal.signal, signal.SIGINT, previous if previous is not None else signal.default_int_handler)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._previous is not None:
-            signal.signal(signal.SIGINT, self._previous)
+        self._within.close()
+
+    def _own_reason(self) -> str:
+        if self._interrupted:
+            return "interrupted"
+        return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if self._interrupted:
             raise KeyboardInterrupt
         self._interrupted = True
+        if self._whole is not None and not self._whole._interrupted:
+            self._whole._interrupt(number, frame)

@@ -13,6 +13,7 @@ from transcription.catalogue import parse
 
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
+from ..fronts.merging import best_rows
 from ..gradients.polish import CountedSolves, PolishLog, polish
 from ..pareto import archive as archives
 from ..pareto import directions
@@ -111,24 +112,25 @@ class MACS(Settings, Solver):
         if not solves.stopped:
             state.polishing = None
 
-    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
-        """The front, polished on another transcription or with refined meshes if the settings ask for it."""
+    def finish(self, front: Front, verify: float | None, progress: bool | None) -> Front:
+        """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
+        settings ask for it."""
         if self.polish_on is not None:
             solves = front.stats["evaluations"] // self.polish_every
             return front.polished(
                 parse(self.polish_on),
                 solves=solves,
                 limit=self.archive,
-                verify=self.verify,
-                time_limit=time_limit,
+                verify=verify,
                 progress=progress,
             )
-        if self.mesh == "fixed" or not len(front):
-            return front
-        refined = front.refine_mesh(tolerance=self.mesh_tolerance, time_limit=time_limit, progress=progress)
-        # The objectives of a point on too coarse a mesh may be too low: such a point must not remove others.
-        trusted = refined.F[[i for i, point in enumerate(refined) if not point.note]]
-        return refined[np.flatnonzero(~np.any(dominates(trusted, refined.F[:, None]), axis=1))]
+        if self.mesh == "adaptive" and len(front):
+            refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
+            return refined[best_rows(refined)]
+        marked = front.verify(verify)
+        if self.mesh == "fixed" or not self.refines or verify is None:
+            return marked
+        return marked.mended(progress=progress)
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

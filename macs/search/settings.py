@@ -27,11 +27,12 @@ INTERVALS = {
     "experience": "[0, 1]",
     "breeding": "[0, 10]",
     "mesh_tolerance": "[1e-10, 1]",
-    "verify": "(0, inf)",
     "exponent": "[1, 16]",
 }
 """Interval of each number."""
-OPTIONAL = ("verify", "exponent")
+MESHES = ("mended", "fixed", "adaptive")
+"""Kinds of mesh."""
+OPTIONAL = ("exponent",)
 """Numbers that may be None."""
 
 
@@ -62,13 +63,11 @@ class Settings:
         (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
         agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
         polished again each time.
-    verify : float, optional
-        With `polish_on`: largest violation, in the constraints' scales, of a point when simulated. Points with more are moved inside their
-        limits by further solves, or left out.
-    mesh : {"fixed", "adaptive"}, default "fixed"
-        "adaptive": after the search, each point is solved on a mesh of its own until an independent simulation confirms it, see
-        `Front.refine_mesh`; points that are dominated then are left out. Not after Ctrl-C, a time limit or a callback. For optimal control
-        problems only.
+    mesh : {"mended", "fixed", "adaptive"}, default "mended"
+        What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
+        points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
+        of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
+        Without derivatives ("refine=False") points are not mended.
     mesh_tolerance : float, default 1e-7
         With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
         [1e-10, 1].
@@ -137,8 +136,7 @@ class Settings:
     archive: int = 10
     refine: bool = True
     polish_on: str | None = None
-    verify: float | None = None
-    mesh: str = "fixed"
+    mesh: str = "mended"
     mesh_tolerance: float = 1e-7
     rho: float = 1.0
     F: float = 0.9
@@ -177,13 +175,11 @@ class Settings:
             if name not in OPTIONAL or getattr(self, name) is not None:
                 check_interval(f"MACS: {name}", getattr(self, name), interval)
         check_choice("MACS: reseed", self.reseed, ("all", "spread"))
-        check_choice("MACS: mesh", self.mesh, ("fixed", "adaptive"))
+        check_choice("MACS: mesh", self.mesh, MESHES)
         self._check_polish()
 
     def _check_polish(self) -> None:
         if self.polish_on is None:
-            if self.verify is not None:
-                raise ValueError("MACS: verify makes no sense without polish_on")
             return
         if not isinstance(self.polish_on, str):
             raise ValueError(f"MACS: polish_on must be a word such as 'dfet:30x3', not {self.polish_on!r}")
@@ -215,6 +211,7 @@ class Settings:
         """
         settings: dict[str, Any] = {
             "refine": False,
+            "mesh": "fixed",
             "adaptive_coordinates": False,
             "redraw": False,
             "reseed": "spread",

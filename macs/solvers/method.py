@@ -77,9 +77,12 @@ class SearchMethod(ABC):
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
-    def finish(self, front: Front, time_limit: float | None, progress: bool) -> Front:
-        """The front after further work, of at most `time_limit` seconds, if the search was not stopped; for most solvers the same front."""
-        return front
+    def finish(self, front: Front, verify: float | None, progress: bool | None) -> Front:
+        """The front, marked by a simulation of its points unless `verify` is None, after further work.
+
+        Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too.
+        """
+        return front.verify(verify)
 
     def about(self) -> dict[str, Any]:
         """Name and settings of the solver as plain data, for fronts and checkpoints."""

@@ -58,7 +58,7 @@ class Progress:
 class SearchDisplay(Display):
     """Display of the `Progress` of a search; see `Display`."""
 
-    def __init__(self, shown: bool = True, stream: TextIO | None = None) -> None:
+    def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
         super().__init__(shown, stream)
         self._last: Progress | None = None
         self._shown_last: Progress | None = None
@@ -75,7 +75,7 @@ class SearchDisplay(Display):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         super().__exit__(kind, error, trace)
-        if self._shown and self._live is None and self._last is not self._shown_last:
+        if self._due and self._live is None and self._last is not self._shown_last:
             self._write(self.line())
 
     def line(self) -> str:

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import Objective
-from transcription.stopping import stopped_by
+from transcription.stopping import Stopped, stopped_by
 
 from ..evaluation.evaluator import Counts, Evaluator
 from ..front import Front
 from ..fronts.provenance import costs
-from ..io.interrupts import Interrupts, Stopped
+from ..io.interrupts import Interrupts
 from .checkpoint import Checkpoint, Kept
 from .method import SearchMethod
 from .progress import Progress, SearchDisplay
@@ -40,7 +40,7 @@ class SearchRun:
     goals : callable
         Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
     make_front : callable
-        (state, stats) -> Front.
+        (state, stats) -> Front; the state is None if the search was ended before its first population was evaluated.
     budget : int
         Largest number of evaluations.
     seed : int or None
@@ -63,7 +63,7 @@ class SearchRun:
     def go(
         self,
         time_limit: float | None,
-        progress: bool,
+        progress: bool | None,
         callback: Callable[[Progress], Any] | None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -105,7 +105,10 @@ class SearchRun:
         """Search to the end; returns the reason of the end."""
         if self._state is None:
             self.evaluator.before_batch = self._show
-            self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
+            try:
+                self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
+            except Stopped as reason:  # while something was built that even the first evaluations need
+                return str(reason)
             self._keep()
             self._write_in_time()
         # From here on there is a state to return, so a stop may come before any batch. The first population is not stopped by an exception.

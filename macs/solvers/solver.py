@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from os import PathLike
@@ -11,23 +11,29 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
-from problems.problem import Problem
+from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
+from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
+from ..evaluation.evaluator import Counts
 from ..front import Front
-from ..fronts.builders import black_box_points, trajectory_points
+from ..fronts.builders import black_box_points, no_points, trajectory_points
+from ..fronts.provenance import costs, more_costs
+from ..fronts.verified import VERIFY, check_verify
+from ..gradients.first_mesh import search_transcription
+from ..io.interrupts import Interrupts
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
 from .start import beginning, check_run, decisions, drawing
 
+log = logging.getLogger(__name__)
+
 Callback = Callable[[Progress], Any]
-NO_TIME = 1e-6
-"""Time limit, in seconds, of the work after a search that used up its own: this work then ends before its first solve."""
 
 
 class Solver(SearchMethod):
@@ -36,15 +42,16 @@ class Solver(SearchMethod):
     def solve(
         self,
         problem: Problem | CompiledProblem,
-        transcription: Transcription,
+        transcription: Transcription | None = None,
         *,
-        evaluations: int,
+        evaluations: int | None = None,
         seed: int | None = None,
         inner: str | InnerSolver = "auto",
         tolerance: float = 1e-6,
         start: Any = None,
+        verify: float | None = VERIFY,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -53,9 +60,10 @@ class Solver(SearchMethod):
         Parameters
         ----------
         problem : Problem
-        transcription : Transcription
-        evaluations : int
-            Largest number of candidates that are sent to the inner level.
+        transcription : Transcription, optional
+            Default: the problem's own; if it has none, DFET on a mesh that is found, see `gradients.found_mesh`.
+        evaluations : int, optional
+            Largest number of candidates that are sent to the inner level. Default: the problem's own number.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver
@@ -67,11 +75,14 @@ class Solver(SearchMethod):
             First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
             guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
+        verify : float, optional
+            How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
+            simulated.
         time_limit : float, optional
-            Seconds after which the search, and the work that follows it, end with their results so far. Checked, like Ctrl-C, before each
-            batch and each solve by IPOPT. A run that it ends is recorded as not reproducible.
-        progress : bool
-            Show the progress of the search on the terminal.
+            Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
+            doing. A run that this ends is recorded as not reproducible. If nothing was evaluated yet, the front is empty.
+        progress : bool, optional
+            Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
             Function that is called with a `Progress` after every iteration; the search ends if it returns True.
         checkpoint : path, optional
@@ -81,8 +92,8 @@ class Solver(SearchMethod):
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points. If none was found it is empty: `message` says why, and `closest` is the least
-            infeasible point.
+            Feasible, mutually non-dominated points, simulated. If none was found it is empty: `message` says why, and `closest` is the
+            least infeasible point.
 
         Raises
         ------
@@ -94,6 +105,8 @@ class Solver(SearchMethod):
 
         Notes
         -----
+        If what follows the search fails, the front is returned as the search left it, not simulated: `message` says why.
+
         A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
         the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search; only an
         adaptive mesh, or a polish on another transcription, is made again.
@@ -102,42 +115,79 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
+        check_problem(problem)
+        if evaluations is None:
+            evaluations = problem.default_evaluations if isinstance(problem, Problem) else DEFAULT_EVALUATIONS
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
-        check_problem(problem, transcription)
+        check_verify(verify)
         solver = inner_solver(inner)
+        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
+        earlier = Counts()
+        with Interrupts(time_limit) as interrupts:
+            try:
+                if transcription is None:
+                    transcription, earlier = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
+                run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
+            except Stopped as reason:
+                costs_so_far = costs(
+                    earlier, wall_time=interrupts.elapsed, seed=seed, tolerance=tolerance, stopped=str(reason), reproducible=False
+                )
+                return Front.of(no_points(compiled.goals, compiled, about, costs_so_far | level))
+            before = interrupts.elapsed
+            front = run.go(None, progress, callback, checkpoint)
+            front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
+            try:
+                return self.finish(front, verify, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
+            except Stopped as reason:
+                return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
+            except Exception as error:
+                # A search may have taken hours: its front is not lost by what follows it, and says what failed.
+                log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
+                failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
+                return front.replace(message="; ".join(filter(None, [front.message, failed])))
+
+    def _search_run(
+        self,
+        problem: CompiledProblem,
+        transcription: Transcription,
+        inner: InnerSolver,
+        level: dict[str, str],
+        evaluations: int,
+        seed: int | None,
+        tolerance: float,
+        start: Any,
+    ) -> SearchRun:
+        """The run of a search on an optimal control problem, ready to go."""
         nlp = transcription.nlp(problem)
-        self.check_transcription(transcription, nlp.problem)
+        self.check_transcription(transcription, problem)
         check_freedom(nlp)
-        self.check_objectives(len(nlp.problem.goals))
-        about = self.about()
-        level = {"inner": inner if isinstance(inner, str) else repr(inner)}
-        drawn = drawing(start)
-        evaluator = Bilevel(nlp, solver, float(tolerance), drawn if isinstance(drawn, Smooth) else None)
+        self.check_objectives(len(problem.goals))
+        about, drawn = self.about(), drawing(start)
+        evaluator = Bilevel(nlp, inner, tolerance, drawn if isinstance(drawn, Smooth) else None)
         certified = self.certifies and evaluator.has_gradients
-        run = SearchRun(
+
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:
+                return Front.of(no_points(problem.goals, problem, about, stats | level))
+            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified))
+
+        return SearchRun(
             self,
             evaluator,
-            goals=lambda: nlp.problem.goals,
-            make_front=lambda state, stats: Front.of(
-                trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified)
-            ),
+            goals=lambda: problem.goals,
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
             what={
                 "solver": about,
-                "problem": {"name": nlp.problem.name, "fingerprint": nlp.problem.fingerprint},
+                "problem": {"name": problem.name, "fingerprint": problem.fingerprint},
                 "transcription": transcription.to_dict(),
                 "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
                 **level,
             },
         )
-        began = time.perf_counter()
-        front = run.go(time_limit, progress, callback, checkpoint)
-        if front.stats["stopped"] not in ENDED:
-            return front
-        left = None if time_limit is None else max(time_limit - (time.perf_counter() - began), NO_TIME)
-        return self.finish(front, left, progress)
 
     def minimize(
         self,
@@ -153,7 +203,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
-        progress: bool = False,
+        progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
@@ -197,11 +247,16 @@ class Solver(SearchMethod):
         def goals() -> tuple[Objective, ...]:
             return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
 
+        def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            if state is None:  # the function itself asked whether to end
+                return Front.of(no_points(() if box.m_known is None else goals(), None, about, stats))
+            return Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats))
+
         run = SearchRun(
             self,
             box,
             goals=goals,
-            make_front=lambda state, stats: Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats)),
+            make_front=make_front,
             budget=evaluations,
             seed=seed,
             start=None if start is None else decisions(start, variables),

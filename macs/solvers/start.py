@@ -14,6 +14,7 @@ from transcription.base import NLP
 from transcription.smooth import Smooth
 
 from ..fronts.points import Point, Points
+from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
 
 STARTS = ("uniform", "smooth")
@@ -55,9 +56,9 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
     meshes are interpolated.
     """
     rows = []
-    if guess and np.isfinite(nlp.guess).any():
-        middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
-        rows.append(nlp.first_guess(np.where(np.isfinite(nlp.guess), nlp.guess, middle)[None]))
+    own = guessed_start(nlp) if guess else None
+    if own is not None:
+        rows.append(own)
     points = _points(start)
     if points:
         rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))

@@ -36,7 +36,6 @@ def problem() -> Problem:
     problem.maximize("horizontal speed", ascent.final(vx), unit="km/s")
     problem.default_transcription = "dfet:4x6"
     problem.default_evaluations = 10_000
-    problem.verify_tolerance = 3e-2
     return problem
 
 

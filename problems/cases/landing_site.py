@@ -51,7 +51,6 @@ def problem(landers: int = LANDERS) -> Problem:
     problem.minimize("hazard", danger)
     problem.default_transcription = "dfet:1x3"
     problem.default_evaluations = 10_000
-    problem.verify_tolerance = 1e-3
     return problem
 
 

@@ -133,5 +133,4 @@ def _orbit_rise(name: str, angles: tuple[float, float], period: float | None) ->
     problem.maximize("final energy", rise.final((vr**2 + vt**2) / 2 - 1 / r), unit="DU2/TU2")
     problem.default_transcription = "dfet:30x1"
     problem.default_evaluations = 10_000
-    problem.verify_tolerance = 3e-2
     return problem

@@ -6,12 +6,13 @@ import hashlib
 import json
 import pickle
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from macs.gradients.first_mesh import default_transcription
 from macs.io.text import call
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver
@@ -122,7 +123,9 @@ def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> d
     """Transcriptions by label, for each problem."""
     if isinstance(given, Mapping) and not set(given) & set(problems):
         return dict.fromkeys(problems, _named_schemes(given))
-    by_problem = _by_problem("transcriptions", given, problems, "default_transcription")
+    by_problem = _by_problem(
+        "transcriptions", given, problems, lambda problem: problem.default_transcription or default_transcription(problem)
+    )
     return {label: _named_schemes(one) for label, one in by_problem.items()}
 
 
@@ -151,19 +154,21 @@ def _solver(label: str, given: Any) -> Solver:
 
 
 def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, int]:
-    found = _by_problem("evaluations", given, problems, "default_evaluations")
+    found = _by_problem("evaluations", given, problems, lambda problem: problem.default_evaluations)
     for label, budget in found.items():
         check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
     return {label: int(budget) for label, budget in found.items()}
 
 
-def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledProblem], default: str) -> dict[str, Any]:
-    """A value for each problem: one for all, by labels, or if none is given the problem's attribute `default`."""
+def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledProblem], own: Callable[[Problem], Any]) -> dict[str, Any]:
+    """A value for each problem: one for all, by labels, or if none is given the problem's `own`."""
     if given is None:
+        found = {}
         for label, problem in problems.items():
             if isinstance(problem, CompiledProblem):
                 raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
-        return {label: getattr(problem, default) for label, problem in problems.items()}
+            found[label] = own(problem)
+        return found
     if not isinstance(given, Mapping):
         return dict.fromkeys(problems, given)
     for label in given:

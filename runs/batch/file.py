@@ -60,6 +60,8 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
                 raise ValueError(f"{key} is missing")
         for address in _addresses(data):
             check_trusted(address, trust, "it")
+    if data.get("verify") is False:
+        data["verify"] = None  # TOML has no word for nothing
     data.setdefault("name", path.stem)
     data["problems"] = _beside(data["problems"], path.parent)
     return data

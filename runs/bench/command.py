@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import inner, population, search, study
+from . import inner, population, search, standard, study
 from .measured import Row, save
 
-BENCHMARKS = {"inner": inner, "population": population, "search": search, "study": study}
+BENCHMARKS = {"inner": inner, "population": population, "search": search, "standard": standard, "study": study}
 KINDS = tuple(BENCHMARKS)
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
@@ -39,6 +39,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
+        "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),
         "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),
     }
     try:

@@ -18,7 +18,7 @@ from macs.io.text import text_table
 from transcription import NLP
 from transcription.base import CONVERGED
 from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, Newton, Propagate
-from transcription.numerics.batched import compiler
+from transcription.numerics.compiling import compiler
 
 from .cases import BATCH, INNER, Batch, Case
 from .measured import Column, Row, short, table

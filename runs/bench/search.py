@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import transcription
 from macs import MACS, Front, sweep
+from macs.gradients.first_mesh import default_transcription
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.archive import spread
@@ -60,7 +60,7 @@ def bench_search(rows: list[Row], seeds: Sequence[int], quick: bool, cases: Sequ
 
 def _measure(case: Search, seed: int, evaluations: int, reference: np.ndarray, pair: tuple[Row, Row], steps: Steps) -> None:
     problem = load(case.name)
-    method = transcription.parse(problem.default_transcription)
+    method = default_transcription(problem)
     steps.begin(f"{case.name}, {OURS}, seed {seed}")
     ours = MACS(agents=POINTS, archive=POINTS).solve(problem, method, evaluations=evaluations, seed=seed)
     if ours.stats["stopped"] == "interrupted":

@@ -1,9 +1,14 @@
-"""Exit codes of commands, and the error for a wrong call."""
+"""Exit codes of commands, the error for a wrong call, and Ctrl-C before a command begins and after it has ended."""
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 """Exit codes: done; failed (nothing feasible, a check not passed, runs missing); the call was wrong; Ctrl-C."""
@@ -20,3 +25,34 @@ def wrong_call_on_value_error() -> Iterator[None]:
         yield
     except ValueError as error:
         raise WrongCall(str(error)) from error
+
+
+def complain(message: str, program: str) -> int:
+    """One line on stderr."""
+    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    return WRONG
+
+
+@contextmanager
+def ended_at_once(program: str) -> Iterator[None]:
+    """A context in which Ctrl-C ends the process with one line, for imports: an exception in the middle of one may come out as another."""
+
+    def end(*_: Any) -> None:
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"{program}: interrupted\n".encode())
+        os._exit(INTERRUPTED)
+
+    previous = signal.getsignal(signal.SIGINT)
+    # Only where Ctrl-C means what it usually does; a process in the background may ignore it.
+    if previous is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def deaf() -> None:
+    """Ignore Ctrl-C from now on: the answer is given, and the process about to end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

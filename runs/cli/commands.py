@@ -8,18 +8,18 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import problems
 import transcription
 from macs.front import Front
 from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.style import label
 from macs.fronts.points import Point
-from macs.fronts.style import label
-from macs.fronts.verification import Check, missed, objective_scales
+from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
+from macs.io.interrupts import Interrupts
 from macs.io.text import text_table
+from macs.search.settings import MESHES
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
 from macs.solvers.start import STARTS
@@ -30,9 +30,10 @@ from transcription.inner import NAMED
 
 from ..batch import file as studyfile
 from . import study_commands
-from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 
-MESHES = ("fixed", "adaptive")
+UNSIMULATED = "none"
+"""Word for points that are not to be simulated."""
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
 
 
@@ -49,11 +50,11 @@ def list_all(arguments: Namespace) -> int:
 def solve(arguments: Namespace) -> int:
     """Search, simulate every point, print, save, draw."""
     problem = load_problem(arguments.problem)
-    method = problem.default_transcription if arguments.transcription is None else arguments.transcription
     with wrong_call_on_value_error():
-        scheme = transcription.parse(method) if isinstance(method, str) else method
-    mesh = choose(arguments.mesh, MESHES, "kind of mesh")
-    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, problem.verify_tolerance)
+        scheme = None if arguments.transcription is None else transcription.parse(arguments.transcription)
+    mesh = choose(arguments.mesh, MESHES, "kind of mesh") if arguments.mesh else None
+    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on)
+    verify = None if arguments.verify == UNSIMULATED else arguments.verify or problem.default_verify
     inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
     start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
@@ -64,35 +65,37 @@ def solve(arguments: Namespace) -> int:
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
     if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
-    with wrong_call_on_value_error():
-        front = solver.solve(
-            problem,
-            scheme,
-            evaluations=arguments.evaluations or problem.default_evaluations,
-            seed=arguments.seed,
-            inner=inner,
-            start=start,
-            checkpoint=arguments.checkpoint,
-            progress=True,
-        )
-    try:
-        front.save(out)
-    except OSError:
-        # The disk filled up while the search went on: its result is at least shown.
+    with Interrupts() as interrupts:
+        with wrong_call_on_value_error():
+            front = solver.solve(
+                problem,
+                scheme,
+                evaluations=arguments.evaluations or problem.default_evaluations,
+                seed=arguments.seed,
+                inner=inner,
+                start=start,
+                verify=verify,
+                checkpoint=arguments.checkpoint,
+                progress=True,
+            )
+        if interrupts.reason and not front.stats["evaluations"]:
+            complain(front.message, "macs solve")
+            return INTERRUPTED
+        try:
+            front.save(out)
+        except OSError:
+            # The disk filled up while the search went on: its result is at least shown.
+            print(front.table())
+            raise
         print(front.table())
-        raise
-    scales = objective_scales(front)
-    simulated = [as_simulated(point, scales) for point in front]
-    defects = [defect for defect, _ in simulated]
-    print(front.table(defects=defects, columns={"objectives off": [off for _, off in simulated]}))
-    missing = sum(not max(pair) <= problem.verify_tolerance for pair in simulated)
-    if missing:
-        named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-        print(f"{missing} of {len(front)} points, simulated, differ by more than {problem.verify_tolerance:g}:", end=" ")
-        print(f"see `macs verify {out}{named}`.")
-    print(f"\nfront saved in {out}")
-    if arguments.plot:
-        draw(front, arguments.plot)
+        if front.was_simulated.any() and not front.verified.all():
+            named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
+            print(f"See `macs verify {out}{named}`.")
+        print(f"\nfront saved in {out}")
+        if arguments.plot:
+            draw(front, arguments.plot)
+        if interrupts.reason:
+            return INTERRUPTED
     return DONE if len(front) else FAILED
 
 
@@ -137,7 +140,7 @@ def verify(arguments: Namespace) -> int:
         raise WrongCall(f"problem '{front.source.name}' was stated in a script; give it: --problem file.py:function")
     with wrong_call_on_value_error():
         problem = load_problem(arguments.problem) if arguments.problem else front.source.load()
-        tolerance = arguments.tolerance or problem.verify_tolerance
+        tolerance = arguments.tolerance or problem.default_verify
         front = front.replace(problem=front.source.check(problem, arguments.front))
         checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
     print(verification_table(front, checks))
@@ -177,22 +180,19 @@ def load_problem(address: str, **data: Any) -> Problem:
     return problem
 
 
-def make_solver(name: str, plain: bool = False, mesh: str = "fixed", polish_on: str | None = None, verify: float | None = None) -> Solver:
-    """A solver by its name in lower case, `plain` without derivatives, its front's mesh "fixed" or "adaptive", or polished on another
-    transcription so that its points are feasible when simulated, within `verify`."""
+def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None) -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives, with one of `MESHES`, or polished on another transcription."""
     with wrong_call_on_value_error():
         solver = solver_class(name)
         known = inspect.signature(solver).parameters
         if plain and "refine" not in known:
             raise WrongCall(f"--no-refine does not apply to solver '{name}', which never uses derivatives")
-        if mesh != "fixed" and "mesh" not in known:
+        if mesh and "mesh" not in known:
             raise WrongCall(f"--mesh {mesh} does not apply to solver '{name}', which does not change meshes")
         if polish_on and "polish_on" not in known:
             raise WrongCall(f"--polish-on {polish_on} does not apply to solver '{name}', which does not polish")
-        settings: dict[str, Any] = {"refine": False} if plain else {}
-        settings |= {"mesh": mesh} if mesh != "fixed" else {}
-        settings |= {"polish_on": polish_on, "verify": verify} if polish_on else {}
-        return solver(**settings)
+        given = {"refine": False if plain else None, "mesh": mesh, "polish_on": polish_on}
+        return solver(**{setting: value for setting, value in given.items() if value is not None})
 
 
 def choose(word: str, known: Iterable[str], kind: str) -> str:
@@ -230,14 +230,6 @@ def check_picture(path: str | None) -> None:
 # Output
 
 
-def as_simulated(point: Point, scales: np.ndarray) -> tuple[float, float]:
-    """The largest defect of a simulated point, and by how much its objectives differ from those simulated, in `scales` (m,)."""
-    if point.trajectory is None:
-        return np.inf, np.inf
-    flight = point.simulate()
-    return flight.max_defect, missed(flight, point.objectives, scales)
-
-
 def draw(drawn: Front | Point, path: str) -> None:
     """Draw a front, or a point's flight."""
     save_picture(drawn, path)
@@ -250,6 +242,7 @@ def describe(front: Front, point: Point) -> str:
     excursions = {name: f"{value:.2g}" for name, value in (point.excursions or {}).items()}
     groups = {
         f"point {point.index} of {len(front)}, {point.status}": objectives,
+        _verdict(front, point): _simulated(front, point),
         "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,
@@ -261,6 +254,20 @@ def describe(front: Front, point: Point) -> str:
     for name, phase in (point.trajectory or {}).items():
         lines += [f"phase {name}: {phase.t0:.6g} to {phase.tf:.6g} {phase.time_unit}", _ends(phase), ""]
     return "\n".join(lines).rstrip()
+
+
+def _verdict(front: Front, point: Point) -> str:
+    """Whether a point is verified, and within what."""
+    return f"simulated: {'verified' if point.verified else 'not verified'} within {front.stats.get('verify', 0.0):g}"
+
+
+def _simulated(front: Front, point: Point) -> dict[str, str]:
+    """What the simulation of a point found; nothing if it was not simulated."""
+    if point.simulated is None:
+        return {}
+    values = {label(goal.name, goal.unit): f"{point.simulated[goal.name]:.10g}" for goal in front.goals}
+    errors = {"defect": f"{point.defect:.1e}", "violation": f"{point.simulated_violation:.1e}"}
+    return {**values, **errors, **({"note": point.note} if point.note else {})}
 
 
 def _ends(phase: Any) -> str:

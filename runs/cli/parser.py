@@ -1,7 +1,8 @@
 """The parser of the command line, and the end of a call.
 
 Exit codes: 0 done; 1 failed (nothing feasible, a point that does not verify, runs missing); 2 the call was wrong: one line on stderr with
-the reason, and no file is left. The commands themselves are in `commands`, which is only imported to run one: help is instant.
+the reason, and no file is left; 130 ended by Ctrl-C, with what there was by then. The commands themselves are in `commands`, which is only
+imported to run one: help is instant.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from .answers import DONE, INTERRUPTED, WRONG, WrongCall
+from .answers import DONE, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
 
 EPILOG = """\
 examples:
@@ -29,7 +30,7 @@ examples:
   macs study status out/goddard-table3
   macs bench inner --quick
 
-exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong"""
+exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong, 130 ended by Ctrl-C"""
 
 
 BENCH = """\
@@ -38,6 +39,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
@@ -89,7 +91,18 @@ class Version(argparse.Action):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns its exit code."""
+    """Run a command, by default that of this process, which then ends; returns its exit code."""
+    try:
+        return _answer(argv)
+    except KeyboardInterrupt:
+        complain("interrupted", "macs")
+        return INTERRUPTED
+    finally:
+        if argv is None:
+            deaf()
+
+
+def _answer(argv: Sequence[str] | None) -> int:
     parser = build_parser()
     arguments, unknown = parser.parse_known_args(argv)
     if unknown:
@@ -100,7 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     # A warning, such as that of an old file, is one line, without the place in our code.
     warnings.formatwarning = lambda message, *_: f"{arguments.parser.prog}: {message}\n"
     try:
-        from . import commands
+        with ended_at_once(arguments.parser.prog):
+            from . import commands
 
         code = commands.COMMANDS[arguments.command](arguments)
         sys.stdout.flush()
@@ -112,16 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return complain(str(error), arguments.parser.prog)
     except OSError as error:
         return complain(error.strerror or str(error), arguments.parser.prog)
-    except KeyboardInterrupt:
-        complain("interrupted", arguments.parser.prog)
-        return INTERRUPTED
     return int(code)
-
-
-def complain(message: str, program: str) -> int:
-    """One line on stderr."""
-    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
-    return WRONG
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -163,12 +168,17 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(
-        "--mesh", metavar="KIND", default="fixed", help="fixed, or adaptive: refine the front's meshes in the end (default: fixed)"
+        "--mesh",
+        metavar="KIND",
+        help="mended: solve points that a simulation does not confirm again, on finer meshes (default); adaptive: all; fixed: none",
     )
     solve.add_argument(
         "--polish-on",
         metavar="T",
         help="polish the front on this transcription by gradients in the end, so that its points are feasible when simulated",
+    )
+    solve.add_argument(
+        "--verify", metavar="T", type=_verify, help="what simulated points may miss, in scales, or none: no simulation (default: 0.001)"
     )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
@@ -189,7 +199,7 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
-    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="of defects and violations (default: the problem's own)")
+    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="what simulated points may miss (default: 0.001)")
 
 
 def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -221,7 +231,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|population|search|study", nargs="?", help="which one (default: all)")
+    bench.add_argument("what", metavar="inner|population|search|standard|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
@@ -249,3 +259,7 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
 _natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
 _tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))
+
+
+def _verify(text: str) -> float | str:
+    return text if text == "none" else float(_tolerance(text))

@@ -57,8 +57,6 @@ def status(arguments: Namespace) -> int:
 
 def report(arguments: Namespace) -> int:
     """Tables on the terminal, and with the figures in the study's folder."""
-    from macs.io.interrupts import Stopped
-
     from ..report.report import FOLDER
     from ..report.report import report as write
 
@@ -71,9 +69,6 @@ def report(arguments: Namespace) -> int:
     try:
         with wrong_call_on_value_error():
             found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True, trust=arguments.trust)
-    except Stopped:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
     except OSError as error:
         raise WrongCall(str(error)) from error
     print(f"{found}\n\n{len(found.files)} files in {Path(arguments.folder) / FOLDER}")

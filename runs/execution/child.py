@@ -128,7 +128,7 @@ class Child:
         if process is None:
             return
         if hasattr(os, "killpg"):
-            # It leads a group of its own: also a compiler that it may just be calling ends.
+            # It leads a group of its own. A compiler that it may just be calling has another one, and ends by itself.
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)
         else:

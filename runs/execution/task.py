@@ -67,7 +67,7 @@ class Outcome:
         "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
         minimised. The last sample is the front itself.
     simulated : dict
-        If the points of the front were to be simulated: see `simulation_record.record`.
+        If the points of the front were simulated: see `simulation_record.record`.
     """
 
     status: str
@@ -121,6 +121,7 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
                 inner=task.inner,
                 tolerance=task.tolerance,
                 start=task.start,
+                verify=task.verify,
                 callback=samples.note,
                 checkpoint=kept,
             )
@@ -133,8 +134,9 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
 
 
 def _simulated(task: Task, front: Front) -> SimulationRecord:
-    """The points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not lost by it."""
-    if task.verify is None:
+    """The final states of the points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not
+    lost by it."""
+    if task.verify is None or not front.was_simulated.all():
         return {}
     try:
         return record(front, task.verify)

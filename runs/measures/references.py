@@ -16,7 +16,7 @@ from msgspec import Meta
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.style import label
+from macs.fronts.pictures.style import label
 from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
 from problems.compiled import Objective

@@ -1,4 +1,4 @@
-"""Objectives, violations and final states of a run's points after independent simulation, as plain data for its record."""
+"""Final states of a run's points after independent simulation, as plain data for its record."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from typing import TypedDict
 import numpy as np
 
 from macs.front import Front
+from macs.fronts.verified import accuracy
 
 
 class SimulationRecord(TypedDict, total=False):
-    """Objectives "F" (n, m), all minimised, and "violation" (n,) of a front's points as simulated, and "ends" of their trajectories:
-    {phase: {state: final values (n,)}}. Empty if they were not simulated."""
+    """The "ends" of the simulated trajectories of a front's n points: {phase: {state: final values (n,)}}. Empty if they were not
+    simulated."""
 
-    F: list[list[float]]
-    violation: list[float]
     ends: dict[str, dict[str, list[float]]]
 
 
@@ -24,10 +23,10 @@ Ends = Mapping[str, Mapping[str, np.ndarray]]
 
 
 def record(front: Front, tolerance: float) -> SimulationRecord:
-    """The points of a front as simulated; see `Front.simulate`."""
-    simulated = front.simulate(tolerance=tolerance)
-    final = {phase: {name: values.tolist() for name, values in states.items()} for phase, states in ends(simulated).items()}
-    return {"F": simulated.F.tolist(), "violation": simulated.violation.tolist(), "ends": final}
+    """The final states of a front's points when they are simulated as finely as to verify them within a tolerance."""
+    rtol, atol = accuracy(tolerance)
+    final = ends(front.simulate(rtol=rtol, atol=atol))
+    return {"ends": {phase: {name: values.tolist() for name, values in states.items()} for phase, states in final.items()}}
 
 
 def ends(front: Front) -> Ends:

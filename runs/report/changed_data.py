@@ -14,8 +14,8 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.fronts.pictures.style import COLORS, better
 from macs.fronts.simulated import check_alike
-from macs.fronts.style import COLORS, better
 from problems.checks import unknown
 
 from ..data.schema import errors_begin_with

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.simulated import best, judged
+from macs.fronts.columns import by_first
 from macs.io.text import counted
+from macs.pareto.dominance import nondominated
 
 from ..batch.store import Store, StoredRun
 from ..data.schema import errors_begin_with
@@ -29,7 +29,7 @@ the report says how many."""
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated, as simulated.
+    """The points of a run that count: all of them, or in a study that verifies those that are verified, with their simulated objectives.
 
     Attributes
     ----------
@@ -37,33 +37,37 @@ class Verified:
         The n points that count.
     ends : Ends
         Their states at the end of each phase.
-    claimed, feasible : int
-        Number of points that the solver returned, and of those feasible when simulated, dominated ones included.
+    claimed, verified : int
+        Number of points that the solver returned, and of those verified, dominated ones included.
     """
 
     front: Front
     ends: Ends
     claimed: int
-    feasible: int
+    verified: int
 
     @classmethod
     def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
         """The points of a finished run of a study that verifies within a tolerance, or with None not at all.
 
-        Points whose simulation is not in the run's record are simulated now. Raises ValueError if they cannot be, as their problem is not
-        found.
+        Points that were not verified within this tolerance, and final states that are not in the run's record, are simulated now. Raises
+        ValueError if that cannot be, as their problem is not found.
         """
         front = run.front
         if tolerance is None or not len(front):
             return cls(front, ends(front), len(front), len(front))
-        found = run.simulated
-        if np.shape(found.get("F", ())) != front.F.shape or np.shape(found.get("violation", ())) != front.violation.shape:
-            with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
-                found = record(front, tolerance)
-        simulated = judged(front, np.array(found["F"], dtype=float), np.array(found["violation"], dtype=float), tolerance)
-        rows = best(simulated)
-        places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in found["ends"].items()}
-        return cls(Front.of(simulated[rows]), places, len(front), int((simulated.status == CONVERGED).sum()))
+        final = run.simulated.get("ends", {})
+        lengths = {len(values) for states in final.values() for values in states.values()}
+        with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
+            front = front if front.stats.get("verify") == tolerance else front.verify(tolerance)
+            final = final if lengths == {len(front)} else record(front, tolerance)["ends"]
+        rows = np.flatnonzero(front.verified)
+        rows = rows[nondominated(front.simulated_F[rows])]
+        rows = rows[by_first(front.simulated_F[rows] * front.signs)]
+        kept = front[rows]
+        kept = kept.replace(F=kept.simulated_F, violation=kept.simulated_violation, optimality=[None] * len(kept))
+        places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in final.items()}
+        return cls(kept, places, len(front), int(front.verified.sum()))
 
 
 @dataclass(frozen=True, eq=False)

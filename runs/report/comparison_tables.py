@@ -15,7 +15,7 @@ from .tables import Cell, Column, Table, table
 
 
 def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
-    """A row for each solver: the points it claims to be feasible, and those feasible when simulated. Empty if a study does not verify."""
+    """A row for each solver: the points it claims to be feasible, and those verified. Empty if a study does not verify."""
     tolerance = study.get("verify")
     if tolerance is None:
         return {}
@@ -23,18 +23,18 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
     for solver, found in comparison.verified.items():
         if not found:
             continue
-        claimed, feasible = sum(one.claimed for one in found), sum(one.feasible for one in found)
+        claimed, verified = sum(one.claimed for one in found), sum(one.verified for one in found)
         counts = summarise([len(one.front) for one in found], larger=True)
-        share = 100.0 * feasible / claimed if claimed else None
-        rows.append([solver, len(found), claimed, feasible, share, counts.mean, counts.median])
-    heads = ["solver", "runs", "points claimed", "feasible as simulated", "%", "of these not dominated, mean of a run", "median"]
+        share = 100.0 * verified / claimed if claimed else None
+        rows.append([solver, len(found), claimed, verified, share, counts.mean, counts.median])
+    heads = ["solver", "runs", "points claimed", "verified", "%", "of these not dominated, mean of a run", "median"]
     note = (
-        "All points were simulated by DOP853. A point is feasible as simulated if it violates no state bound, final condition, path or "
-        f"other constraint by more than {tolerance:g} of its scale. Indicators and published statistics are of these points alone, with "
-        "their objectives as simulated, without those that others of their run dominate. Figures over evaluations, iterations or time are "
-        "of the points as claimed."
+        f"All points were simulated by DOP853. A point is verified if nothing differs by more than {tolerance:g}: its states, in spans of "
+        "their bounds; its bounds, final values, paths and constraints, in their scales; its objectives, in ranges of its front. "
+        "Indicators and published statistics are of these points alone, with their objectives as simulated, without those that others of "
+        "their run dominate. Figures over evaluations, iterations or time are of the points as claimed."
     )
-    return {"claims": table(heads, rows, f"{comparison.name}: points claimed, and points feasible as simulated.", [note])}
+    return {"claims": table(heads, rows, f"{comparison.name}: points claimed, and points verified.", [note])}
 
 
 def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:

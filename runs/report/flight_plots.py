@@ -11,9 +11,9 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.flight_plot import along, quantities
+from macs.fronts.pictures.flight_plot import along, quantities
+from macs.fronts.pictures.style import COLORS, label
 from macs.fronts.points import Point
-from macs.fronts.style import COLORS, label
 from macs.pareto.archive import spread
 
 from ..measures.indicators import normalised

@@ -11,12 +11,13 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.flight_plot import along
+from macs.fronts.pictures.flight_plot import along
+from macs.fronts.pictures.style import label
 from macs.fronts.points import Point
-from macs.fronts.style import label
 from macs.gradient_tools import payoff
+from macs.gradients.first_mesh import default_transcription
 from problems import load
-from transcription import SingleShooting, from_dict, parse, word
+from transcription import SingleShooting, from_dict, word
 
 from ..measures.indicators import pieces, truth
 from ..measures.references import Reference, module_of
@@ -180,7 +181,7 @@ def _ends(front: Front) -> tuple[Front, str]:
             source = front.source
             if source is None or not source.address:
                 return front[:0], "Objectives were not optimised alone: single shooting is not suited to gradients."
-            method = parse(load(source.address, **source.data).default_transcription)
+            method = default_transcription(load(source.address, **source.data))
     except ValueError as error:
         return front[:0], f"Objectives were not optimised alone: {error}."
     found = payoff(problem, method)

@@ -108,7 +108,7 @@ class GoalAttainment:
     objective : Objective
     histories : (transcription, solver) -> one for each run
         Of failed runs, too, which attain nothing.
-    simulated : (transcription, solver) -> attainment of each run by points that are feasible as simulated
+    verified : (transcription, solver) -> attainment of each run by its verified points
         Of failed runs, too. Empty where points are not simulated.
     seconds : (transcription, solver) -> the time of each finished run
     """
@@ -117,14 +117,14 @@ class GoalAttainment:
     goal: Goal
     objective: Objective
     histories: Mapping[tuple[str, str], Sequence[History]]
-    simulated: Mapping[tuple[str, str], Sequence[float]]
+    verified: Mapping[tuple[str, str], Sequence[float]]
     seconds: Mapping[tuple[str, str], Sequence[float]]
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
         heads: list[Column | str] = [Column("transcription", grouped=True), "solver", "runs"]
         heads += [Column(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
-        heads += [Column("median as simulated", digits=4)] if self.simulated else []
+        heads += [Column("median, verified", digits=4)] if self.verified else []
         heads += [Column(f"evaluations to {share:g}") for share in self.goal.shares]
         heads += [Column("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
@@ -133,14 +133,18 @@ class GoalAttainment:
             final: list[Cell] = [float(part[-1]) if np.isfinite(part[-1]) else None for part in (b.median, b.lower, b.upper)]
             seconds = self.seconds[cell]
             took = float(np.median(seconds)) if seconds else None
-            final += [_middle(self.simulated[cell])] if self.simulated else []
+            final += [_middle(self.verified[cell])] if self.verified else []
             rows.append([*cell, b.runs, *final, *(_reached(b, share) for share in self.goal.shares), took])
         unit = f" {self.objective.unit}" if self.objective.unit else ""
         notes = [
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
             "quartiles are over the runs; one without a feasible point has attained nothing. A dash: that share of runs did not reach it. "
             "Values are those of the transcription"
-            + (", except those as simulated: of the feasible points of each run in the end." if self.simulated else ", not simulated.")
+            + (
+                ", except those verified: as simulated, of the verified points of each run in the end."
+                if self.verified
+                else ", not simulated."
+            )
         ]
         return {f"{self.problem}-goal-attainment": table(heads, rows, f"{self.problem}: goal attainment of {self.objective.name}.", notes)}
 
@@ -158,7 +162,8 @@ class GoalAttainment:
 
 
 def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[GoalAttainment]:
-    """The attainment of the goal that a study states, on each of its problems; also as simulated if it verifies. Empty without a goal."""
+    """The attainment of the goal that a study states, on each of its problems; also by verified points if it verifies. Empty if there is
+    no goal."""
     if study.get("goal") is None:
         return []
     goal, verify = Goal.of(study["goal"], {}), study.get("verify")
@@ -167,7 +172,7 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
         here = [comparison for comparison in comparisons if comparison.problem == problem]
         goals = here[0].known.goals
         histories: dict[tuple[str, str], list[History]] = {}
-        simulated: dict[tuple[str, str], list[float]] = {}
+        attained: dict[tuple[str, str], list[float]] = {}
         seconds: dict[tuple[str, str], list[float]] = {}
         for comparison in here:
             for solver, runs in comparison.runs.items():
@@ -176,10 +181,10 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
                 if known:
                     histories[cell], seconds[cell] = known, [run.wall_time for run in runs]
                 if known and verify is not None:
-                    simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
+                    attained[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
         if histories:
             objective = next(one for one in goals if one.name == goal.objective)
-            found.append(GoalAttainment(problem, goal, objective, histories, simulated, seconds))
+            found.append(GoalAttainment(problem, goal, objective, histories, attained, seconds))
     return found
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.fronts.style import COLORS, GREY, better
+from macs.fronts.pictures.style import COLORS, GREY, better
 from macs.io.text import counted
 from problems.compiled import Objective
 

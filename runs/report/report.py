@@ -135,7 +135,7 @@ def report(
 
 def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
     """The comparisons one by one; the terminal shows which one is in progress."""
-    with Steps("report", len(found)) as steps:
+    with Steps("report", len(found), at_once=True) as steps:
         for comparison in found:
             steps.begin(comparison.name)
             yield comparison

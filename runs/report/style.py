@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from macs.fronts.style import STYLE, blank_figure
+from macs.fronts.pictures.style import STYLE, blank_figure
 
 COLUMN, PAGE = 3.5, 7.2
 """Inches: the width of a column, and of a page of two."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.fronts.style import label
+from macs.fronts.pictures.style import label
 from macs.io.atomic import write_whole
 from macs.io.text import text_table
 

@@ -23,7 +23,7 @@ import moocore
 import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
-from macs.gradients.multistart import MultistartSolver
+from macs.gradients.multistart import GradientSolves, MultistartSolver
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
@@ -76,7 +76,7 @@ class Truth:
         self.case = load(case).compile()
         self.nlp = METHOD.transcribe(strict)
         self.template = self.nlp.unpack(self.nlp.first_guess(self.nlp.guess[None])[0])
-        self.descents = MultistartSolver(self.nlp, None, 1, np.random.default_rng(0), 1e-6)
+        self.descents = MultistartSolver(self.nlp, None, 1, np.random.default_rng(0), GradientSolves(1e-6))
         self.found: list[Solved] = []
 
     @property

@@ -198,14 +198,14 @@ def test_fronts_of_different_things_do_not_merge():
 
 def test_a_table_has_a_row_for_each_point_and_warnings():
     front = flights(5)
-    lines = front.table(defects=[1e-9] * 5, columns={"note": list("abcde")}).split("\n")
+    lines = front.table({"bound": [1e-9] * 5, "note": list("abcde")}).split("\n")
     assert lines[0] == "two legs: 5 points, DFET(elements=3, order=4), MACS, 1 000 evaluations, seed 7, 1.2 s"
-    assert "min [s]" in lines[3] and "max [km]" in lines[3] and "defect" in lines[2] and "note" in lines[2]
+    assert "min [s]" in lines[3] and "max [km]" in lines[3] and "bound" in lines[2] and "note" in lines[2]
     assert len([line for line in lines if "converged" in line]) == 5
     assert "4 of 5 points leave their bounds between nodes: u of point 4 by 0.5" in lines[-1]
     assert max(map(len, lines)) < 140 and all(line == line.rstrip() for line in lines)
-    with pytest.raises(ValueError, match="'defect' has 2 entries"):
-        front.table(defects=[0, 1])
+    with pytest.raises(ValueError, match="'bound' has 2 entries"):
+        front.table({"bound": [0, 1]})
 
 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=6))

@@ -18,7 +18,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, inner, population, search, study
+from runs.bench import command, inner, population, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -44,6 +44,7 @@ def coarse(name):
 def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
+    monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
@@ -108,18 +109,59 @@ def test_searches_for_the_same_time_and_points(small):
     assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
 
 
+def test_published_problems_each_in_its_own_process():
+    rows: list[Row] = []
+    standard.bench_standard(rows, standard.Effort(("moon_landing", "schwartz")))
+    assert [(row.case, row.who) for row in rows] == [("moon_landing", standard.RIGHT), ("schwartz", standard.RIGHT)]
+    landing = rows[0]
+    assert landing.of("published") == 1.420312599049 and abs(landing.of("error")) < 5e-4
+    assert landing.of("simulated") == pytest.approx(landing.of("published") * (1 + landing.of("error")), rel=1e-12)
+    assert landing.of("violation") < 1e-6 and landing.of("iterations") >= landing.of("starts") >= 1 and 30 < landing.of("memory") < 1500
+    text = standard.report(rows)
+    assert "right and verified: asked at least 17 of 18, measured 2 of 2, met" in text
+    assert all(len(line) <= 150 for line in text.splitlines())
+
+
+def test_what_does_not_end_or_crashes_is_told(capfd):
+    rows: list[Row] = []
+    standard.bench_standard(rows, standard.Effort(("moon_landing",), limit=0.05))
+    with Steps("published problems", 1) as steps:
+        found = standard.apart("no_such_problem", 0, 60.0, steps)
+    rows.append(standard.compared("no_such_problem", standard.published("moon_landing")[0], found))
+    assert [row.who for row in rows] == [standard.LATE, standard.CRASHED]
+    assert "no_such_problem" in capfd.readouterr().err
+    assert "measured 0 of 2, MISSED" in standard.report(rows)
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "right"),
+        ({"simulated": 1.4213}, "WRONG"),
+        ({"simulated": 1.4193}, "WRONG"),
+        ({"verified": 0.0}, "not verified"),
+        ({"simulated": 1.43, "verified": 0.0}, "not verified"),
+        ({"status": "failed"}, "FAILED"),
+    ],
+)
+def test_verdicts(change, verdict):
+    found = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "verified": 1.0, "seconds": 1.0} | change
+    assert standard.compared("moon_landing", standard.published("moon_landing")[0], found).who == verdict
+
+
 def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    places = [said.out.index(words) for words in ("INNER LEVELS", "POPULATIONS", "SEARCHES", "STUDIES", f"values in {path}")]
+    titles = ("INNER LEVELS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
+    places = [said.out.index(words) for words in (*titles, f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
     assert "in one call, without a compiler: asked at least 2500 candidates a second, at best " in said.out
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "population", "search", "study"}
+    assert {row["benchmark"] for row in table} == {"inner", "population", "search", "standard", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -154,7 +196,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, population, search"]),
+        (["bench", "studies"], ["studies", "study", "inner, population, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

@@ -93,7 +93,7 @@ def test_failed_runs_attain_nothing():
     ]
 
 
-def test_studies_that_verify_also_have_the_attainment_as_simulated():
+def test_studies_that_verify_also_have_the_attainment_of_verified_points():
     def points(*costs: float) -> Front:
         n = len(costs)
         F = [[cost, 0.0] for cost in costs]
@@ -102,10 +102,10 @@ def test_studies_that_verify_also_have_the_attainment_as_simulated():
     for fronts, median in (([points(8.0, 6.0), points(), points(10.0)], "0.0"), ([points(8.0), points(), points()], "")):
         here = Comparison("p", "coarse", {"s": RUNS}, {"s": fronts}, {}, {"s": 0}, {"s": 0})
         (found,) = goal_attainments([here], {"goal": COST, "verify": 0.01})
-        assert [row["median as simulated"] for row in rows(found)] == [median]
-        assert "feasible points" in str(found.tables())
+        assert [row["median, verified"] for row in rows(found)] == [median]
+        assert "verified points" in str(found.tables())
     (found,) = goal_attainments([here], {"goal": COST})
-    assert "median as simulated" not in rows(found)[0]
+    assert "median, verified" not in rows(found)[0]
 
 
 def test_a_line_for_each_transcription_from_where_the_median_run_has_something():

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from cases import candidates, decay, integrator, oscillator, propagated, solved
+from euler import Euler
 from gauss import integrate
 from test_dfet import rates_of
 
@@ -78,6 +79,16 @@ def test_the_degree_of_the_controls_follows_the_order_unless_it_is_given():
     assert free == [4 * 10 + 1, 4 * 3 + 1]
 
 
+def test_a_mesh_may_have_a_degree_of_controls_of_its_own():
+    nlp = DFET(3, 2, control_order=1, mesh={"swing": (UNEVEN, 4, 0)}).transcribe(oscillator())
+    assert nlp.unpack(propagated(nlp, k=1)[0])["swing"].control.coefficients.shape == (4, 1, 2)
+    same = DFET(3, 2, control_order=1, mesh={"swing": (UNEVEN, 4, 2)}), DFET(3, 2, control_order=2, mesh={"swing": (UNEVEN, 4)})
+    one, two = (method.transcribe(oscillator()) for method in same)
+    Z = propagated(one)
+    assert np.array_equal(Z, propagated(two))
+    assert all(np.array_equal(a, b) for a, b in zip(one.evaluate(Z), two.evaluate(Z), strict=True))
+
+
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_guesses_follow_the_elements(basis):
     problem, phase = integrator()
@@ -131,9 +142,28 @@ def test_periodic_controls_are_interpolated_the_short_way_round():
 )
 def test_meshes_make_equal_values_and_go_through_files(mesh):
     method = DFET(2, 3, mesh=mesh)
+    assert all(set(plain) == {"edges", "order"} for plain in (method.to_dict()["settings"]["mesh"] or {}).values())
     again = from_dict(json.loads(json.dumps(method.to_dict())))
     assert again == method and hash(again) == hash(method)
     assert json.loads(json.dumps(method.to_dict())) == method.to_dict() == again.to_dict()
+
+
+def test_degrees_of_controls_and_moving_edges_are_kept():
+    mesh = PhaseMesh(UNEVEN, 3, np.int64(1), [3, np.int64(1)])
+    assert (mesh.control_order, mesh.moving) == (1, (1, 3))
+    assert PhaseMesh.of(json.loads(json.dumps(mesh.to_dict()))) == mesh == PhaseMesh.of((UNEVEN, 3, 1, (1, 3)))
+    assert repr(mesh) == "PhaseMesh(4 elements of order 3, controls of order 1, 2 of 3 inner edges moving)"
+    assert mesh != PhaseMesh(UNEVEN, 3, 1) != PhaseMesh(UNEVEN, 3)
+    method = DFET(2, 3, mesh={"swing": (UNEVEN, 3, 1)})
+    again = from_dict(json.loads(json.dumps(method.to_dict())))
+    assert again == method and hash(again) == hash(method)
+
+
+def test_methods_that_do_not_use_them_refuse_them():
+    with pytest.raises(ValueError, match="Euler: phase 'swing': the order of its controls cannot be chosen"):
+        Euler(3, mesh={"swing": (UNEVEN, 1, 2)})
+    with pytest.raises(ValueError, match="Euler: phase 'swing': the edges of its elements cannot move"):
+        Euler(3, mesh={"swing": (UNEVEN, 1, None, (2,))})
 
 
 @pytest.mark.parametrize(
@@ -150,6 +180,15 @@ def test_meshes_make_equal_values_and_go_through_files(mesh):
         {"swing": ("ab", 1)},
         {"swing": 3},
         {"swing": {"edges": (0, 1), "degree": 2}},
+        {"swing": (UNEVEN, 2, -1)},
+        {"swing": (UNEVEN, 2, 1.5)},
+        {"swing": (UNEVEN, 2, 1, (0,))},
+        {"swing": (UNEVEN, 2, 1, (4,))},
+        {"swing": (UNEVEN, 2, 1, (1.0,))},
+        {"swing": (UNEVEN, 2, 1, (True,))},
+        {"swing": (UNEVEN, 2, 1, (1, 2, 1))},
+        {"swing": (UNEVEN, 2, 1, 1)},
+        {"swing": (UNEVEN, 2, 1, "12")},
     ],
 )
 def test_what_is_no_mesh_is_refused_by_the_phases_name(mesh):

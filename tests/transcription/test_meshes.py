@@ -11,14 +11,28 @@ from hypothesis import strategies as st
 
 from problems import Problem
 from transcription import DFET
-from transcription.meshes.adaptation import cuts, degrees, judge, next_method, refine, split
+from transcription.meshes.adaptation import LAYERS, cuts, degrees, merged, next_method, pieces, refine, split
 from transcription.meshes.errors import decay_rates, phase_errors
+from transcription.meshes.growth import growth
+from transcription.meshes.scales import control_scales, objective_variations, own_scales, state_scales
+from transcription.meshes.verdict import Wanted, judge
+from transcription.nlp.scaling import gradients
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
-from transcription.trajectories.simulate import simulate
+from transcription.trajectories.simulate import simulate, simulate_elements
 
 HIGHEST = DFET.highest_order
 EDGES = np.array([0.0, 0.2, 0.5, 1.0])
 NONE = np.full(3, np.nan)
+
+
+def errors(nlp, flight):
+    """Those of the only phase."""
+    return phase_errors(nlp.problem, flight, simulate_elements(nlp.problem, flight, rtol=1e-12, atol=1e-13))[0]
+
+
+def assessed(nlp, z, tolerance=1e-6):
+    F = nlp.evaluate(z[None])[0][0]
+    return judge(nlp.problem, nlp.unpack(z), Wanted(tolerance, tolerance), F, np.maximum(np.abs(F), 1e-3))
 
 
 # The kernel
@@ -63,13 +77,15 @@ def test_smooth_elements_get_a_higher_order():
 
 def test_what_a_higher_order_would_not_mend_is_cut():
     finer, order = refine(EDGES, 6, np.array([1e9, 0.2, 0.1]), np.full(3, 0.9), NONE, most=20, highest=HIGHEST)
-    assert len(finer) == 5 and order == 6
+    assert order == 6 and finer.tolist() == [0.0, 0.05, 0.1, pytest.approx(0.15), 0.2, 0.5, 1.0], "as many parts as the error asks for"
 
 
 def test_an_element_is_cut_around_a_steep_place():
     finer, order = refine(EDGES, 4, np.array([0.1, 0.1, 9.0]), np.full(3, 3.0), np.array([np.nan, np.nan, 0.2]), most=20, highest=HIGHEST)
     assert finer == pytest.approx([0, 0.2, 0.5, 0.725, 0.875, 1.0]) and order == 4
-    assert cuts(0.95) == [pytest.approx(0.65)] and cuts(np.nan) == [0.0]
+    assert cuts(0.95) == [pytest.approx(0.7)] and cuts(-0.95) == [pytest.approx(-0.7)] and cuts(np.nan) == [0.0]
+    assert cuts(0.95, graded=True) == pytest.approx([0.7, 0.94, 0.988]), "an element at the end, however thin the layer is"
+    assert cuts(0.2, graded=True) == pytest.approx(sorted([0.2 + s * d for s in (-1, 1) for d in LAYERS]))
 
 
 def test_the_worst_elements_come_first_where_there_is_little_room():
@@ -100,9 +116,9 @@ def test_decay_rates_are_those_of_the_function():
 def test_local_defects_are_those_of_the_single_elements():
     nlp = DFET(1, 1, mesh={"fall": ((0, 0.5, 1), 0)}).transcribe(decay(tf=2.0)[0])
     flight = nlp.unpack(propagated(nlp, k=1)[0])
-    found = phase_errors(nlp.problem, flight, rtol=1e-12, atol=1e-13)[0]
+    found = errors(nlp, flight)
     edges = flight["fall"].edge_states[:, 0]
-    assert found.defect == pytest.approx(np.abs(edges[:-1] * np.exp(-1.0) - edges[1:]) / 4.0, rel=1e-6)
+    assert found.defect == pytest.approx(np.abs(edges[:-1] * np.exp(-1.0) - edges[1:]) / np.ptp(edges), rel=1e-6)
 
 
 def test_quadrature_is_held_against_the_flight():
@@ -113,8 +129,33 @@ def test_quadrature_is_held_against_the_flight():
     problem.minimize("cost", phase.integral(1 + ca.cos(40 * x)))
     nlp = DFET(2, 1).transcribe(problem)
     flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
-    found = phase_errors(nlp.problem, flight, rtol=1e-10, atol=1e-11)[0]
-    assert found.defect.max() < 1e-10 and found.integral.max() > 0.01
+    found = errors(nlp, flight)
+    exact = 1 + np.sin(40) / 40
+    z = nlp.interpolate(flight)
+    F = nlp.evaluate(z[None])[0][0]
+    verdict = judge(nlp.problem, flight, Wanted(1e-6, 1e-6), F, np.ones(1))
+    assert found.defect.max() < 1e-10 and found.sums.sum() == pytest.approx(1.0)
+    assert verdict.missed_by_elements == pytest.approx(abs(F[0] - exact), rel=1e-6) and verdict.missed_by_elements > 0.01
+    assert "objectives differ" in " ".join(verdict.complaints())
+    finer = next_method(nlp.transcription, verdict, flight)
+    assert finer.mesh_of("run").elements > 2, "the states are exact: the integral alone asks for it"
+    fine = judge(nlp.problem, flight, Wanted(1e-6, 1e-6), np.array([exact]), np.ones(1))
+    confirming = next_method(nlp.transcription, fine, flight).mesh_of("run")
+    assert confirming.elements >= 2 and confirming.order > 1, "where nothing is wrong, a mesh that has all of this one, and more"
+
+
+def test_a_peak_between_nodes_asks_for_its_element():
+    problem = Problem("hump")
+    phase = problem.phase("run", t0=0, tf=1)
+    x = phase.state("x", bounds=(0, 3), initial=0)
+    phase.dynamics(x=1)
+    problem.minimize("peak", phase.peak(ca.exp(-((20 * (x - 0.32)) ** 2))))
+    nlp = DFET(4, 1).transcribe(problem)
+    z = nlp.tighten(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))[0]
+    verdict = assessed(nlp, z)
+    assert verdict.missed_by_elements > 0.1 and errors(nlp, nlp.unpack(z)).sums.tolist() == [0.0, 1.0, 0.0, 0.0]
+    finer = next_method(nlp.transcription, verdict, nlp.unpack(z)).mesh_of("run")
+    assert finer.elements > 4 and set(np.linspace(0, 1, 5)) - set(finer.edges) <= {0.75}, "nothing but the second one is cut"
 
 
 def test_controls_that_switch_are_found():
@@ -127,10 +168,10 @@ def test_controls_that_switch_are_found():
     nlp = DFET(1, 8, basis="bernstein").transcribe(problem)
     names = [nlp.variables[i].name for i in nlp.free]
     z = nlp.propagate(nlp.first_guess(np.array([[1.0 if i < 5 else -1.0 for i in range(len(names))]])))[0]
-    found = phase_errors(nlp.problem, nlp.unpack(z), rtol=1e-9, atol=1e-10)[0]
+    found = errors(nlp, nlp.unpack(z))
     assert abs(found.steep[0] - 0.1) < 0.2
     z = nlp.propagate(nlp.first_guess(np.linspace(-0.9, 0.9, len(names))[None]))[0]
-    assert np.isnan(phase_errors(nlp.problem, nlp.unpack(z), rtol=1e-9, atol=1e-10)[0].steep[0])
+    assert np.isnan(errors(nlp, nlp.unpack(z)).steep[0])
 
 
 # Together
@@ -143,7 +184,7 @@ def test_trajectories_become_as_exact_as_wanted(method):
     z = propagated(nlp, k=1)[0]
     for _ in range(8):
         flight = nlp.unpack(z)
-        verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
+        verdict = assessed(nlp, z)
         if not verdict.simulation.max_defect > 1e-6:
             break
         finer = next_method(method, verdict, flight)
@@ -159,10 +200,129 @@ def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
     for i in nlp.free:
         if ".u[" in nlp.variables[i].name:
             z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0
-    flight = nlp.unpack(nlp.propagate(z[None])[0])
-    verdict = judge(nlp.problem, flight, 1e-6, 1e-6)
+    z = nlp.propagate(z[None])[0]
+    flight, verdict = nlp.unpack(z), assessed(nlp, z)
     assert verdict.leaving > 0.01 and "a control leaves its bounds" in " ".join(verdict.complaints())
     finer = next_method(DFET(1, 2), verdict, flight)
     assert finer.basis == "bernstein"
     again = finer.transcribe(nlp.problem)
-    assert judge(nlp.problem, again.unpack(again.interpolate(flight)), 1e-6, 1e-6).leaving == 0.0
+    assert assessed(again, again.interpolate(flight)).leaving == 0.0
+
+
+# What errors are measured by
+
+
+def test_scales_are_what_a_quantity_does_not_its_bounds():
+    low, high, span = np.array([0.0, 5.0, -1e-9, 0.0, -3.0]), np.array([2.0, 5.0, 1e-9, 9.0, 4.0]), np.array([1e4, 1e4, 10.0, 3.0, 7.0])
+    assert own_scales(low, high, span) == pytest.approx([2.0, 1e-2, 1e-5, 3.0, 7.0])
+
+
+@pytest.mark.parametrize("wide", [1.0, 1e3])
+def test_errors_do_not_depend_on_the_width_of_bounds(wide):
+    problem = Problem("wide")
+    phase = problem.phase("run", t0=0, tf=3)
+    x = phase.state("x", bounds=(-5 * wide, 5 * wide), initial=1)
+    u = phase.control("u", bounds=(-2 * wide, 2 * wide))
+    phase.dynamics(x=-(x**3) + u)
+    problem.minimize("cost", phase.integral(x**2 + u**2))
+    nlp = DFET(3, 2).transcribe(problem)
+    values = np.sin(np.arange(len(nlp.free)))
+    z = nlp.propagate(nlp.first_guess(values[None]))[0]
+    flight = nlp.unpack(z)
+    found, verdict = errors(nlp, flight), assessed(nlp, z)
+    narrow = Problem("narrow")
+    phase = narrow.phase("run", t0=0, tf=3)
+    x = phase.state("x", bounds=(-5, 5), initial=1)
+    u = phase.control("u", bounds=(-2, 2))
+    phase.dynamics(x=-(x**3) + u)
+    narrow.minimize("cost", phase.integral(x**2 + u**2))
+    other = DFET(3, 2).transcribe(narrow)
+    same = other.propagate(other.first_guess(values[None]))[0]
+    assert found.defect == pytest.approx(errors(other, other.unpack(same)).defect, rel=1e-5) and found.defect.max() > 1e-3
+    assert verdict.defect == pytest.approx(assessed(other, same).defect, rel=1e-5)
+    assert found.tail == pytest.approx(errors(other, other.unpack(same)).tail, rel=1e-9)
+    assert state_scales(flight["run"])[0] <= np.ptp(flight["run"].state.on_elements(np.linspace(-1, 1, 999))) * (1 + 1e-9)
+    assert control_scales(flight["run"])[0] == pytest.approx(control_scales(other.unpack(same)["run"])[0])
+
+
+def test_an_objective_that_vanishes_has_a_size_all_the_same():
+    problem = Problem("miss")
+    phase = problem.phase("run", t0=0, tf=1)
+    x = phase.state("x", bounds=(-1e4, 1e4), initial=0)
+    u = phase.control("u", bounds=(-1e4, 1e4))
+    phase.dynamics(x=u)
+    problem.minimize("miss", (phase.final(x) - 1.5) ** 2)
+    nlp = DFET(2, 2).transcribe(problem)
+    z = nlp.propagate(nlp.first_guess(np.full((1, len(nlp.free)), 1.5)))[0]
+    assert nlp.evaluate(z[None])[0][0, 0] < 1e-20
+    assert 0.1 < objective_variations(nlp, z)[0] < 10.0, "the miss, had the state been another part of its way: not that of its bounds"
+
+
+# Orders of controls, and elements that become one
+
+
+def test_controls_of_a_low_order_get_a_higher_one_where_that_is_what_is_wrong():
+    method = DFET(4, 5, control_order=1)
+    nlp = method.transcribe(oscillator())
+    z = propagated(nlp, k=1)[0]
+    for i in nlp.free:
+        if ".u[" in nlp.variables[i].name:
+            j, k = nlp.variables[i].name.split("[")[1].rstrip("]").split(",")
+            z[i] = np.cos(int(j) + (-0.5, 0.5)[int(k)])
+    z = nlp.propagate(z[None])[0]
+    finer = next_method(method, assessed(nlp, z), nlp.unpack(z))
+    assert finer.degree_of_controls(5, finer.mesh_of("swing").control_order) >= 3
+
+
+def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be():
+    edges, kept = np.linspace(0, 1, 7), np.zeros(7, dtype=bool)
+    good, bad = np.full(6, 1e-9), np.array([1.0, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9])
+    assert merged(edges, 4, good, kept).tolist() == [True, False, True, False, True, False, True]
+    assert merged(edges, 4, bad, kept).tolist() == [True, True, False, True, False, True, True]
+    kept[1] = True
+    assert merged(edges, 4, good, kept).tolist() == [True, True, False, True, False, True, True]
+    assert merged(np.array([0.0, 0.01, 1.0]), 4, good[:2], kept[:3]).all(), "elements of very different lengths stay apart"
+    assert merged(edges, 4, np.full(6, 1e-2), kept).all()
+
+
+def test_pieces_are_what_the_error_asks_for():
+    assert pieces(1.5, 5) == 2 and pieces(3.0**5 * 0.99, 5) == 3 and pieces(1e30, 5) == 4 and pieces(np.inf, 5) == 4
+
+
+# Growth
+
+
+def test_growth_is_that_of_the_closed_form():
+    """x' = k x + u: an error at the beginning grows by exp(k t)."""
+    for rate, duration in ((1.0, 20.0), (-1.0, 20.0)):
+        nlp, z = _linear(rate, duration)
+        assert growth(nlp.problem, nlp.unpack(z)) == pytest.approx(max(1.0, np.exp(rate * duration)), rel=1e-3)
+
+
+def test_what_no_simulation_can_follow_is_called_that_and_not_an_error_of_the_mesh():
+    nlp, z = _linear(1.0, 60.0)
+    verdict = assessed(nlp, z)
+    assert verdict.local < 1e-9 and verdict.defect > 1.0
+    assert verdict.unstable and verdict.complaints() == [] and verdict.error <= 1.0
+    assert "unstable: open-loop simulation cannot follow" in verdict.remark and "each element is right to" in verdict.remark
+    assert next_method(nlp.transcription, verdict, nlp.unpack(z)).mesh_of("run").elements <= 60, "no mesh is refined for it"
+    stable, z = _linear(-1.0, 60.0)
+    assert not assessed(stable, z).unstable and assessed(stable, z).remark == ""
+
+
+def _linear(rate, duration):
+    """An exact flight of x' = rate x + u with the control that keeps it at cos t."""
+    problem = Problem("linear")
+    phase = problem.phase("run", t0=0, tf=duration)
+    x = phase.state("x", bounds=(-9, 9), initial=1)
+    u = phase.control("u", bounds=(-9, 9))
+    phase.dynamics(x=rate * x + u)
+    problem.minimize("cost", phase.integral(u**2))
+    nlp = DFET(60, 9).transcribe(problem)
+    t = duration * np.array([place for profile in nlp.profiles for place in profile.places])
+    z = nlp.first_guess((-np.sin(t) - rate * np.cos(t))[None])[0]
+    # The states that go with it, element by element.
+    _, J, _, g = gradients(nlp)(z)
+    states = np.setdiff1d(np.arange(len(z)), nlp.free)
+    z[states] -= np.linalg.lstsq(np.array(J)[:, states], np.array(g).ravel() - nlp.g_lower, rcond=None)[0]
+    return nlp, z

@@ -11,7 +11,7 @@ from problems import load
 from transcription import DFET
 from transcription.inner import Auto, Ipopt
 from transcription.nlp.scalarized import scalarize
-from transcription.stopping import stopped_by, stopping
+from transcription.stopping import Stopped, check_stopping, stopped_by, stopping
 
 
 def after(solves: int):
@@ -25,8 +25,12 @@ def test_only_within_and_only_if_asked():
     with stopped_by(lambda: True):
         assert stopping()
         with stopped_by(lambda: False):
-            assert not stopping()
-        assert stopping()
+            assert stopping(), "work that is a part of other work ends with it"
+    with stopped_by(lambda: False):
+        assert not stopping()
+        with stopped_by(lambda: "time limit"), pytest.raises(Stopped, match=r"^time limit$"):
+            check_stopping()
+        check_stopping()
     with pytest.raises(KeyError), stopped_by(lambda: True):
         raise KeyError
     assert not stopping()
@@ -43,7 +47,8 @@ def test_ipopt_leaves_the_rest_of_a_batch():
     assert (part.violation[2:] > 1e-6).all()
     near = np.clip(whole.z[:, nlp.free] + 1e-3, nlp.lower[nlp.free], nlp.upper[nlp.free])
     with stopped_by(lambda: True):
-        assert set(Auto().solve(nlp, near, whole.z).status) == {"converged"}, "Newton is quick enough to be let finish"
+        cut = Auto().solve(nlp, near, whole.z)
+    assert set(cut.status) == {"timeout"} and cut.clocked and set(cut.iterations) == {1} and not cut.fallbacks
 
 
 def test_gradient_solves_end_with_what_they_have():
@@ -52,7 +57,7 @@ def test_gradient_solves_end_with_what_they_have():
     with stopped_by(lambda: True):
         solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
     assert solved.status == "timeout" and solved.clocked and not solved.begun and np.array_equal(solved.z, start)
-    with stopped_by(after(8)):
+    with stopped_by(after(16)):
         part = sweep(load("goddard"), DFET(3, 2), points=10)
-    assert 0 < len(part) < 10 and part.stats["gradient_solves"] >= 8 and not part.stats["reproducible"]
+    assert 0 < len(part) < 10 and part.stats["gradient_solves"] >= 4 and not part.stats["reproducible"]
     assert part.stats["failures"]["timeout"] > 0 and (part.status == "converged").all()

@@ -44,7 +44,7 @@ def test_a_flight_without_controls_has_its_closed_form(method):
 def test_an_exact_trajectory_has_no_defect():
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(3, 4).transcribe(problem)
+    nlp = DFET(3, 4, basis="bernstein").transcribe(problem)
     for z in propagated(nlp):
         check = simulated(nlp, z, rtol=1e-12, atol=1e-14)
         assert check.max_defect < 1e-12 and check.violation == 0
@@ -128,7 +128,7 @@ def two_legs(jump: float) -> Problem:
 
 
 def test_linked_phases_are_simulated_from_where_the_first_ended():
-    nlp = DFET(3, 6).transcribe(two_legs(2.0))
+    nlp = DFET(3, 6, basis="bernstein").transcribe(two_legs(2.0))
     found = solved(nlp)
     assert set(found.status) == {"converged"}
     flight = nlp.unpack(found.z[0])
@@ -157,7 +157,7 @@ def test_a_meeting_that_does_not_take_place_is_found():
         phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
         problem.link(phase, together)
     problem.minimize("place", together.final(x))
-    nlp = DFET(2, 2).transcribe(problem)
+    nlp = DFET(2, 2, basis="bernstein").transcribe(problem)
     good, bad = solved(nlp, k=1).z[0], propagated(nlp, k=1)[0]
     assert simulated(nlp, good).violation < 1e-5
     check = simulated(nlp, bad)
@@ -356,3 +356,24 @@ def test_several_by_an_implicit_method(method):
     flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 2)))]
     for flight, check in zip(flights, simulate_all(nlp.problem, flights, method=method), strict=True):
         assert check.objectives == pytest.approx(simulate(nlp.problem, flight).objectives, rel=1e-5)
+
+
+def test_a_control_that_leaves_its_bounds_between_nodes_violates_them():
+    """A parabola through values inside the bounds at its three nodes, with its top outside."""
+    problem, phase = integrator()
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(1, 2).transcribe(problem)
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0])
+    (name,) = flight
+    law = flight[name].control
+    bound = flight[name].control_variables[0]
+    outside = bound.upper + 0.05 * bound.span
+
+    def raised(coefficients):
+        places = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
+        coefficients[0, :, 0] = outside - 0.5 * (places - 0.4) ** 2 * bound.span
+        assert ((bound.lower <= coefficients) & (coefficients <= bound.upper)).all()
+        return coefficients
+
+    check = simulate(nlp.problem, tampered(flight, name, raised))
+    assert law.basis == "legendre" and check.violations[f"bounds of {name}.{bound.name}"] == pytest.approx(0.05, abs=1e-3)

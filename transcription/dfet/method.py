@@ -47,8 +47,9 @@ class DFET(Meshed):
         Lagrange polynomials on Gauss-Lobatto nodes for states and tests and on Gauss-Legendre nodes for controls, which are then bounded at
         the nodes; or Bernstein polynomials for all three, whose coefficients bound the whole polynomial.
     mesh : mapping, optional
-        Phases that have elements of their own: name -> (edges, order), edges relative to the phase, increasing from 0 to 1. The degree of
-        their controls is `control_order` where that is given, else their order. The other phases have `elements` equal ones of `order`.
+        Phases that have elements of their own: name -> (edges, order[, control_order[, moving]]), edges relative to the phase, increasing
+        from 0 to 1; see `PhaseMesh`. The degree of their controls is that of the mesh where it has one, else `control_order` where that is
+        given, else their order. The other phases have `elements` equal ones of `order`.
 
     Raises
     ------
@@ -62,6 +63,8 @@ class DFET(Meshed):
     basis: str = "lobatto"
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
+    orders_controls = True
+    moves_edges = True
     word = "dfet"
     examples = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1)"
 
@@ -71,14 +74,27 @@ class DFET(Meshed):
             check_count("DFET: control_order", self.control_order, 0)
         check_choice("DFET: basis", self.basis, BASES)
 
-    def degree_of_controls(self, order: int) -> int:
-        """q, where states have degree `order`."""
-        return order if self.control_order is None else self.control_order
+    def degree_of_controls(self, order: int, own: int | None = None) -> int:
+        """q, where states have degree `order`, on a mesh whose own degree of controls is `own`."""
+        return next((q for q in (own, self.control_order) if q is not None), order)
 
     def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> DFET:
         """See `Meshed.remeshed`: the coefficients of Bernstein polynomials bound them."""
         other = super().remeshed(meshes)
         return replace(other, basis="bernstein") if bounded else other
+
+    def alternatives(self) -> tuple[DFET, ...]:
+        """See `Meshed.alternatives`: the other basis; controls of the degree of the states; both; a degree more."""
+        basis = next(one for one in BASES if one != self.basis)
+        full = {name: replace(mesh, control_order=None) for name, mesh in self.meshes.items()}
+        more = {name: replace(mesh, order=mesh.order + 1) for name, mesh in self.meshes.items()}
+        found = (
+            replace(self, basis=basis),
+            replace(self, control_order=None, mesh=full),
+            replace(self, basis=basis, control_order=None, mesh=full),
+            replace(self, order=self.order + 1, mesh=more),
+        )
+        return tuple(one for one in dict.fromkeys(found) if one != self)
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> DFET:
@@ -102,12 +118,12 @@ class DFET(Meshed):
             _need_derivatives(phase)
 
         @cache
-        def tables(order: int) -> Tables:
-            return Tables(order, self.degree_of_controls(order), self.basis)
+        def tables(order: int, control_order: int) -> Tables:
+            return Tables(order, control_order, self.basis)
 
         def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> DFETPhase:
             mesh = self.mesh_of(phase.name)
-            return DFETPhase(mesh, tables(mesh.order), phase, layout, ends)
+            return DFETPhase(mesh, tables(mesh.order, self.degree_of_controls(mesh.order, mesh.control_order)), phase, layout, ends)
 
         return Assembly(compiled, writer).nlp(self)
 

@@ -25,16 +25,19 @@ class DFETPhase(PhaseWriter):
     """One phase on the N elements of its mesh.
 
     Slots: `X` (N, l + 1, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
-    elements, which are unknowns of their own.
+    elements, which are unknowns of their own, `E` (m,) places of the edges that move, relative to the phase.
     """
 
     def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
         super().__init__(phase, layout, ends)
         self.mesh, self.tables = mesh, tables
         self.n = elements = mesh.elements
-        self.places, self.widths = mesh.places, np.diff(mesh.places)
         prefix = f"{phase.name}."
-        self.U = layout.add_table(prefix, phase.controls, elements, tables.control_order + 1, free=True)
+        self.U = self._controls(prefix)
+        moving = zip(mesh.moving, mesh.ranges().tolist(), strict=True)
+        places = [Variable(f"{prefix}edge[{j}]", low, high, "", high - low) for j, (low, high) in moving]
+        self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
+        self._begin = np.array(mesh.edges)[list(mesh.moving)]
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
         at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
         self.interior = self.X.ravel()
@@ -44,6 +47,23 @@ class DFETPhase(PhaseWriter):
         self.S = layout.add_table(prefix, self._sizes, elements, len(tables.tau))
         self.magnitudes = self.S.ravel()
         self._element = expanded(element_function(tables, phase))
+
+    def _controls(self, prefix: str) -> np.ndarray:
+        """Slots (N, q + 1, nu) of the controls; where one is constant, all of an arc are the same."""
+        shape, arcs, constant = (self.n, self.tables.control_order + 1), self.mesh.arcs, dict(self.mesh.constant)
+        if not constant:
+            return self.layout.add_table(prefix, self.phase.controls, *shape, free=True)
+        one: dict[tuple[str, int], int] = {}
+
+        def slot(v: Variable, j: int, k: int) -> int:
+            arc = int(arcs[j])
+            if arc not in constant.get(v.name, ()):
+                return self.layout.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=True)
+            if (v.name, arc) not in one:
+                one[v.name, arc] = self.layout.add(replace(v, name=f"{prefix}{v.name}[arc {arc}]"), free=True)
+            return one[v.name, arc]
+
+        return np.array([[[slot(v, j, k) for v in self.phase.controls] for k in range(shape[1])] for j in range(self.n)])
 
     @cached_property
     def _propagation(self) -> Propagation:
@@ -104,8 +124,8 @@ class DFETPhase(PhaseWriter):
         left, X = pick(extended, self.B[:-1]), pick(extended, self.X)
         blocks = ca.horzsplit(self._propagation.derivatives(interior)(X, left, *self._inputs(extended)), self._propagation.inputs)
         edges, inside = [S[(self.ends.initial % S.shape[0]).tolist(), :]], []
-        for j, D in enumerate(blocks):
-            out = D[:, :nx] @ edges[-1] + D[:, nx:] @ self._outer(j)
+        for D, outer in zip(blocks, self._outer(extended), strict=True):
+            out = D[:, :nx] @ edges[-1] + D[:, nx:] @ outer
             edges.append(out[:nx, :])
             inside.append(out[nx:, :])
         slots, values = [self.B[1:].ravel()], edges[1:]
@@ -116,35 +136,66 @@ class DFETPhase(PhaseWriter):
     def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
         """The other inputs of the elements, side by side: controls, starts, lengths, and s."""
         s = self.layout.pick(extended, self.ends.statics)
-        mean = (s[1] - s[0]) / self.n
-        starts, lengths = s[0] + mean * ca.DM(self.places[:-1]).T, mean * ca.DM(self.widths).T
+        mean, places = (s[1] - s[0]) / self.n, self._places(extended)
+        starts, lengths = s[0] + mean * places[:, :-1], mean * (places[:, 1:] - places[:, :-1])
         return self.layout.pick(extended, self.U), starts, lengths, ca.repmat(s, 1, self.n)
 
-    def _outer(self, j: int) -> ca.DM:
-        """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of element j, which never change: these
-        are free variables or constants."""
-        seeds = self.layout.seeds()
-        controls, statics = (seeds[(slots.ravel() % seeds.shape[0]).tolist(), :] for slots in (self.U[j], self.ends.statics))
-        mean = (statics[1, :] - statics[0, :]) / self.n
-        return ca.vertcat(controls, statics[0, :] + mean * self.places[j], mean * self.widths[j], statics)
+    def _places(self, extended: ca.MX) -> ca.DM | ca.MX:
+        """Places (1, N + 1) of the edges, in mean lengths of an element: see `PhaseMesh.places`."""
+        places = ca.DM(self.mesh.places).T
+        if not len(self.E):
+            return places
+        moved = extended[self.layout.index(self.E).tolist()] - ca.DM(self._begin)
+        return places + self.n * (ca.sparsify(ca.DM(self.mesh.shares)) @ moved).T
+
+    def _outer(self, extended: ca.MX) -> list[ca.DM | ca.MX]:
+        """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element by the free variables.
+
+        Controls and s are free variables or constants, and so are the times; only where edges move do starts and lengths depend on where.
+        """
+        seeds, length = self.layout.seeds(), ca.diff(self.layout.pick(extended, self.ends.statics)[:2])
+        statics, *controls = (seeds[(slots.ravel() % seeds.shape[0]).tolist(), :] for slots in (self.ends.statics, *self.U))
+        mean, places = (statics[1, :] - statics[0, :]) / self.n, self._places(extended)
+        starts = [statics[0, :] + mean * places[j] for j in range(self.n)]
+        lengths = [mean * (places[j + 1] - places[j]) for j in range(self.n)]
+        if len(self.E):
+            moved = length * (ca.DM(self.mesh.shares) @ seeds[self.E.tolist(), :])
+            starts = [start + moved[j, :] for j, start in enumerate(starts)]
+            lengths = [one + moved[j + 1, :] - moved[j, :] for j, one in enumerate(lengths)]
+        return [ca.vertcat(controls[j], starts[j], lengths[j], statics) for j in range(self.n)]
+
+    def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
+        """See `PhaseWriter.guess_controls`; edges that move begin where the mesh has them."""
+        edges = dict(zip(self.E.tolist(), self._begin.tolist(), strict=True))
+        return edges | super().guess_controls(t0, tf)
 
     def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
-        """See `PhaseWriter.interpolate`."""
+        """See `PhaseWriter.interpolate`; edges that move are where they are in a trajectory of this mesh, else where the mesh has them."""
         phase, tables, t0, length = self.phase, self.tables, trajectory.t0, trajectory.tf - trajectory.t0
+        mesh = self.mesh.found_in(trajectory.state.edges)
         # Between the ends of this mesh's elements, where a control may jump: Gauss-Legendre nodes never meet them.
         nodes_of_states, nodes_of_controls = gauss_legendre(tables.order + 1)[0], gauss_legendre(tables.control_order + 1)[0]
-        states = trajectory.state(t0 + length * self.mesh.inside(nodes_of_states))
-        controls = unwrapped(trajectory.control(t0 + length * self.mesh.inside(nodes_of_controls)), phase.controls)
-        at_edges = trajectory.state(t0 + length * np.array(self.mesh.edges[1:-1]))
+        states = trajectory.state(t0 + length * mesh.inside(nodes_of_states))
+        controls = unwrapped(trajectory.control(t0 + length * mesh.inside(nodes_of_controls)), phase.controls)
+        at_edges = trajectory.state(t0 + length * np.array(mesh.edges[1:-1]))
+        self.layout.write(extended, self.E, np.array(mesh.edges)[None, list(mesh.moving)])
         self.layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
-        self.layout.write(extended, self.U, wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)[None])
+        U = wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)
+        for name, arcs in self.mesh.constant:
+            i = [v.name for v in phase.controls].index(name)
+            for arc in arcs:
+                # Not the mean: near a switch, a trajectory of a coarser mesh is on its way to the other bound.
+                U[mesh.arcs == arc, :, i] = np.median(controls[mesh.arcs == arc, :, i])
+        self.layout.write(extended, self.U, U[None])
         self.layout.write(extended, self.B[1:-1], at_edges[None])
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, tables = self.phase, self.tables
-        s = extended[self.ends.statics]
-        edges = s[0] + (s[1] - s[0]) * self.places / self.n
+        s, places = extended[self.ends.statics], self.mesh.places
+        if len(self.E):
+            places = places + self.n * self.mesh.shares @ (extended[self.E] - self._begin)
+        edges = s[0] + (s[1] - s[0]) * places / self.n
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)

@@ -12,8 +12,9 @@ from problems.derived import remembered
 
 from ..base import FAILED, NLP, TIMEOUT
 from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
+from ..nlp.watched import Watched
 from ..numerics.batched import expanded
-from ..stopping import stopping
+from ..stopping import Stopped, stopping
 from .base import InnerResult, InnerSolver, scored, started
 
 
@@ -51,7 +52,7 @@ class Ipopt(InnerSolver):
 
         A projection that does not converge is tried once more from propagated states. What stays infeasible comes back as it would be
         propagated, so that its violation is that of the user's constraints, not one smeared over the dynamics. If the work is to end early
-        (`stopping`), what is left of the batch is not solved, and has the status "timeout".
+        (`stopping`), what is left of the batch is not solved any further, and has the status "timeout".
         """
         start = nlp.tighten(started(nlp, candidates, warm))
         Z, status, iterations = self._solve_all(nlp, start, start, tolerance)
@@ -70,9 +71,12 @@ class Ipopt(InnerSolver):
 
     def _solve_all(self, nlp: NLP, start: np.ndarray, guess: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
-        solver, lower, upper = _program(nlp, self, tolerance)
-        scale, zero = nlp.scale, origin(nlp)
         Z, status, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
+        try:
+            solver, lower, upper = _program(nlp, self, tolerance)
+        except Stopped:
+            return Z, np.full(len(start), TIMEOUT, dtype="<U10"), iterations
+        scale, zero = nlp.scale, origin(nlp)
         _, violation = nlp.evaluate(guess)
         for row in range(len(start)):
             if not np.isfinite(guess[row]).all():
@@ -95,7 +99,7 @@ class Ipopt(InnerSolver):
 
 
 @remembered
-def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[Watched, np.ndarray, np.ndarray]:
     """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
     z = origin(nlp) + y * nlp.scale
@@ -120,5 +124,4 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[ca.Function, 
             "ipopt.acceptable_tol": 0.1 * tolerance,
             "ipopt.acceptable_iter": 5,
         }
-    solver = ca.nlpsol("inner", "ipopt", parts, options)
-    return solver, *scaled_bounds(nlp)
+    return Watched("inner", parts, options), *scaled_bounds(nlp)

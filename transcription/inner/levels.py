@@ -21,7 +21,7 @@ class Auto(InnerSolver):
         """See `InnerSolver.solve`."""
         found = Newton().solve(nlp, candidates, warm, tolerance=tolerance)
         rest = np.flatnonzero(found.status != CONVERGED)
-        if not len(rest):
+        if not len(rest) or found.clocked:
             return found
         start = started(nlp, candidates, warm)
         repaired = Ipopt().solve(nlp, candidates[rest], start[rest], tolerance=tolerance)

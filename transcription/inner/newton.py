@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import INFEASIBLE, NLP
+from ..base import INFEASIBLE, NLP, TIMEOUT
 from ..phases.reduced import Propagated, Reduced
+from ..stopping import stopping
 from .base import InnerResult, InnerSolver, scored, started
 from .least_distance import least_distance
 
@@ -40,9 +41,10 @@ class Newton(InnerSolver):
     max_iterations: int = 40
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
-        """See `InnerSolver.solve`."""
+        """See `InnerSolver.solve`. If the work is to end early (`stopping`), what was not done with by then has the status "timeout"."""
         start = started(nlp, candidates, warm)
         Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
+        otherwise = np.full(len(start), INFEASIBLE)
         going = _Going(nlp, start)
         # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -63,10 +65,13 @@ class Newton(InnerSolver):
                         break
                     going.keep(on)
                     propagated, outside, pull = Propagated(propagated.Z[on], propagated.values[on]), outside[on], pull[on]
+                if stopping():
+                    otherwise[going.index] = TIMEOUT
+                    break
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return scored(nlp, (Z, *nlp.residuals(Z)), start, np.full(len(start), INFEASIBLE), iterations, tolerance)
+        return scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float

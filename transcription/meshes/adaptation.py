@@ -1,133 +1,69 @@
-"""One trajectory and its mesh: whether it is good enough, and if not, the next finer mesh."""
+"""The next finer mesh of a trajectory, from the errors of its elements."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
-
 from ..base import Meshed
 from ..phases.mesh import PhaseMesh
-from ..trajectories.simulate import Simulation, simulate
-from ..trajectories.trajectory import Trajectory
-from .errors import PhaseErrors, phase_errors
+from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from .errors import PhaseErrors
+from .verdict import ElementScores, Verdict
 
 Method = TypeVar("Method", bound=Meshed)
 
-SAFETY = 0.5
-"""Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
-COST = 10.0
-"""Multiple of the tolerance by which objectives may be off, in ranges of the front: their loss by poorly described controls is of second
-order."""
 
-
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """The independent assessment of a trajectory on its mesh.
-
-    Attributes
-    ----------
-    simulation : Simulation
-        Of the whole trajectory.
-    errors : list of PhaseErrors
-        Element by element.
-    tolerance, feasible : float
-        Of defects; of constraints, simulated and between nodes, in their scales.
-    """
-
-    simulation: Simulation
-    errors: list[PhaseErrors]
-    tolerance: float
-    feasible: float
-
-    @property
-    def excess(self) -> float:
-        """The largest amount by which states and path constraints leave their limits between nodes, in their scales."""
-        return max((float(phase.excess.max()) for phase in self.errors), default=0.0)
-
-    @property
-    def leaving(self) -> float:
-        """The same for controls."""
-        return max((float(phase.leaving.max()) for phase in self.errors), default=0.0)
-
-    @property
-    def error(self) -> float:
-        """The largest of defect, excess and simulated violation, in units of what they may be."""
-        return max(self.simulation.max_defect / self.tolerance, max(self.excess, self.simulation.violation) / self.feasible)
-
-    def complaints(self) -> list[str]:
-        """Messages about what is not good enough, of which controls may not leave their bounds at all; empty if all is."""
-        found = []
-        if not self.simulation.max_defect <= self.tolerance:
-            found.append(f"simulated, it ends {self.simulation.max_defect:.1e} away")
-        if self.leaving > 0.0:
-            found.append(f"a control leaves its bounds by {self.leaving:.1e} between nodes")
-        if not self.excess <= self.feasible:
-            found.append(f"a state or path constraint leaves its limits by {self.excess:.1e} between nodes")
-        if not found and not self.simulation.violation <= self.feasible:
-            worst = max(self.simulation.violations, key=lambda key: self.simulation.violations[key])
-            found.append(f"simulated, it violates '{worst}' by {self.simulation.violation:.1e}")
-        return found
-
-    def scores(self, method: Meshed, trajectory: Trajectory, *, integrals: bool = False) -> list[np.ndarray]:
-        """For each phase the error of each element (N,), in units of what it may be; that of integrals too, if wanted."""
-        total = sum(float(phase.defect.sum()) for phase in self.errors)
-        # What an error at one element becomes at the end of the trajectory, at least.
-        growth = max(1.0, self.simulation.max_defect / total) if 0.0 < total < np.inf and np.isfinite(self.simulation.max_defect) else 1.0
-        count = sum(len(phase.defect) for phase in self.errors)
-        found = []
-        for name, phase in zip(trajectory, self.errors, strict=True):
-            lengths = np.diff(method.mesh_of(name).edges)
-            parts = [
-                growth * phase.defect * count / (SAFETY * self.tolerance),
-                phase.excess / self.feasible,
-                lengths * phase.tail**2 * count / (COST * self.tolerance),
-            ]
-            if integrals:
-                parts.append(phase.integral * count / self.tolerance)
-            found.append(np.max(parts, axis=0))
-        return found
-
-    def worst_place(self, method: Meshed, trajectory: Trajectory) -> str:
-        """The place of the largest error, in words."""
-        scores = self.scores(method, trajectory)
-        names = list(trajectory)
-        i = int(np.argmax([score.max() for score in scores]))
-        j = int(np.argmax(scores[i]))
-        phase, steep = trajectory[names[i]], self.errors[i].steep[j]
-        time = phase.state.times(np.nan_to_num([steep]))[j, 0]
-        why = "" if np.isnan(steep) else ", where a control switches or is steep"
-        return f"the mesh is coarsest for phase '{names[i]}' near {time:.6g} {phase.time_unit}{why}"
-
-
-def judge(problem: CompiledProblem, trajectory: Trajectory, tolerance: float, feasible: float) -> Verdict:
-    """The assessment of a trajectory by an integrator a thousand times more exact than `tolerance`; see `Verdict`."""
-    rtol = float(np.clip(1e-3 * tolerance, 1e-13, 1e-9))
-    return Verdict(
-        simulation=simulate(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
-        errors=phase_errors(problem, trajectory, rtol=rtol, atol=0.1 * rtol),
-        tolerance=tolerance,
-        feasible=feasible,
-    )
-
-
-def next_method(method: Method, verdict: Verdict, trajectory: Trajectory, *, integrals: bool = False) -> Method:
-    """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes.
-
-    `integrals`: refine where integrals are wrong, too. The same method where no mesh can be refined further.
-    """
-    finer, most = {}, max(method.most_elements, 2 * method.elements)
-    scores = verdict.scores(method, trajectory, integrals=integrals)
-    for name, phase, score in zip(trajectory, verdict.errors, scores, strict=True):
+def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
+    """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes. The same method where no
+    mesh can be refined further."""
+    finer = {}
+    for name, errors, scores in zip(trajectory, verdict.errors, verdict.scores(), strict=True):
         old = method.mesh_of(name)
-        edges, order = refine(np.array(old.edges), old.order, score, phase.rate, phase.steep, most=most, highest=method.highest_order)
-        mesh = PhaseMesh(tuple(edges.tolist()), order)
+        mesh = _finer(method, old, trajectory[name], errors, scores)
         if mesh != old:
             finer[name] = mesh
-    return method.remeshed(finer, bounded=verdict.leaving > 0.0)
+    return method.remeshed(finer, bounded=verdict.leaving > verdict.wanted.leaving)
+
+
+def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: PhaseErrors, scores: ElementScores) -> PhaseMesh:
+    """The next mesh of one phase."""
+    most = max(method.most_elements, 2 * method.elements)
+    degree = trajectory.control.coefficients.shape[1] - 1
+    apart = method.orders_controls and degree < old.order and bool(trajectory.control_variables)
+    # Controls whose degree is that of the states get a higher one with them.
+    rate = errors.rate if apart else np.minimum(errors.rate, errors.control_rate)
+    rate = np.where(scores.sums > scores.states, np.minimum(rate, errors.integrand_rate), rate)
+    poor = scores.controls >= min(1.0, WORST_SHARE * scores.all.max(initial=0.0))
+    smooth = np.isnan(errors.steep) & (errors.control_rate >= SMOOTH)
+    # Where a higher degree of the controls alone mends what is wrong, elements need not be cut for it.
+    error = np.where(apart & poor & smooth, scores.others, scores.all)
+    if apart and (poor & smooth).any() and error.max(initial=0.0) < 1.0:
+        edges, order = np.array(old.edges), old.order
+    else:
+        kept = np.isin(np.arange(len(old.edges)), old.moving)
+        # Where nothing is wrong, a finer mesh is to confirm that: it has all that this one has.
+        kept |= scores.all.max(initial=0.0) <= 1.0
+        remain = merged(np.array(old.edges), old.order, scores.all, kept)
+        before = np.array(old.edges)
+        edges, order = refine(
+            before, old.order, error, rate, errors.steep, most=most + int(np.count_nonzero(~remain)), highest=method.highest_order
+        )
+        if len(edges) > len(before) or order > old.order:
+            edges = edges[~np.isin(edges, before[~remain])]
+    control_order = old.control_order
+    if apart and (poor & smooth).any():
+        more = max(degrees(e, r) for e, r in zip(scores.controls[poor & smooth], errors.control_rate[poor & smooth], strict=True))
+        raised = int(min(order, max(degree + min(more, order), LEAST_CONTROL_ORDER)))
+        control_order = raised if raised > degree else control_order
+    return remeshed(old, edges, order, control_order)
+
+
+def remeshed(old: PhaseMesh, edges: np.ndarray, order: int, control_order: int | None) -> PhaseMesh:
+    """A mesh with these edges, among which are all of `old`, and those of them moving that move there."""
+    moving = tuple(int(np.argmin(np.abs(edges - old.edges[j]))) for j in old.moving)
+    return PhaseMesh(tuple(edges.tolist()), order, control_order, moving)
 
 
 SMOOTH = 0.8
@@ -136,12 +72,21 @@ SLOWEST = 1e-3
 """A rate below this is none."""
 WORST_SHARE = 0.1
 """Elements whose error is at least this share of the largest are refined together."""
-LAYER = 0.3
-"""Half width, on [-1, 1], of the element that is put around a place where a control changes steeply."""
+LAYERS = (0.3, 0.06, 0.012)
+"""Distances, on [-1, 1], from a place where a control changes steeply, at which its element is cut: the first, or all of them where the
+error is `GRADED`, since nothing tells how thin the layer is."""
+GRADED = 1e2
+"""Error, in units of what it may be, from which on elements are cut in graded lengths."""
 SHORTEST = 1e-7
 """No element is cut to less than this length, relative to its phase."""
 MARGIN = 0.1
 """Distance from the ends of an element, on [-1, 1], within which it is not cut."""
+MOST_PIECES = 4
+"""An element is cut into so many at most: its error says little about meshes that are much finer."""
+MERGED, UNEVEN = 0.1, 4.0
+"""Error, in units of what it may be, that two elements may have when they are merged, and how much longer than the other one may be."""
+LEAST_CONTROL_ORDER = 3
+"""Degree of controls that is tried first where a lower one is not enough: from fewer coefficients no rate of decay can be seen."""
 
 
 def refine(
@@ -150,8 +95,8 @@ def refine(
     """A finer mesh of one phase.
 
     The elements of large error are refined; if none reaches the goal, those with the largest ones. Of these, the smooth ones ask for the
-    order that is enough at their rate of decay, if that is not above the highest; the others are cut: around the place where a control is
-    steep, else in halves.
+    order that is enough at their rate of decay, unless that is above the highest or it is cheaper to cut them; the others are cut: around
+    the place where a control is steep, else into as many equal parts as their error asks for.
 
     Parameters
     ----------
@@ -178,11 +123,23 @@ def refine(
     error = np.where(np.isnan(error), np.inf, error)
     marked = error >= min(1.0, WORST_SHARE * error.max(initial=0.0))
     more = np.array([degrees(e, r) for e, r in zip(error, rate, strict=True)])
-    smooth = np.isnan(steep) & (rate >= SMOOTH) & (order + more <= highest)
-    raised = order + int(min(more[marked & smooth].max(initial=0.0), max(2, order // 2 + 1)))
-    cut = [j for j in np.flatnonzero(marked & ~smooth) if edges[j + 1] - edges[j] >= 2.0 * SHORTEST]
+    # Where no rate can be told and much is wrong, nothing says that one degree more would be enough.
+    told = np.isfinite(rate) | (error < GRADED)
+    smooth = marked & np.isnan(steep) & (rate >= SMOOTH) & told & (order + more <= highest)
+    extra = int(min(more[smooth].max(initial=0.0), max(2, order // 2 + 1)))
+    shorter = {int(j): pieces(error[j], 2 * order) for j in np.flatnonzero(smooth)}
+    room = most - (len(edges) - 1)
+    if extra and len(error) * extra > (order + 1) * sum(k - 1 for k in shorter.values()) <= (order + 1) * room // 2:
+        smooth, extra = np.zeros(len(error), dtype=bool), 0
+    cut = [int(j) for j in np.flatnonzero(marked & ~smooth) if edges[j + 1] - edges[j] >= SHORTEST]
     worst_first = sorted(cut, key=lambda j: (-error[j], j))
-    return split(edges, {int(j): cuts(steep[j]) for j in worst_first}, most), raised
+    places = {j: cuts(steep[j], shorter.get(j) or pieces(error[j], order + 1), bool(error[j] >= GRADED)) for j in worst_first}
+    return split(edges, places, most), order + extra
+
+
+def pieces(error: float, power: int) -> int:
+    """The number of equal parts, at least two, in each of which an error that falls with this power of their length is at most 1."""
+    return int(np.clip(np.ceil(error ** (1.0 / max(power, 1))), 2, MOST_PIECES))
 
 
 def degrees(error: float, rate: float) -> float:
@@ -192,18 +149,40 @@ def degrees(error: float, rate: float) -> float:
     return max(1.0, float(np.ceil(np.log(error) / (2.0 * rate)))) if rate > SLOWEST else np.inf
 
 
-def cuts(steep: float) -> list[float]:
-    """Where, on (-1, 1), to cut an element: on both sides of the place where a control is steep, else in the middle."""
+def cuts(steep: float, parts: int = 2, graded: bool = False) -> list[float]:
+    """Where, on (-1, 1), to cut an element: on both sides of the place where a control is steep, else into equal parts."""
     if np.isnan(steep):
-        return [0.0]
-    return [tau for tau in (steep - LAYER, steep + LAYER) if abs(tau) < 1.0 - MARGIN] or [0.0]
+        return np.linspace(-1.0, 1.0, parts + 1)[1:-1].tolist()
+    distances = LAYERS if graded else LAYERS[:1]
+    if abs(steep) >= 1.0 - LAYERS[0]:
+        # At an end: the layer may begin there.
+        return sorted(float(np.sign(steep)) * (1.0 - distance) for distance in distances)
+    return sorted(steep + side * distance for distance in distances for side in (-1.0, 1.0) if abs(steep + side * distance) < 1.0 - MARGIN)
 
 
 def split(edges: np.ndarray, cut: dict[int, list[float]], most: int) -> np.ndarray:
     """Cut elements, in the order in which they are given, as long as there are at most `most` elements."""
     added: list[float] = []
     for j, places in cut.items():
-        if len(edges) - 1 + len(added) + len(places) > most:
-            continue
+        room = most - (len(edges) - 1 + len(added))
+        if len(places) > room:
+            places = [0.0] if room > 0 else []
         added += [edges[j] + 0.5 * (1.0 + tau) * (edges[j + 1] - edges[j]) for tau in places]
     return np.sort(np.concatenate([edges, added])) if added else edges
+
+
+def merged(edges: np.ndarray, order: int, error: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """The mask (N + 1,) of the edges that remain when neighbouring elements that are far better than they need to be become one.
+
+    `kept` (N + 1,): edges that remain in any case. No element takes part twice.
+    """
+    remain = np.ones(len(edges), dtype=bool)
+    small = MERGED * 2.0 ** -(order + 2)
+    j = 1
+    while j < len(edges) - 1:
+        lengths = edges[j] - edges[j - 1], edges[j + 1] - edges[j]
+        if not kept[j] and max(error[j - 1], error[j]) < small and max(lengths) <= UNEVEN * min(lengths):
+            remain[j] = False
+            j += 1
+        j += 1
+    return remain

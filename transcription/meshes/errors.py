@@ -1,4 +1,4 @@
-"""Errors of a trajectory element by element, independent of the transcription."""
+"""Errors of a trajectory element by element, independent of the transcription, in units of what states and controls do on it."""
 
 from __future__ import annotations
 
@@ -10,108 +10,151 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from ..numerics.polynomials import gauss_legendre, legendre_coefficients
-from ..trajectories.arcs import Arcs
-from ..trajectories.limits import DENSE, excess_by_element
+from ..trajectories.limits import DENSE, excess_by_element, paths_and_peaks
+from ..trajectories.simulate import Simulation
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from .scales import control_scales, state_scales
 
 STEEP = 3.0
 """A control is steep where it changes so many times faster than on average over its element."""
 ON_BOUND = 1e-3
 """A control is on a bound if it is nearer than this, in spans."""
 FLAT = 1e-4
-"""A quantity that varies by less than this on an element, in spans of its bounds, counts as constant: its rate of decay means nothing."""
+"""A quantity that varies by less than this on an element, in scales, counts as constant: its rate of decay means nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseErrors:
-    """Of one phase of N elements.
+    """Of one phase of N elements. Scales are those of `state_scales` and `control_scales`.
 
     Attributes
     ----------
     defect : array (N,)
         Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with its
-        controls, in spans of the states' bounds; infinite where the integration breaks down.
-    integral : array (N,)
-        The same for integrals, of which the transcription has a quadrature at its nodes, in sizes of their sums over all elements.
+        controls, in scales; infinite where the integration breaks down.
+    sums : array (N,)
+        Share of each element in the error of integrals, as a quadrature with a node more than the degree of the states would have it, or in
+        that of peaks, by which these are higher between the nodes than at any node; 0 where there is none.
     excess : array (N,)
-        How far states and path constraints leave their limits between nodes, in their scales.
+        How far states and path constraints leave their limits between nodes, in the scales of these.
     leaving : array (N,)
         The same for controls.
     tail : array (N,)
-        How well polynomials of this degree describe the controls: the last two Legendre coefficients, in spans of the controls' bounds.
-    rate : array (N,)
-        How fast Legendre coefficients of states and controls decay: by a factor exp(-rate) with each degree, at the slowest.
+        How well polynomials of this degree describe the controls: the last two Legendre coefficients, in scales. Of constant controls: the
+        larger of the jumps to the neighbours.
+    weight : array (N,)
+        Share of each element in what happens: in the time, or in the way of a state, whichever is larger.
+    rate, control_rate : array (N,)
+        How fast Legendre coefficients of the states, and of the controls, decay: by a factor exp(-rate) with each degree, at the slowest.
+    integrand_rate : array (N,)
+        The same for integrands; 0 where a peak is higher between the nodes: there elements are to be shorter.
     steep : array (N,)
         Where a control is steepest or leaves a bound, in (-1, 1), if it does so much more than elsewhere on the element; else NaN.
     """
 
     defect: np.ndarray
-    integral: np.ndarray
+    sums: np.ndarray
     excess: np.ndarray
     leaving: np.ndarray
     tail: np.ndarray
+    weight: np.ndarray
     rate: np.ndarray
+    control_rate: np.ndarray
+    integrand_rate: np.ndarray
     steep: np.ndarray
 
 
-def phase_errors(problem: CompiledProblem, trajectory: Trajectory, *, rtol: float, atol: float) -> list[PhaseErrors]:
-    """The errors of each phase.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-    rtol, atol
-        Of the integrator; see `simulate`.
-    """
+def phase_errors(problem: CompiledProblem, trajectory: Trajectory, simulated: Simulation) -> list[PhaseErrors]:
+    """The errors of each phase, from the simulation of each element by itself (`simulate_elements`)."""
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    return [_errors(phase, trajectory[phase.name], parameters, rtol, atol) for phase in problem.phases]
+    return [_errors(phase, trajectory[phase.name], simulated.trajectory[phase.name], parameters) for phase in problem.phases]
 
 
-def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float) -> PhaseErrors:
+def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseTrajectory, parameters: np.ndarray) -> PhaseErrors:
     excess = excess_by_element(phase, trajectory, parameters)
     names = {v.name for v in phase.controls}
-    values = trajectory.control.on_elements(DENSE) / np.array([v.span for v in phase.controls])
+    values, scales = trajectory.control.on_elements(DENSE), control_scales(trajectory)
     nothing = np.zeros(len(values))
     controls, states = _coefficients(trajectory)
-    defect, integral = _local_defects(phase, trajectory, parameters, rtol, atol)
+    share, integrand_rate = _quadrature(phase, trajectory, parameters)
+    peaks = _peak_shares(phase, trajectory, parameters)
     return PhaseErrors(
-        defect=defect,
-        integral=integral,
+        defect=_local_defects(trajectory, simulated),
+        sums=np.maximum(share, peaks),
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
-        tail=np.abs(controls[:, 1:][:, -2:]).max(axis=(1, 2), initial=0.0),
-        rate=np.minimum(decay_rates(states), decay_rates(controls)),
-        steep=np.array([_steepest(one, phase.controls) for one in values]),
+        tail=_tails(controls),
+        weight=_weights(trajectory),
+        rate=decay_rates(states),
+        control_rate=decay_rates(controls),
+        integrand_rate=np.where(peaks > 0.0, 0.0, integrand_rate),
+        steep=np.array([_steepest(one, phase.controls, scales) for one in values]),
     )
 
 
-def _local_defects(
-    phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, rtol: float, atol: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """See `PhaseErrors.defect` and `PhaseErrors.integral`."""
-    elements, span = len(trajectory.state.coefficients), np.array([v.span for v in phase.states])
-    nothing = np.zeros((elements, phase.integrands.size1_out(0)))
-    tolerances = atol * np.concatenate([span, np.ones(nothing.shape[1])])
-    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements)])
-    reached = arcs.integrate(np.hstack([trajectory.edge_states[:-1], nothing]), rtol, tolerances, "DOP853")[:, -1]
-    defect = np.abs(reached[:, : len(span)] - trajectory.edge_states[1:]) / span
-    integrals = _quadrature(phase, trajectory, np.array([trajectory.t0, trajectory.tf, *parameters]))
-    sizes = np.abs(integrals).sum(axis=0)
-    difference = np.abs(reached[:, len(span) :] - integrals) / np.where(sizes > 0, sizes, 1.0)
-    worst = np.array([defect.max(axis=1), difference.max(axis=1, initial=0.0)])
-    worst[~np.isfinite(worst)] = np.inf
-    return worst[0], worst[1]
+def _local_defects(trajectory: PhaseTrajectory, simulated: PhaseTrajectory) -> np.ndarray:
+    """See `PhaseErrors.defect`."""
+    difference = np.abs(simulated.state.ends()[1] - trajectory.edge_states[1:]) / state_scales(trajectory)
+    worst = difference.max(axis=1)
+    return np.where(np.isfinite(worst), worst, np.inf)
 
 
-def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray) -> np.ndarray:
-    """Integrals (N, k) over each element by Gauss-Legendre's rule on as many nodes as the trajectory has inside it."""
+def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (N,) in the error of integrals, and `PhaseErrors.integrand_rate`."""
+    s = np.array([trajectory.t0, trajectory.tf, *parameters])
+    nodes = trajectory.state.coefficients.shape[1]
+    (few, _), (many, values) = (_integrals(phase, trajectory, s, count) for count in (nodes, 2 * nodes + 4))
+    total = np.abs(many).sum(axis=0)
+    error = (np.abs(few - many) / np.where(total > 0, total, 1.0)).max(axis=1, initial=0.0)
+    error = np.where(np.isfinite(error), error, 0.0)
+    size = np.abs(values).max(axis=(0, 1))
+    rate = decay_rates(legendre_coefficients(np.nan_to_num(values / np.where(size > 0, size, 1.0))))
+    return _shares(error), rate
+
+
+def _peak_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
+    """Shares (N,) in the error of peaks."""
+    s = np.array([trajectory.t0, trajectory.tf, *parameters])
+    times = trajectory.state.times(DENSE)
+    x, u = (
+        values.reshape(times.size, values.shape[2])
+        for values in (trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE))
+    )
+    between = paths_and_peaks(phase, x, u, times.ravel(), s)[1].reshape(*times.shape, -1)
+    at_nodes = paths_and_peaks(phase, trajectory.states, trajectory.controls, trajectory.time, s)[1]
+    higher = np.maximum(between.max(axis=1) - at_nodes.max(axis=0), 0.0) / np.maximum(np.abs(at_nodes).max(axis=0), np.finfo(float).tiny)
+    return _shares(np.nan_to_num(higher.max(axis=1, initial=0.0)))
+
+
+def _shares(errors: np.ndarray) -> np.ndarray:
+    return errors / max(errors.sum(), np.finfo(float).tiny)
+
+
+def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Integrals (N, k) over each element by Gauss-Legendre's rule, and the integrands (N, nodes, k) there."""
     lengths = np.diff(trajectory.state.edges)
-    tau, weights = gauss_legendre(max(1, (len(trajectory.time) - 1) // len(lengths) - 1))
+    tau, weights = gauss_legendre(nodes)
     times = trajectory.state.times(tau)
     x, u = (values.reshape(times.size, -1) for values in (trajectory.state.on_elements(tau), trajectory.controls_on_elements(tau)))
     values = np.array(phase.integrands(x.T, u.T, times.reshape(1, -1), s)).reshape(-1, *times.shape)
-    return (0.5 * lengths[:, None] * values @ weights).T
+    return (0.5 * lengths[:, None] * values @ weights).T, np.moveaxis(values, 0, 2)
+
+
+def _tails(controls: np.ndarray) -> np.ndarray:
+    """See `PhaseErrors.tail`, from Legendre coefficients (N, k, nu)."""
+    if controls.shape[1] > 1:
+        return np.abs(controls[:, 1:][:, -2:]).max(axis=(1, 2), initial=0.0)
+    jumps = np.abs(np.diff(controls[:, 0], axis=0)).max(axis=1, initial=0.0)
+    return np.maximum(np.append(jumps, 0.0), np.append(0.0, jumps))
+
+
+def _weights(trajectory: PhaseTrajectory) -> np.ndarray:
+    """See `PhaseErrors.weight`."""
+    lengths = np.diff(trajectory.state.edges)
+    ways = np.abs(np.diff(trajectory.state.on_elements(DENSE), axis=1)).sum(axis=1)
+    # The way of a state that hardly moves is noise.
+    ways /= np.maximum(ways.sum(axis=0), state_scales(trajectory))
+    return np.maximum(lengths / max(lengths.sum(), np.finfo(float).tiny), ways.max(axis=1))
 
 
 def decay_rates(coefficients: np.ndarray) -> np.ndarray:
@@ -136,25 +179,24 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
 
 
 def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Legendre coefficients (N, k, columns) of the controls and of the states on each element, in spans of their bounds."""
+    """Legendre coefficients (N, k, columns) of the controls and of the states on each element, in scales."""
     found = []
-    for piece, variables in ((trajectory.control, trajectory.control_variables), (trajectory.state, trajectory.state_variables)):
-        k = piece.coefficients.shape[1]
-        tau = gauss_legendre(k)[0]
-        found.append(legendre_coefficients(piece.on_elements(tau)) / np.array([v.span for v in variables]))
+    for piece, scales in ((trajectory.control, control_scales(trajectory)), (trajectory.state, state_scales(trajectory))):
+        tau = gauss_legendre(piece.coefficients.shape[1])[0]
+        found.append(legendre_coefficients(piece.on_elements(tau)) / scales)
     # Through stages and both ends of an element pass polynomials whose degree, by collocation, is one less: the last is always 0.
     return found[0], found[1][:, :-1] if trajectory.state.basis == "closed-legendre" else found[1]
 
 
-def _steepest(values: np.ndarray, variables: Sequence[Variable]) -> float:
-    """See `PhaseErrors.steep`, on one element, from its controls (len(DENSE), nu) in spans."""
+def _steepest(values: np.ndarray, variables: Sequence[Variable], scales: np.ndarray) -> float:
+    """See `PhaseErrors.steep`, on one element, from its controls (len(DENSE), nu)."""
     for i, v in enumerate(variables):
-        if v.period is None and not np.isnan(place := _switch(values[:, i], v.lower / v.span)):
+        if v.period is None and not np.isnan(place := _switch(values[:, i], v, scales[i])):
             return place
     if not values.size:
         return np.nan
     middle = 0.5 * (DENSE[1:] + DENSE[:-1])
-    change = np.abs(np.diff(values, axis=0))
+    change = np.abs(np.diff(values / scales, axis=0))
     # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), in any case.
     slopes = change / np.diff(DENSE)[:, None] * np.sqrt(1.0 - middle[:, None] ** 2)
     mean = change.sum(axis=0) / 2.0
@@ -163,11 +205,11 @@ def _steepest(values: np.ndarray, variables: Sequence[Variable]) -> float:
     return float(middle[np.argmax(slopes[:, column])]) if ratio[column] >= STEEP else np.nan
 
 
-def _switch(values: np.ndarray, lower: float) -> float:
-    """The place where a control, given at `DENSE` in spans, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
-    on = np.minimum(np.abs(values - lower), np.abs(values - lower - 1.0)) < ON_BOUND
+def _switch(values: np.ndarray, bounds: Variable, scale: float) -> float:
+    """The place where a control, given at `DENSE`, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
+    on = np.minimum(np.abs(values - bounds.lower), np.abs(values - bounds.upper)) < ON_BOUND * bounds.span
     changes = 0.5 * (DENSE[1:] + DENSE[:-1])[on[1:] != on[:-1]]
-    if not len(changes) or np.ptp(values) < 10.0 * ON_BOUND:
+    if not len(changes) or np.ptp(values) < 10.0 * ON_BOUND * scale:
         return np.nan
     if on[0] and on[-1]:
         return float(0.5 * (changes[0] + changes[-1]))

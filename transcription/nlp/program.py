@@ -9,7 +9,9 @@ from problems.derived import remembered
 from problems.peaks import refuse_peaks
 
 from ..base import NLP
+from ..stopping import check_stopping
 from .scaling import gradients, ipopt_options, origin, symbol
+from .watched import Watched
 
 Options = tuple[tuple[str, object], ...]
 """Options of IPOPT as pairs, which can be remembered by."""
@@ -21,7 +23,7 @@ def program_parameters(shift: np.ndarray, inverse: np.ndarray, slope: np.ndarray
 
 
 @remembered
-def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> ca.Function:
+def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> Watched:
     """The solver of the program
 
         minimise a   subject to   (F(z) - shift) / scale <= slope a,   (F(z) - shift) / scale <= top,   rows and bounds,
@@ -37,6 +39,7 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> c
     above = (F - shift) * inverse
     values = ca.vertcat(g * rows, above - x[n] * slope, above)
     dF, dg, _, _ = gradients(nlp)(z)
+    check_stopping()
     of_rows, of_objectives = _scaled(dg, rows, scales), _scaled(dF, inverse, scales)
     jacobian = ca.blockcat([[of_rows, ca.MX(r, 1)], [of_objectives, -slope], [of_objectives, ca.MX(m, 1)]])
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", r + 2 * m)
@@ -51,7 +54,7 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> c
     # Sensitivities to the parameters, which nobody asks for, would take longer to derive than some solves take.
     unasked = {"calc_lam_p": False, "no_nlp_grad": True}
     settings = ipopt_options(seconds, max_iterations) | {f"ipopt.{name}": value for name, value in options}
-    return ca.nlpsol("scalarized", "ipopt", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives | unasked)
+    return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives | unasked)
 
 
 @remembered

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
-from ..stopping import stopping
+from ..stopping import Stopped, stopping
 from .program import Options, program_parameters, solver
 from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, nlp_scales, origin
 
@@ -193,11 +193,11 @@ def scalarize(
         than minimised or bounded above.
     """
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
+    if stopping():
+        return _not_begun(nlp, start)
     task = _task(nlp, start, reference, weights, ceiling, margin)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
-    if stopping():
-        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     found: list[Solved] = []
@@ -214,6 +214,12 @@ def scalarize(
     ended = best.status != CONVERGED and found[-1].message == AT_LIMIT
     message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
+
+
+def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
+    """The start itself, where the work is to end before IPOPT begins."""
+    F, violation = nlp.evaluate(start[None])
+    return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
 
 
 def _task(
@@ -266,7 +272,10 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     tolerance = settings.tolerance
     columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
     options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
-    run = solver(nlp, settings.seconds, settings.max_iterations, options)
+    try:
+        run = solver(nlp, settings.seconds, settings.max_iterations, options)
+    except Stopped:
+        return _not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
     slack = min(1e-8, SLACK * tolerance)
     states = np.where(made_up, 0.0, slack * nlp.scale)
@@ -297,7 +306,7 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
-    return Solved(z, F[0], float(violation[0]), status, iterations, "Time" in outcome, message=message), stuck
+    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT, message=message), stuck
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

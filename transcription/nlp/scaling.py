@@ -15,6 +15,7 @@ STATUS_OF_IPOPT = {
     "Infeasible_Problem_Detected": INFEASIBLE,
     "Maximum_CpuTime_Exceeded": TIMEOUT,
     "Maximum_WallTime_Exceeded": TIMEOUT,
+    "User_Requested_Stop": TIMEOUT,
 }
 """The status that a return status of IPOPT means, where it is not just a failure."""
 

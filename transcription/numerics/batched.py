@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
+
+from .compiling import compiled_form, compiler
 
 PAYS, TYPICAL = 30_000_000, 1500
 """Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
@@ -108,7 +106,7 @@ class Batched:
         if self._length > LONG:
             return
         interpreted = self._function, self._blocks, self._wide, self._width
-        library = _library(self._function)
+        library = compiled_form(self._function)
         if library is None:
             return
         self._function, self._blocks, self._wide, self._width = library, {}, None, 0
@@ -116,33 +114,6 @@ class Batched:
         if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(found, expected, strict=True)):
             self._function, self._blocks, self._wide, self._width = interpreted
             log.info("%s: compiled values differ in the last bits; it stays interpreted", self._function.name())
-
-
-def compiler() -> str | None:
-    """The C compiler of this machine that Functions are compiled with; None if they are not, or there is none."""
-    if os.environ.get("MACS_COMPILE", "1") == "0":
-        return None
-    return os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-
-
-def _library(function: ca.Function) -> ca.Function | None:
-    """The function compiled by the C compiler of this machine; None where there is none, or it fails."""
-    command = compiler()
-    if not command:
-        return None
-    with tempfile.TemporaryDirectory(prefix="macs_") as folder:
-        try:
-            generator = ca.CodeGenerator("compiled.c")
-            generator.add(function)
-            generator.generate(folder + os.sep)
-            # Contracted or reordered operations would round differently.
-            options = ["-shared", "-fPIC", "-O1", "-ffp-contract=off"]
-            words = [*command.split(), *options, "compiled.c", "-o", "compiled.so", "-lm"]
-            subprocess.run(words, cwd=folder, check=True, capture_output=True)
-            return ca.external(function.name(), str(Path(folder) / "compiled.so"))
-        except (OSError, subprocess.CalledProcessError, RuntimeError) as error:
-            log.info("%s is not compiled: %s", function.name(), error)
-            return None
 
 
 def work(function: ca.Function) -> int:

@@ -1,8 +1,9 @@
-"""The mesh of one phase: where its elements end, and the degree of its states on them."""
+"""The mesh of one phase: where its elements end, and the degrees of its states and controls on them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,10 @@ from problems.checks import check_count
 
 SHORTEST = 1e-9
 """Shortest element, relative to its phase: below, its length is mostly rounding."""
+REACH, FAR = 0.45, 0.9
+"""How far a moving edge may go towards the next one, as a fraction of the distance: where that moves too, and where it stays."""
+SAME = 1e-9
+"""Largest difference between the same edge in a mesh and in its trajectory, relative to the phase: of rounding, of times far from 0 too."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -23,15 +28,26 @@ class PhaseMesh:
         Ends of the elements, relative to the phase: increasing from 0 to 1.
     order : int
         Degree of the states on each element.
+    control_order : int, optional
+        Degree of the controls on each element; by default the method's own rule.
+    moving : sequence of int
+        Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them. The edges between
+        two of these, or one and an end of the phase, share the distance as they do here.
+    constant : mapping or pairs of a name and a sequence of int
+        Controls that have one value on some arcs: which of these, 0 to m, where m moving edges part m + 1 arcs.
 
     Raises
     ------
     ValueError
-        If the edges are not such, or the order is no whole number of at least 0.
+        If the edges are not such, an order is no whole number of at least 0, a moving edge is no inner one, an arc none of these, or one of
+        them given twice.
     """
 
     edges: tuple[float, ...]
     order: int
+    control_order: int | None = None
+    moving: tuple[int, ...] = ()
+    constant: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         try:
@@ -43,9 +59,17 @@ class PhaseMesh:
         check_count("order of a mesh", self.order, 0)
         object.__setattr__(self, "edges", tuple(edges.tolist()))
         object.__setattr__(self, "order", int(self.order))
+        if self.control_order is not None:
+            check_count("control_order of a mesh", self.control_order, 0)
+            object.__setattr__(self, "control_order", int(self.control_order))
+        object.__setattr__(self, "moving", _indices("moving edges", self.moving, 1, self.elements - 1))
+        object.__setattr__(self, "constant", self._arcs(self.constant))
 
     def __repr__(self) -> str:
-        return f"PhaseMesh({self.elements} elements of order {self.order})"
+        controls = "" if self.control_order is None else f", controls of order {self.control_order}"
+        moving = f", {len(self.moving)} of {self.elements - 1} inner edges moving" if self.moving else ""
+        constant = "".join(f", {name} constant on {len(arcs)} of {len(self.moving) + 1} arcs" for name, arcs in self.constant)
+        return f"PhaseMesh({self.elements} elements of order {self.order}{controls}{moving}{constant})"
 
     @classmethod
     def uniform(cls, elements: int, order: int) -> PhaseMesh:
@@ -54,13 +78,14 @@ class PhaseMesh:
 
     @classmethod
     def of(cls, given: Any) -> PhaseMesh:
-        """From what a user writes, (edges, order), or a file: {"edges": ..., "order": ...}. Raises ValueError for anything else."""
+        """From what a user writes, (edges, order) and perhaps more, or a file, a mapping of these names. Raises ValueError for anything
+        else."""
         if isinstance(given, PhaseMesh):
             return given
         try:
             return cls(**given) if isinstance(given, dict) else cls(*given)
         except TypeError:
-            raise ValueError(f"the mesh of a phase is written (edges, order), not {given!r}") from None
+            raise ValueError(f"the mesh of a phase is written (edges, order[, control_order[, moving]]), not {given!r}") from None
 
     @property
     def elements(self) -> int:
@@ -82,9 +107,87 @@ class PhaseMesh:
         places = self.places
         return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
 
+    @property
+    def knots(self) -> tuple[int, ...]:
+        """Indices (m + 2,) of the moving edges and the two ends."""
+        return (0, *self.moving, self.elements)
+
+    @property
+    def arcs(self) -> np.ndarray:
+        """The arc (N,) in which each element lies."""
+        return np.searchsorted(self.moving, np.arange(self.elements), side="right")
+
+    def ranges(self) -> np.ndarray:
+        """Bounds (m, 2) of the places of the moving edges, relative to the phase.
+
+        Two neighbours may each use less than half of what lies between them, so that they never meet; beside an end there is more room.
+        """
+        distances = np.diff(np.array(self.edges)[list(self.knots)])
+        reach = np.full((2, len(self.moving)), REACH)
+        reach[0, :1], reach[1, -1:] = FAR, FAR
+        places = np.array(self.edges)[list(self.moving)]
+        return np.stack([places - reach[0] * distances[:-1], places + reach[1] * distances[1:]], axis=-1)
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Derivatives (N + 1, m) of the places of all edges by those of the moving ones."""
+        knots = np.array(self.edges)[list(self.knots)]
+        return np.array([np.interp(self.edges, knots, one) for one in np.eye(len(knots))[1:-1]]).reshape(-1, len(self.edges)).T
+
+    def moved(self, places: np.ndarray) -> PhaseMesh:
+        """The same mesh with its moving edges at other places (m,), relative to the phase: from there they can move as far again."""
+        if not self.moving:
+            return self
+        edges = np.array(self.edges) + self.shares @ (places - np.array(self.edges)[list(self.moving)])
+        return replace(self, edges=tuple(edges.tolist()))
+
+    def with_elements(self, edges: Sequence[float], order: int, control_order: int | None) -> PhaseMesh:
+        """Other elements, and degrees on them, with the same moving edges and arcs. Raises ValueError if these are not among `edges`."""
+        j = np.searchsorted(edges, [self.edges[k] - SHORTEST for k in self.moving])
+        if any(k >= len(edges) or abs(edges[k] - self.edges[one]) > SHORTEST for k, one in zip(j, self.moving, strict=True)):
+            raise ValueError("a moving edge of a mesh has to stay one of its edges")
+        return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()), self.constant)
+
+    def found_in(self, edges: np.ndarray) -> PhaseMesh:
+        """This mesh as it lies in a trajectory of it, from the ends (N + 1,) of the trajectory's elements, in time: with its moving edges
+        where they are there. The mesh as it is, if the trajectory is of another one."""
+        if len(edges) != len(self.edges) or not self.moving or not edges[-1] > edges[0]:
+            return self
+        places = (edges - edges[0]) / (edges[-1] - edges[0])
+        low, high = self.ranges().T
+        mesh = self.moved(np.clip(places[list(self.moving)], low, high))
+        return mesh if np.abs(places - mesh.edges).max() <= SAME else self
+
     def to_dict(self) -> dict[str, Any]:
-        """As plain data."""
-        return {"edges": list(self.edges), "order": self.order}
+        """As plain data; what a mesh does not have is left out."""
+        plain: dict[str, Any] = {"edges": list(self.edges), "order": self.order}
+        if self.control_order is not None:
+            plain["control_order"] = self.control_order
+        if self.moving:
+            plain["moving"] = list(self.moving)
+        return plain | {"constant": {name: list(arcs) for name, arcs in self.constant}} if self.constant else plain
+
+    def _arcs(self, given: Any) -> tuple[tuple[str, tuple[int, ...]], ...]:
+        """The controls that are constant, sorted by name, and on which arcs. Raises ValueError if they are not such."""
+        try:
+            named = {str(name): arcs for name, arcs in dict(given).items()}
+        except (TypeError, ValueError):
+            raise ValueError(f"constant controls of a mesh must be a mapping of their names to arcs, not {given!r}") from None
+        arcs = {name: _indices(f"arcs on which '{name}' is constant", named[name], 0, len(self.moving)) for name in sorted(named)}
+        return tuple((name, those) for name, those in arcs.items() if those)
+
+
+def _indices(what: str, given: Any, least: int, most: int) -> tuple[int, ...]:
+    """Different whole numbers within a range, sorted. Raises ValueError if they are not such."""
+    if not isinstance(given, Iterable) or isinstance(given, str | bytes):
+        raise ValueError(f"{what} must be a sequence of whole numbers, not {given!r}")
+    indices = tuple(given)
+    for one in indices:
+        if isinstance(one, bool) or not isinstance(one, int | np.integer) or not least <= one <= most:
+            raise ValueError(f"{what} must be among {least} to {most}, not {one!r}")
+    if len(set(indices)) < len(indices):
+        raise ValueError(f"{what} must differ, not {given!r}")
+    return tuple(sorted(map(int, indices)))
 
 
 def as_meshes(given: Any) -> tuple[tuple[str, PhaseMesh], ...]:

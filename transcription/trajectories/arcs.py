@@ -15,6 +15,7 @@ from problems.derived import remembered
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
+from ..stopping import check_stopping
 from .limits import DENSE
 from .trajectory import PhaseTrajectory
 
@@ -23,6 +24,10 @@ METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
 MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which the integration counts as broken down."""
+EVERY = 100
+"""Evaluations of the dynamics after which an integration asks whether to end early: some hundredths of a second."""
+GRACE = 1.0
+"""Seconds that integrations have left when the work is asked to end: most are over by then, so that what was found is still checked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +81,13 @@ class Arcs:
         -------
         array (n, len(DENSE), ny)
             States and integrals at the local coordinates `DENSE`; NaN where the integration breaks down.
+
+        Raises
+        ------
+        Stopped
+            If the work is to end early, and has been for `GRACE`.
         """
+        check_stopping(GRACE)
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
         able = np.flatnonzero(np.isfinite(y).all(axis=1))
         if len(able):
@@ -127,6 +138,8 @@ class Arcs:
             calls += 1
             if calls > MOST_CALLS:
                 raise ArithmeticError("too many evaluations of the dynamics")
+            if not calls % EVERY:
+                check_stopping(GRACE)
             x[:] = y.reshape(n, -1)[:, :nx]
             time[:] = self.begins + (tau + 1.0) * half[:, 0]
             values = (basis_matrix(self.basis, degree, np.array([tau])) @ laws).reshape(n, nu) if degree else laws.reshape(n, nu)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, verified_scale
+from problems.derived import remembered
 
 from .arcs import METHODS, Arcs
 from .limits import DENSE, excess, paths_and_peaks
@@ -24,8 +25,8 @@ class Simulation:
         `defect[phase][state]`: largest difference from the transcription at the ends of its elements, divided by the span of the state's
         bounds; infinite where the integration broke down.
     violation : float
-        Largest scaled residual of state bounds, final values, path constraints, links and constraints of the simulated trajectory, sampled
-        densely. Bounds of the controls between nodes are the same as in the transcription: see `Point.excursions`.
+        Largest scaled residual of bounds of states and controls, final values, path constraints, links and constraints of the simulated
+        trajectory, sampled densely.
     violations : mapping
         The same by constraint.
     objectives : mapping
@@ -104,6 +105,29 @@ def simulate_all(
     return [found[k] for k in range(len(trajectories))]
 
 
+def simulate_elements(problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10) -> Simulation:
+    """The simulation of a trajectory's controls on each element by itself, from the state that the trajectory has at its beginning.
+
+    Errors do not grow from element to element, so that it follows dynamics too, which are so unstable that no simulation of the whole can.
+    `trajectory` is discontinuous: the end of an element differs from the beginning of the next by the local error. Objectives are those of
+    the planned states at the ends of phases, and of the simulated integrals and peaks. See `simulate` for the arguments.
+    """
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    simulated: dict[int, _SimulatedPhase] = {}
+    violations: dict[str, float] = {}
+    for i in problem.order_in_time:
+        phase = problem.phases[i]
+        planned = trajectory[phase.name]
+        nx, integrals = len(phase.states), np.zeros((len(planned.state.coefficients), phase.integrands.size1_out(0)))
+        tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
+        arcs = Arcs.of(phase, [(planned, j, parameters) for j in range(len(integrals))])
+        elements = arcs.integrate(np.hstack([planned.edge_states[:-1], integrals]), rtol, tolerances, "DOP853")
+        elements[1:, :, nx:] += np.cumsum(elements[:-1, -1:, nx:], axis=0)
+        simulated[i] = _simulated_phase(phase, planned, elements, parameters)
+        violations |= simulated[i].violations(phase)
+    return _simulation(problem, simulated, violations, trajectory, parameters)
+
+
 def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
     """Simulations of trajectories of one shape."""
     parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]
@@ -149,26 +173,61 @@ def _simulation(
 
 @dataclass(frozen=True, eq=False)
 class _SimulatedPhase:
-    """One phase: the planned and the simulated trajectory, the quantities q for objectives and constraints, the excess of its paths."""
+    """One phase: the planned and the simulated trajectory, the quantities q for objectives and constraints, the excess of its paths and
+    that of its controls."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
     quantities: np.ndarray
     path_excess: np.ndarray
+    control_excess: np.ndarray
 
     def defect(self, phase: CompiledPhase) -> dict[str, float]:
-        difference = np.abs(self.trajectory.edge_states - self.planned.edge_states) / np.array([v.span for v in phase.states])
+        # At an end of two elements the trajectory has two values where each element is simulated by itself.
+        both = [self.trajectory.edge_states - self.planned.edge_states, self.trajectory.state.ends()[1] - self.planned.edge_states[1:]]
+        difference = np.abs(np.vstack(both)) / np.array([v.span for v in phase.states])
         return {v.name: _or_infinite(amount) for v, amount in zip(phase.states, difference.max(axis=0), strict=True)}
 
     def violations(self, phase: CompiledPhase) -> dict[str, float]:
-        states = self.trajectory.states
-        found = {f"bounds of {phase.name}.{v.name}": a for v, a in zip(phase.states, excess(states, phase.states), strict=True)}
-        found |= {f"path '{v.name}' of '{phase.name}'": a for v, a in zip(phase.paths, self.path_excess, strict=True)}
-        ends = [replace(v, lower=low, upper=high) for v, (low, high) in zip(phase.states, phase.final, strict=True)]
-        for v, end, amount in zip(phase.states, ends, excess(states[-1:], ends), strict=True):
-            if (end.lower, end.upper) != (v.lower, v.upper):
-                found[f"final value of {phase.name}.{v.name}"] = amount
-        return {label: _or_infinite(amount) for label, amount in found.items()}
+        states, ends = self.trajectory.states, _ends(phase)
+        amounts = [excess(states, phase.states), self.control_excess, self.path_excess, excess(states[-1:], ends)]
+        every = zip(_labelled(phase), np.concatenate(amounts), strict=True)
+        return {label: _or_infinite(amount) for (label, _), amount in every if label}
+
+
+def _ends(phase: CompiledPhase) -> list[Variable]:
+    """The final values of the states, as variables with their limits."""
+    return [replace(v, lower=low, upper=high) for v, (low, high) in zip(phase.states, phase.final, strict=True)]
+
+
+def _labelled(phase: CompiledPhase) -> list[tuple[str, Variable | Limit]]:
+    """What is limited in a phase, by its label: bounds of states and of controls, paths, and final values; the label is empty for a control
+    that is periodic, which has no bounds, and for a final value with the bounds of its state."""
+    return [
+        *((f"bounds of {phase.name}.{v.name}", v) for v in phase.states),
+        *(("" if v.period else f"bounds of {phase.name}.{v.name}", v) for v in phase.controls),
+        *((f"path '{limit.name}' of '{phase.name}'", limit) for limit in phase.paths),
+        *(
+            ("" if (end.lower, end.upper) == (v.lower, v.upper) else f"final value of {phase.name}.{v.name}", end)
+            for v, end in zip(phase.states, _ends(phase), strict=True)
+        ),
+    ]
+
+
+def worst_violation(problem: CompiledProblem, simulation: Simulation) -> tuple[str, float]:
+    """The constraint that a simulated trajectory violates most where it is to be verified, and by how much, in `verified_scale`."""
+    parts = _stricter(problem)
+    amounts = {label: parts.get(label, 1.0) * amount for label, amount in simulation.violations.items()}
+    label = max(amounts, key=lambda label: amounts[label], default="")
+    return label, amounts.get(label, 0.0)
+
+
+@remembered
+def _stricter(problem: CompiledProblem) -> dict[str, float]:
+    """The scale of each constraint as a part of its `verified_scale`, by its label in `Simulation.violations`, where they differ."""
+    limits = [one for phase in problem.phases for one in _labelled(phase) if one[0]]
+    limits += [(f"constraint '{limit.name}'", limit) for limit in problem.limits]
+    return {label: part for label, limit in limits if (part := limit.scale / verified_scale(limit)) < 1.0}
 
 
 def _start(
@@ -216,7 +275,7 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
     quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks.max(axis=0)])
-    return _SimulatedPhase(planned, trajectory, quantities, excess(paths, phase.paths))
+    return _SimulatedPhase(planned, trajectory, quantities, excess(paths, phase.paths), excess(controls, phase.controls))
 
 
 def _or_infinite(value: float) -> float:

@@ -171,7 +171,6 @@ def reentry(
     problem.default_transcription = "dfet:50x2:bernstein:1"
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"
-    problem.verify_tolerance = 2e-2
     return problem
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from macs import NSGA2, Front
-from macs.fronts.simulated import best
 from problems import Problem
 from transcription import DFET, SingleShooting
 
@@ -66,7 +65,6 @@ def test_points_that_become_infeasible_have_this_status_and_do_not_merge(front):
     assert (limited.violation > 1e-3).tolist() == (speeds > limit + 1e-3).tolist()
     assert set(limited.status[speeds > limit + 1e-3]) == {"infeasible"}
     assert len(Front.merge([limited])) == (speeds <= limit + 1e-3).sum()
-    assert best(limited).tolist() == [k for k in range(len(front)) if speeds[k] <= limit + 1e-3]
     assert (front.simulate(push(gate=limit), tolerance=100.0).status == "converged").all()
 
 
@@ -74,10 +72,18 @@ def test_what_is_dominated_in_the_air_is_not_the_best():
     """Objectives on a coarse mesh that simulation does not confirm."""
     front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="propagate")
     again = front.simulate(tolerance=1.0)
-    kept = best(again)
     merged = Front.merge([again])
+    kept = [k for k, one in enumerate(again.F) if not ((one >= again.F).all(axis=1) & (one > again.F).any(axis=1)).any()]
     np.testing.assert_array_equal(again.F[kept], merged.F)
     assert (np.abs(again.F - front.F).max() > 1e-3) and len(kept) <= len(front)
+
+
+def test_other_data_make_nothing_verified(front):
+    """What a simulation of the front's own problem found is not true of another."""
+    assert front.verified.all() and front.was_simulated.all()
+    other = front.simulate(push(mass=4.0))
+    assert not other.verified.any() and not other.was_simulated.any() and "verify" not in other.stats
+    assert len(Front.merge([other])) == len(other) == len(front)
 
 
 def test_simulated_fronts_are_saved_like_others(front, tmp_path):
@@ -123,3 +129,13 @@ def test_what_was_decided_has_to_be_within_the_other_bounds(front, data, what, a
     for point in other:
         thrust = point.trajectory["run"].control.coefficients
         assert point.violations[what] == pytest.approx((thrust.max() - 0.01) / 0.01 if amount is None else amount)
+
+
+def test_controls_that_leave_their_bounds_between_nodes_are_seen():
+    """Three values at the inner nodes of an element, within their bounds: the parabola through them is not."""
+    found = NSGA2(population=8).solve(push(), DFET(1, 2), evaluations=64, seed=1, inner="propagate", verify=None)
+    assert max(point.excursions.get("run.u", 0.0) for point in found) > 0.05, "at least one leaves them"
+    for point, flight in zip(found, found.simulate(tolerance=1.0), strict=True):
+        values = point.trajectory["run"].controls_on(0, np.linspace(-1.0, 1.0, 2001))
+        excess = max(values.max() - 2.0, -values.min(), 0.0) / 2.0
+        assert flight.violations["bounds of run.u"] == pytest.approx(excess, abs=2e-3)

@@ -15,7 +15,7 @@ from transcription import DFET, parse
 
 @pytest.fixture(scope="module")
 def front() -> Front:
-    return MACS(agents=4, archive=4).solve(problems.load("goddard"), parse("dfet:4x6"), evaluations=60, seed=1)
+    return MACS(agents=4, archive=4, mesh="fixed").solve(problems.load("goddard"), parse("dfet:4x6"), evaluations=60, seed=1)
 
 
 def altered(front: Front, **changes) -> Front:

@@ -1,0 +1,156 @@
+"""Points marked by an independent simulation: whether their dynamics, constraints and objectives are as they say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+import numpy as np
+
+from problems.checks import check_positive
+from problems.compiled import CompiledProblem
+from problems.sanity import objective_spreads
+from transcription.stopping import Stopped
+from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
+from transcription.trajectories.trajectory import Trajectory
+
+from ..evaluation.evaluator import CONVERGED
+from .points import Points
+
+Kind = TypeVar("Kind", bound=Points)
+
+VERIFY = 1e-3
+"""How much a point may miss by default when it is simulated, in scales."""
+PART = 1e-4
+"""Error of the integrator, as a fraction of what a point may miss."""
+COARSEST, FINEST = 1e-7, 1e-12
+"""Relative tolerances of the integrator."""
+CONSTANT = 1e-6
+"""An objective that varies less over a front, as a fraction of its size, is judged by its size."""
+NOTHING = 1e-6
+"""Smallest scale of an objective, as a fraction of how much it varies within the bounds of the problem."""
+MISSES = "simulated, "
+"""Beginning of a note on what a point misses."""
+
+
+def verified(points: Kind, tolerance: float | None) -> Kind:
+    """The same points with the columns of a simulation, and with a note where it does not agree.
+
+    A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
+    spans of their bounds, if the simulated trajectory and its controls violate no constraint by more, in `verified_scale`, and if no
+    simulated objective differs by more, in `objective_scales`.
+
+    Parameters
+    ----------
+    points : Points
+    tolerance : float or None
+        None: the points are returned as they are. So are those of a black box, and those whose simulation is not over soon after the work
+        was asked to end early (`transcription.stopping`).
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not positive, or the problem of the points cannot be found.
+    """
+    check_verify(tolerance)
+    if tolerance is None or points.source is None:
+        return points
+    rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
+    problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
+    rtol, atol = accuracy(tolerance)
+    try:
+        simulations = simulate_all(problem, planned, rtol=rtol, atol=atol)
+    except Stopped:
+        return points
+    scales = objective_scales(points)
+    n, m = points.F.shape
+    defect, violation, F, agrees = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan), np.zeros(n, dtype=bool)
+    notes = [_without_misses(note) for note in points.notes]
+    for i, trajectory, simulation in zip(rows, planned, simulations, strict=True):
+        worst, violation[i] = worst_violation(problem, simulation)
+        defect[i], F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
+        off = missed(simulation, points[int(i)].objectives, scales)
+        agrees[i] = points.status[i] == CONVERGED and max(defect[i], violation[i], off) <= tolerance
+        if not agrees[i]:
+            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), off, tolerance)
+            notes[i] = "; ".join([*filter(None, [notes[i]]), *reasons])
+    return points.replace(
+        defect=defect,
+        simulated_violation=violation,
+        simulated_F=F,
+        verified=agrees,
+        notes=notes,
+        stats={**points.stats, "verify": float(tolerance)},
+    )
+
+
+def unmarked(points: Kind) -> Kind:
+    """The same points as if they had not been simulated."""
+    nothing = np.full(len(points), np.nan)
+    return points.replace(
+        defect=nothing,
+        simulated_violation=nothing,
+        simulated_F=np.full(points.F.shape, np.nan),
+        verified=np.zeros(len(points), dtype=bool),
+        notes=[_without_misses(note) for note in points.notes],
+        stats={key: value for key, value in points.stats.items() if key != "verify"},
+    )
+
+
+def check_verify(tolerance: float | None) -> None:
+    """Raise ValueError if what points may miss is neither None nor positive."""
+    if tolerance is not None:
+        check_positive("verify", tolerance)
+
+
+def accuracy(tolerance: float) -> tuple[float, float]:
+    """Tolerances rtol and atol of an integrator that is to detect an error of `tolerance`."""
+    rtol = float(np.clip(PART * tolerance, FINEST, COARSEST))
+    return rtol, 0.1 * rtol
+
+
+def objective_scales(points: Points) -> np.ndarray:
+    """What counts as one in each objective (m,): the scale that was stated, or the range over the feasible points; the size of one that
+    hardly varies; and at least a small part of how much it varies within the bounds of the problem, if that is known."""
+    good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
+    F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
+    sizes, ranges = np.abs(F).max(axis=0), np.ptp(F, axis=0)
+    found = np.where(ranges > CONSTANT * sizes, ranges, sizes)
+    found = np.maximum(found, 0.0 if points.problem is None else NOTHING * objective_spreads(points.problem))
+    given = np.array([goal.scale or 0.0 for goal in points.goals])
+    return np.where(given > 0.0, given, np.where(found > 0.0, found, 1.0))
+
+
+def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
+    """The largest difference between a point's objectives, by name, and those of its simulation, divided by `scales` (m,)."""
+    difference = np.abs([simulation.objectives[name] - value for name, value in objectives.items()])
+    return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
+
+
+def _misses(
+    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], off: float, tolerance: float
+) -> list[str]:
+    """In words, what a point misses by more than the tolerance."""
+    label, violation = worst
+    found = []
+    if not defect <= tolerance:
+        found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance)}")
+    if not violation <= tolerance:
+        found.append(f"it violates '{label}' by {violation:.1e}")
+    if not off <= tolerance:
+        found.append(f"its objectives differ by {off:.1e} of the front's range")
+    return [MISSES + ", ".join(found)] if found else []
+
+
+def _growing(problem: CompiledProblem, trajectory: Trajectory, tolerance: float) -> str:
+    """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
+    rtol, atol = accuracy(PART * tolerance)
+    own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
+    if not own <= PART * tolerance:
+        return ""
+    return f", though on each element by at most {own:.0e}: the dynamics are unstable, and no simulation without feedback can follow them"
+
+
+def _without_misses(note: str) -> str:
+    """A note without what an earlier simulation said."""
+    return "; ".join(part for part in note.split("; ") if part and not part.startswith(MISSES))

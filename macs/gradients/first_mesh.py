@@ -1,0 +1,115 @@
+"""The transcription of a problem for which none is given: its own default, or one on a mesh that is found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.problem import Problem
+from transcription.base import Meshed, Transcription
+from transcription.catalogue import parse
+from transcription.dfet.method import DFET
+from transcription.meshes.verdict import Wanted
+from transcription.phases.mesh import PhaseMesh
+
+from ..evaluation.evaluator import CONVERGED, Counts
+from ..fronts.builders import vectors_points
+from ..fronts.points import Points
+from ..fronts.verified import verified
+from .mesh_loop import differentiable
+from .mesh_refinement import FrontRefinement
+from .multistart import GradientSolves, MultistartSolver, guessed_start
+
+COARSE = DFET(8, 3, basis="bernstein")
+"""The first mesh of a problem that names none."""
+PART = 10.0
+"""What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
+MESHES = 3
+"""Most meshes of one end."""
+MOST = 40
+"""Most elements of a phase: a search evaluates its mesh thousands of times."""
+NEAR = 0.25
+"""An edge is left out if the element is then longer than the shortest there by at most this part."""
+
+
+def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
+    """The problem's own default, or a coarse mesh."""
+    word = problem.default_transcription if isinstance(problem, Problem) else None
+    return COARSE if word is None else parse(word)
+
+
+def search_transcription(
+    problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float
+) -> tuple[Transcription, Counts]:
+    """The problem's own default, or the transcription of `found_mesh`; and what it cost."""
+    if isinstance(problem, Problem) and problem.default_transcription is not None:
+        return parse(problem.default_transcription), Counts()
+    return found_mesh(compiled, verify, tolerance)
+
+
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Transcription, Counts]:
+    """DFET on a mesh for a search, and what it cost to find.
+
+    Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
+    simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    verify : float
+        How much simulated points may miss.
+    tolerance : float
+        Largest scaled residual of a feasible point.
+    """
+    if not differentiable(problem):
+        return COARSE, Counts()
+    nlp, m = COARSE.nlp(problem), len(problem.goals)
+    solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
+    solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
+    own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
+    Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
+    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
+    limits = PART * verify
+    job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+    job.go()
+    counts = solver.counts.joined(job.solves.counts)
+    fine = [found.best.method for found in job.found.values()]
+    return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
+
+
+def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:
+    """Whether a simulation confirms the ends on the coarse mesh, and finer ones changed nothing in the objectives that are their own."""
+    moved = [abs(found.best.F[own[i]] - ends.F[i, own[i]]) / job.units[own[i]] for i, found in job.found.items()]
+    return bool(verified(ends, limits).verified.all()) and max(moved, default=0.0) <= limits
+
+
+def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Transcription:
+    """DFET on one mesh that has the elements and degrees of several."""
+    meshes = {phase.name: _together([method.mesh_of(phase.name) for method in methods]) for phase in problem.phases}
+    basis = "lobatto" if all(getattr(method, "basis", "") == "lobatto" for method in methods) else COARSE.basis
+    return DFET(COARSE.elements, COARSE.order, basis=basis, mesh=meshes)
+
+
+def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
+    """A mesh with the edges of several, without those that divide what no single mesh divides as finely."""
+    edges = sorted({edge for mesh in meshes for edge in mesh.edges})
+    while len(edges) > 2:
+        joined = np.array(edges[2:]) - np.array(edges[:-2])
+        # How long the element without an edge would be, in those that the meshes have there.
+        excess = joined / np.array([min(_length_at(mesh, edge) for mesh in meshes) for edge in edges[1:-1]])
+        k = int(np.argmin(excess))
+        if excess[k] > 1.0 + NEAR and len(edges) - 1 <= MOST:
+            break
+        del edges[k + 1]
+    orders = [mesh.control_order for mesh in meshes]
+    controls = None if None in orders else max(order for order in orders if order is not None)
+    return PhaseMesh(tuple(edges), max(mesh.order for mesh in meshes), controls)
+
+
+def _length_at(mesh: PhaseMesh, place: float) -> float:
+    """The length of the shortest element of a mesh that has a place in it or at its end."""
+    edges = np.array(mesh.edges)
+    touching = (edges[:-1] <= place) & (place <= edges[1:])
+    return float(np.diff(edges)[touching].min())

@@ -1,0 +1,302 @@
+"""One point on one mesh after another, until independent simulations agree with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.peaks import refuse_peaks
+from transcription.base import NLP, Meshed
+from transcription.inner import Ipopt
+from transcription.meshes.adaptation import next_method
+from transcription.meshes.knots import switched
+from transcription.meshes.scales import objective_variations
+from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
+from transcription.stopping import Stopped, stopping
+from transcription.trajectories.trajectory import Trajectory
+
+from ..evaluation.evaluator import CONVERGED, TIMEOUT
+from .multistart import GradientSolves
+from .tasks import Task
+
+KEPT = 3
+"""Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
+LITTLE = 1e-4
+"""Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
+PATIENCE = 3
+"""Number of meshes without progress after which a point is not refined further."""
+PROGRESS = 0.5
+"""The error falls at least to this fraction where there is progress."""
+DETOURS = 4
+"""Number of other meshes that are tried for a point where solves fail."""
+BLUNT = 1e-4
+"""Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
+DRIFT = 1e-2
+"""If a point gets worse by more than this, in units, other starts are tried too."""
+
+
+class Programs:
+    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes."""
+
+    def __init__(self, problem: CompiledProblem) -> None:
+        self.problem = problem
+        self._kept: dict[Meshed, NLP] = {}
+
+    def __call__(self, method: Meshed) -> NLP:
+        """The NLP of the problem on these meshes."""
+        nlp = self._kept.pop(method, None) or method.transcribe(self.problem)
+        self._kept[method] = nlp
+        while len(self._kept) > KEPT:
+            del self._kept[next(iter(self._kept))]
+        return nlp
+
+
+@dataclass(frozen=True, eq=False)
+class OnMesh:
+    """A point on one mesh, and its assessment.
+
+    Attributes
+    ----------
+    method : Meshed
+    z : array (n,)
+    F : array (m,)
+        Objectives, all minimised.
+    trajectory : Trajectory
+    verdict : Verdict
+    by_gradients : bool
+        True: a local optimum. False: a feasible point, or nothing is known.
+    achieved : array (m,) or None
+        The objectives of its simulation, all minimised, where that is feasible.
+    change : float
+        Largest change of an objective that matters from the mesh before, in units; infinite where there was none.
+    """
+
+    method: Meshed
+    z: np.ndarray
+    F: np.ndarray
+    trajectory: Trajectory
+    verdict: Verdict
+    by_gradients: bool
+    achieved: np.ndarray | None
+    change: float = np.inf
+
+    @property
+    def error(self) -> float:
+        """The largest error, or change from the mesh before, in units of what it may be."""
+        return max(self.verdict.error, self.change / self.verdict.wanted.settled)
+
+    def complaints(self) -> list[str]:
+        """Reasons why the point is not good enough; empty if it is."""
+        found = self.verdict.complaints()
+        if np.isinf(self.change):
+            found.append("it was not solved on a finer mesh")
+        elif not self.change <= self.verdict.wanted.settled:
+            found.append(f"its objectives still change by {self.change:.1e} of the front's range from mesh to mesh")
+        return found
+
+
+@dataclass(eq=False)
+class Refinement:
+    """What became of a point.
+
+    Attributes
+    ----------
+    best : OnMesh
+        The point on the best of its meshes: good enough if any is, else that of the least error.
+    trouble : str
+        Reason why there were no finer meshes although it is not good enough.
+    worse : float
+        By how much it is worse, in units, than what a simulation of it on an earlier mesh achieved; 0 if it is not.
+    meshes : list of Meshed
+        Those on which it was solved.
+    """
+
+    best: OnMesh
+    trouble: str = ""
+    worse: float = 0.0
+    meshes: list[Meshed] = field(default_factory=list)
+
+    def complaints(self) -> list[str]:
+        """Reasons why the point is not good enough; empty if it is."""
+        found = self.best.complaints()
+        if self.worse > 0.0:
+            found.append(f"it is worse by {self.worse:.1e} of the front's range than what it achieved on an earlier mesh when simulated")
+        return found
+
+    @property
+    def note(self) -> str:
+        """All that is to be said of it."""
+        complaints = self.complaints()
+        if complaints:
+            complaints.append(self.best.verdict.worst_place(self.best.method, self.best.trajectory))
+            complaints += [self.trouble] if self.trouble else []
+        return "; ".join([*complaints, *([self.best.verdict.remark] if self.best.verdict.unstable else [])])
+
+
+class MeshLoop:
+    """Solves points on one mesh after another.
+
+    Parameters
+    ----------
+    programs : Programs
+    solves : GradientSolves
+        Makes and counts the solves.
+    wanted : Wanted
+    limit : int
+        Largest number of meshes for each point.
+    most_work : float, optional
+        Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
+    """
+
+    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_work: float | None = None) -> None:
+        self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
+        self.problem = programs.problem
+        self._differentiable = differentiable(self.problem)
+
+    @property
+    def ended(self) -> bool:
+        """Whether no new mesh is to be begun."""
+        return stopping() or (self.most_work is not None and self.solves.work >= self.most_work)
+
+    def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
+        """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
+        varies by near a vector of the NLP: an objective near zero is not judged by its own size."""
+        ranges = np.ptp(F, axis=0)
+        found = np.maximum(np.where(ranges > 0, ranges, np.abs(F).max(axis=0)), LITTLE * objective_variations(nlp, z))
+        return np.where(found > 0, found, 1.0)
+
+    def on_mesh(
+        self, method: Meshed, z: np.ndarray, F: np.ndarray, trajectory: Trajectory, units: np.ndarray, by_gradients: bool
+    ) -> OnMesh:
+        """The assessment of a vector that was found on a mesh."""
+        verdict = judge(self.problem, trajectory, self.wanted, F, units)
+        achieved = simulated_objectives(self.problem, verdict.simulation)
+        feasible = verdict.simulation.violation <= self.wanted.feasible and verdict.leaving <= max(
+            self.wanted.feasible, self.wanted.leaving
+        )
+        return OnMesh(method, z, F, trajectory, verdict, by_gradients, achieved if feasible and np.isfinite(achieved).all() else None)
+
+    def refine(self, begun: OnMesh, task: Task, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
+        """A point on meshes that simulations agree with, as far as the limits allow.
+
+        Parameters
+        ----------
+        begun : OnMesh
+            Where it begins; its change is infinite if it is no optimum of `task` on its mesh.
+        task : Task
+            What it is the optimum of.
+        others : sequence of Trajectory
+            Of neighbouring points, as further starts.
+        hints : sequence of Meshed
+            Meshes that are tried first, one after the other.
+        """
+        found = Refinement(begun)
+        present, history, waiting, detours = begun, [begun.verdict.error], list(hints), DETOURS
+        least = _achieved(begun, task)
+        while len(found.meshes) < self.limit and not self.ended:
+            reached, status = None, ""
+            for method, better in self._proposals(present, waiting, detours > 0):
+                try:
+                    reached, last = self._solved(method, present, task, others, least)
+                except Stopped:
+                    # In the middle of it: the point stays on its best mesh so far.
+                    break
+                found.meshes.append(method)
+                if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
+                    reached = None
+                status = status or last
+                if reached is not None or self.ended or not detours:
+                    break
+                detours -= 1
+            if reached is None:
+                if not stopping():
+                    found.trouble = f"on the next finer mesh its status is '{status}'" if status else "its mesh cannot be refined further"
+                break
+            least = min(least, _achieved(reached, task))
+            present = reached
+            found.best = min((found.best, present), key=lambda one: (bool(one.complaints()), one.error))
+            history.append(present.error)
+            if not present.complaints():
+                break
+            if len(history) > PATIENCE and min(history[-PATIENCE:]) > PROGRESS * min(history[:-PATIENCE]):
+                found.trouble = "finer meshes do not help"
+                break
+        beyond = task.loss(found.best.F) - least
+        found.worse = beyond if beyond > 2.0 * self.wanted.settled else 0.0
+        return found
+
+    def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[tuple[Meshed, bool]]:
+        """The next mesh, and others to be tried where no solve converges on it; each with whether it must be an improvement to be taken."""
+        seen = {present.method}
+        while waiting:
+            yield waiting.pop(0), False
+        knots = switched(present.method, self.problem, present.trajectory) if knotted else None
+        if knots is not None and knots not in seen:
+            yield knots, True
+        finer = next_method(present.method.settled(present.trajectory), present.verdict, present.trajectory)
+        if finer not in seen:
+            yield finer, False
+            yield from ((method, False) for method in finer.alternatives())
+
+    def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
+        """The point on another mesh, None if no solve converged; and its status."""
+        try:
+            nlp = self.programs(method)
+            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+            if status != CONVERGED:
+                return None, status
+            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        except Stopped:
+            return None, TIMEOUT
+        return replace(reached, change=_change(present, F, task, self.wanted.settled)), status
+
+    def _from_starts(
+        self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
+    ) -> tuple[np.ndarray, np.ndarray, str, bool]:
+        """The best result of solves from the present trajectory and, if that fails or gets worse, from others: z, F, status, and whether
+        it is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
+        if not self._differentiable:
+            return self._projected(nlp, nlp.interpolate(present.trajectory))
+        bound = task.loss(present.F) if np.isinf(least) else least
+        best = None
+        for trajectory in (present.trajectory, *others):
+            solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))
+            if best is None or (solved.status != CONVERGED, task.loss(solved.F)) < (best.status != CONVERGED, task.loss(best.F)):
+                best = solved
+            if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + DRIFT):
+                break
+        assert best is not None
+        return best.z, best.F, best.status, True
+
+    def _projected(self, nlp: NLP, start: np.ndarray) -> tuple[np.ndarray, np.ndarray, str, bool]:
+        """The feasible point nearest to a vector: z, F, status, and that it is no optimum."""
+        near = Ipopt().solve(nlp, start[None, nlp.free], start[None], tolerance=self.solves.tolerance)
+        self.solves.counts.inner_iterations += int(near.iterations.sum())
+        self.solves.counts.clocked += near.clocked
+        return near.z[0], near.F[0], str(near.status[0]), False
+
+
+def differentiable(problem: CompiledProblem) -> bool:
+    """Whether gradient solves are possible: a peak that is maximised has no derivatives."""
+    try:
+        refuse_peaks(problem)
+    except ValueError:
+        return False
+    return True
+
+
+def _achieved(point: OnMesh, task: Task) -> float:
+    """The loss that the simulation of a point has for certain."""
+    return np.inf if point.achieved is None else task.loss(point.achieved) + point.verdict.doubt
+
+
+def _change(before: OnMesh, F: np.ndarray, task: Task, settled: float) -> float:
+    """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation
+    achieved, whichever is less: what a coarse mesh has wrong is no change of the point. Of objectives that are not `sharp`, a change of
+    `BLUNT` counts as one of `settled`."""
+    known = [before.F] if before.achieved is None else [before.F, before.achieved]
+    weights = np.where(task.sharp, 1.0, min(1.0, settled / BLUNT)) / task.units
+    return min(float((np.abs(F - one) * weights)[task.used].max()) for one in known)

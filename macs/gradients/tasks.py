@@ -1,0 +1,102 @@
+"""What a point is the optimum of, so that it can be solved again on any mesh."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from transcription.base import NLP
+from transcription.nlp.scalarized import Solved
+
+from ..evaluation.evaluator import CONVERGED
+from .multistart import GradientSolves
+
+
+class Task(ABC):
+    """A scalarised problem that can be solved on any mesh.
+
+    Attributes
+    ----------
+    units : array (m,)
+        What counts as one in each objective.
+    """
+
+    units: np.ndarray
+
+    @abstractmethod
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:
+        """The result of gradient solves from a vector (n,)."""
+
+    @abstractmethod
+    def loss(self, F: np.ndarray) -> float:
+        """How bad objectives (m,) are for it, in units; less is better."""
+
+    @property
+    @abstractmethod
+    def used(self) -> np.ndarray:
+        """Mask (m,) of the objectives that matter."""
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """Mask (m,) of those that a solve determines as exactly as its tolerance. By default all that matter."""
+        return self.used
+
+
+@dataclass(frozen=True, eq=False)
+class Along(Task):
+    """From a reference along weights to the front: Pascoletti and Serafini 1984; see `scalarize` for the arguments (m,)."""
+
+    reference: np.ndarray
+    weights: np.ndarray
+    units: np.ndarray
+    ceiling: np.ndarray | None = None
+
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:
+        """See `Task.solve`."""
+        return solves(nlp, start, self.reference, self.weights, self.ceiling)
+
+    def loss(self, F: np.ndarray) -> float:
+        """See `Task.loss`."""
+        moving, hard = self.used & (self.weights > 0), self.used & (self.weights <= 0)
+        alpha = np.max((F - self.reference)[moving] / self.units[moving])
+        return float(alpha + np.maximum((F - self.reference)[hard] / self.units[hard], 0.0).sum())
+
+    @property
+    def used(self) -> np.ndarray:
+        """See `Task.used`."""
+        return self.reference < np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class End(Task):
+    """The least value of one objective, and for that the least values of the others."""
+
+    objective: int
+    units: np.ndarray
+
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:
+        """See `Task.solve`."""
+        mine = np.arange(len(self.units)) == self.objective
+        first = solves(nlp, start, np.where(mine, 0.0, np.inf), self.units)
+        if first.status != CONVERGED or len(self.units) == 1:
+            return first
+        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+        ceiling = np.where(mine, first.F, np.inf)
+        second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
+        return second if second.status == CONVERGED else first
+
+    def loss(self, F: np.ndarray) -> float:
+        """See `Task.loss`."""
+        return float(F[self.objective] / self.units[self.objective])
+
+    @property
+    def used(self) -> np.ndarray:
+        """See `Task.used`."""
+        return np.ones(len(self.units), dtype=bool)
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """See `Task.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
+        return np.arange(len(self.units)) == self.objective

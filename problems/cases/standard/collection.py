@@ -1,0 +1,73 @@
+"""The table of contents of the collection."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from .published import Published
+
+ROOMS: dict[str, dict[str, str]] = {
+    "smooth": {
+        "batch_reactor": "the temperatures that make the most of a product",
+        "brachistochrone": "the quickest way down",
+        "bryson_max_range": "as far as possible in a given time",
+        "climb": "the quickest climb of a supersonic aircraft, with tables",
+        "hang_glider": "as far as possible through a thermal",
+        "hypersensitive": "a boundary layer at each end of a long rest",
+        "isoperimetric": "the largest area within a curve",
+        "linear_tangent": "the quickest way to a height and a speed",
+        "low_thrust": "many turns around the earth, to a high orbit",
+        "newton_nose": "least drag of a body of revolution",
+        "orbit_raising": "from the earth's orbit to that of Mars by a small thrust",
+        "van_der_pol": "an oscillator that is brought to rest",
+        "zermelo": "the quickest way of a ship in a current",
+    },
+    "paths": {
+        "alp_rider": "an unstable system above four peaks",
+        "breakwell": "least effort below a ceiling",
+        "bryson_denham": "least effort below a ceiling, at two heights",
+        "crane": "least swing of a container on its crane",
+        "dynamic_soaring": "the weakest gradient of wind that keeps a glider up",
+        "jacobson_lele": "a speed below a parabola of time",
+        "obstacle": "past two discs, with hardly any room",
+        "rayleigh": "an oscillator with a mixed constraint",
+    },
+    "switching": {
+        "aly_chan": "a control that is singular all along",
+        "car": "the quickest way from rest to rest, bang-bang",
+        "catalyst_mixing": "the best blend along a reactor, singular",
+        "f8": "the quickest return of an aircraft to trim, bang-bang, with local optima",
+        "free_flying_robot": "least fuel of jets, to a place and an attitude",
+        "lotka_fishing": "fishing prey and predators to rest, singular",
+        "moon_landing": "least propellant to a soft landing, bang-bang",
+        "reorientation": "the quickest turn of a spacecraft, bang-bang",
+        "robot_arm": "the quickest turn of an arm, bang-bang",
+        "rocket": "the greatest height of a rocket with drag, singular",
+        "tumour": "the smallest tumour that a drug leaves, singular",
+        "two_link_arm": "the quickest way of an arm with two links, bang-bang",
+    },
+    "phases": {
+        "delta_iii": "a launcher in four phases",
+        "missile": "along the sea, then a strike from above",
+        "schwartz": "two phases, the first around an ellipse",
+        "sounding_rocket": "the greatest height of a rocket, in three phases",
+    },
+}
+"""For each room its problems, with one line on each."""
+
+
+def cases() -> dict[str, tuple[str, str]]:
+    """For each problem the address of its function, and one line on it."""
+    return {name: (f"{_module(room, name)}:problem", text) for room, texts in ROOMS.items() for name, text in texts.items()}
+
+
+def published(name: str) -> tuple[Published, ...]:
+    """The published optima of a problem, that for its default data first. Raises ValueError if there is no such problem."""
+    room = next((room for room, texts in ROOMS.items() if name in texts), None)
+    if room is None:
+        raise ValueError(f"there is no problem '{name}' in the collection; there are {', '.join(cases())}")
+    return import_module(_module(room, name)).PUBLISHED
+
+
+def _module(room: str, name: str) -> str:
+    return f"{__package__}.{room}.{name}"

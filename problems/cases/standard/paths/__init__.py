@@ -1,0 +1,1 @@
+"""Problems with active state or mixed constraints along the way."""

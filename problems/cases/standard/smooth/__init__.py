@@ -1,0 +1,1 @@
+"""Problems with smooth controls, without active constraints along the way."""

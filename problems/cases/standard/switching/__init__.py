@@ -1,0 +1,1 @@
+"""Problems with bang-bang or singular controls."""

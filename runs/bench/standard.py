@@ -1,0 +1,169 @@
+"""Benchmark of published problems: each solved with defaults, in a process of its own, and compared with its published optimum when
+simulated."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+from macs import optimize
+from macs.io.console import Steps
+from problems import load
+from problems.cases.standard import SHARE, Published, cases, published
+from problems.catalogue import STANDARD
+
+from ..execution.child import THREADS
+from .measured import Column, Row, short, table
+
+RIGHT, WRONG, UNVERIFIED, FAILED, LATE, CRASHED = "right", "WRONG", "not verified", "FAILED", "TOO LATE", "CRASHED"
+QUICK = ("linear_tangent", "breakwell", "moon_landing", "schwartz")
+MEMORY = 1500.0
+"""Target: megabytes of each process."""
+POLL = 0.1
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Size of a measurement: names of problems (all if none), and seconds after which one is ended."""
+
+    names: tuple[str, ...] = ()
+    limit: float = 300.0
+
+
+def bench_standard(rows: list[Row], effort: Effort) -> None:
+    """Measure; `rows` are filled as values become known, also if `Stopped` ends it."""
+    tasks = [(name, i) for name in effort.names or cases() for i in range(len(published(name)))]
+    with Steps("published problems", len(tasks)) as steps:
+        for name, i in tasks:
+            steps.begin(title(name, i))
+            rows.append(compared(title(name, i), published(name)[i], apart(name, i, effort.limit, steps)))
+
+
+def title(name: str, i: int) -> str:
+    """A problem with its data, where they are not the defaults."""
+    data = ", ".join(f"{key}={value:g}" for key, value in published(name)[i].data.items())
+    return f"{name} ({data})" if data else name
+
+
+def solved(name: str, i: int) -> dict[str, float | str]:
+    """What a user gets without any option, simulated; `seconds` are those from the statement to the solution."""
+    import resource  # not on every system
+
+    record, began = published(name)[i], time.perf_counter()
+    problem = load(STANDARD + name, **record.data)
+    point = optimize(problem)
+    seconds = time.perf_counter() - began
+    stats = point.alone().stats
+    check = point.simulate()
+    return {
+        "status": point.status,
+        "ours": point.objectives[record.objective],
+        "simulated": check.objectives[record.objective],
+        "violation": check.violation,
+        "seconds": seconds,
+        "starts": stats["gradient_solves"],
+        "iterations": stats["inner_iterations"],
+        "verified": float(bool(point.verified)),
+        # Kilobytes, but bytes on a Mac.
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10),
+    }
+
+
+def apart(name: str, i: int, limit: float, steps: Steps) -> dict[str, float | str]:
+    """`solved` in a process of its own, so that its memory is its own and its end can be forced."""
+    places = os.pathsep.join(place or os.curdir for place in sys.path)
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, "-m", __name__, name, str(i)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": places},
+        start_new_session=True,
+    )
+    try:
+        while True:
+            try:
+                out, words = process.communicate(timeout=POLL)
+                break
+            except subprocess.TimeoutExpired:
+                steps.check()
+                if time.perf_counter() - began > limit:
+                    return {"status": LATE, "seconds": limit}
+    finally:
+        # It leads a group of its own: also a compiler that it may just be calling ends.
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    if process.returncode:
+        print(f"{name}: {words.strip().splitlines()[-1] if words.strip() else process.returncode}", file=sys.stderr)
+        return {"status": CRASHED}
+    return json.loads(out.splitlines()[-1])
+
+
+def compared(case: str, record: Published, found: dict[str, float | str]) -> Row:
+    """The row of a problem; its `who` is the verdict."""
+    values = {key: float(value) for key, value in found.items() if key != "status"}
+    if found["status"] in (LATE, CRASHED):
+        row = Row(case, str(found["status"]))
+    else:
+        simulated = values["simulated"]
+        values["error"] = record.error(simulated)
+        right = RIGHT if record.met(simulated) else WRONG
+        row = Row(case, FAILED if found["status"] != "converged" else right if values["verified"] else UNVERIFIED)
+    row.add(published=record.value, **values)
+    return row
+
+
+def report(rows: Sequence[Row]) -> str:
+    """The measured values, and the targets."""
+    right, wrong = (sum(row.who == who for row in rows) for who in (RIGHT, WRONG))
+    most = max(row.of("memory") if "memory" in row.values else 0.0 for row in rows)
+    lines = [
+        "PUBLISHED PROBLEMS: the optimum that the defaults find, against the published one. Error: of the value as simulated, relative to",
+        f"the published one, or to its scale; right within {SHARE:g}, or what the published digits are good for. Violation: largest one",
+        "when simulated. Not verified: said so by the program itself. Seconds: from the statement to the solution.",
+        "",
+        table(rows, COLUMNS),
+        "",
+        f"right and verified: asked at least 17 of 18, measured {right} of {len(rows)}, {_verdict(18 * right >= 17 * len(rows))}",
+        f"wrong, but verified: asked none, measured {wrong}, {_verdict(not wrong)}",
+        f"memory: asked at most {MEMORY:g} MB each, measured {most:.0f} MB, {_verdict(most <= MEMORY)}",
+    ]
+    return "\n".join(lines)
+
+
+def _verdict(met: bool) -> str:
+    return "met" if met else "MISSED"
+
+
+def _value(name: str) -> Column:
+    return (name, "", lambda row: f"{row.of(name):.7g}" if row.values.get(name) else "-")
+
+
+def _short(name: str, header: str, unit: str = "") -> Column:
+    return (header, unit, lambda row: short(row.of(name)) if row.values.get(name) else "-")
+
+
+COLUMNS: tuple[Column, ...] = (
+    _value("published"),
+    _value("ours"),
+    _value("simulated"),
+    ("error", "", lambda row: f"{row.of('error'):+.1e}" if row.values.get("error") else "-"),
+    ("vio-", "lation", lambda row: f"{row.of('violation'):.0e}" if row.values.get("violation") else "-"),
+    _short("seconds", "s"),
+    _short("starts", "starts"),
+    _short("iterations", "itera-", "tions"),
+    _short("memory", "MB"),
+)
+
+
+if __name__ == "__main__":
+    print(json.dumps(solved(sys.argv[1], int(sys.argv[2]))))

@@ -1,0 +1,199 @@
+"""What mesh refinement reports is so: ends are kept, optima are right, and nothing is a success that is worse than what came in."""
+
+from __future__ import annotations
+
+import gc
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from macs import optimize, sweep
+from macs.gradients.found_mesh import COARSE, found_optimum
+from macs.gradients.mesh_loop import KEPT, MeshLoop, Programs
+from macs.gradients.multistart import GradientSolves
+from problems import Problem, load
+from problems.cases.standard.collection import published
+from transcription import DFET, parse
+from transcription.base import NLP
+from transcription.meshes.verdict import Wanted
+
+
+def layers(start: float, end: float | None, duration: float, span: float) -> Problem:
+    """x' = -x^3 + u from one state to another: a layer at each end, nothing in between."""
+    problem = Problem("layers")
+    run = problem.phase("run", t0=0.0, tf=duration)
+    x = run.state("x", bounds=(-span, span), initial=start, final=end)
+    u = run.control("u", bounds=(-span, span))
+    run.dynamics(x=-(x**3) + u)
+    problem.minimize("cost", run.integral(0.5 * (x**2 + u**2)))
+    return problem
+
+
+def layer_costs(x: float) -> tuple[float, float]:
+    """Costs of the layers from x to 0 and from 0 to x: the Hamiltonian vanishes, u = x^3 -+ sqrt(x^6 + x^2); integrals of |u|."""
+    root = 0.25 * (x**2 * np.sqrt(x**4 + 1) + np.arcsinh(x**2))
+    return root - 0.25 * x**4, root + 0.25 * x**4
+
+
+def test_a_front_keeps_its_ends_however_far_a_finer_mesh_moves_them():
+    problem = layers(1.0, None, 1000.0, 8.0)
+    problem.minimize("miss", (problem.phases["run"].final(problem.phases["run"]["x"]) - 1.5) ** 2)
+    coarse = sweep(problem, DFET(30, 4), points=3)
+    exact = layer_costs(1.0)[0], layer_costs(1.0)[0] + layer_costs(1.5)[1]
+    assert coarse.F[-1, 1] < 1e-12 and coarse.F[0, 0] > 1.3 * exact[0], "the coarse mesh has both ends wrong, but it has them"
+    fine = coarse.refine_mesh()
+    assert len(fine) == 3 and fine.message.startswith("3 of 3") and [point.note for point in fine] == [""] * 3
+    assert fine.F[-1, 1] < 1e-12, "the best miss"
+    assert [fine.F[0, 0], fine.F[-1, 0]] == pytest.approx(exact, rel=1e-6)
+    share = (fine.F[1] - fine.F.min(axis=0)) / np.ptp(fine.F, axis=0)
+    assert (share > 0.02).all() and (share < 0.6).all(), "the point between them is between them"
+    for point in fine:
+        flown = list(point.simulate(rtol=1e-11, atol=1e-12).objectives.values())
+        assert flown == pytest.approx(point.F.tolist(), rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(("span", "transcription"), [(50.0, "dfet:40x3:bernstein:1"), (5.0, "dfet:40x3:bernstein:1"), (50.0, "dfet:20x3")])
+def test_an_optimum_is_only_certified_if_it_is_one(span, transcription):
+    """Bounds ten times as wide as needed hide an error that is divided by them; a control of order 1 hides its own suboptimality."""
+    point = optimize(layers(1.5, 1.0, 50.0, span), parse(transcription))
+    exact = layer_costs(1.5)[0] + layer_costs(1.0)[1]
+    assert abs(point.F[0] / exact - 1) > 1e-2
+    fine = point.alone().refine_mesh()
+    assert fine.message.startswith("1 of 1") and fine[0].note == ""
+    assert fine.F[0, 0] == pytest.approx(exact, rel=1e-6)
+
+
+def test_an_objective_near_zero_is_not_judged_by_its_own_size():
+    problem = Problem("near")
+    run = problem.phase("run", t0=0, tf=2)
+    x = run.state("x", bounds=(-4, 4), initial=0)
+    u = run.control("u", bounds=(-3, 3))
+    run.dynamics(x=u - ca.sin(3 * x))
+    problem.minimize("miss", (run.final(x) - 1.0) ** 2 + 1e-2 * run.integral((u - 1) ** 2) * (run.final(x) - 1.0) ** 2)
+    fine = optimize(problem, DFET(3, 3)).alone().refine_mesh()
+    assert fine.F[0, 0] < 1e-10 and fine.message.startswith("1 of 1") and fine[0].note == ""
+
+
+def random_problem(seed: int) -> Problem:
+    """Effort against distance from a target, with random dynamics, linear but for a pendulum's or a cubic's term."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 4))
+    A, b, target = rng.normal(0, 1, (n, n)), rng.normal(0, 1, n), rng.normal(0, 1.5, n)
+    A -= max(0.0, np.linalg.eigvals(A).real.max()) * np.eye(n)
+    bend = rng.choice([0.0, 0.3, 1.0])
+    problem = Problem(f"random {seed}")
+    run = problem.phase("run", t0=0, tf=float(rng.uniform(2, 12)))
+    wide = float(10 ** rng.uniform(0, 2))
+    x = [run.state(f"x{i}", bounds=(-10 * wide, 10 * wide), initial=float(rng.normal())) for i in range(n)]
+    u = run.control("u", bounds=(-3.0, 3.0))
+    rates = {f"x{i}": sum(A[i, j] * x[j] for j in range(n)) + b[i] * u - bend * ca.sin(x[i]) for i in range(n)}
+    run.dynamics(**rates)
+    problem.minimize("effort", run.integral(u**2 + 0.1 * x[0] ** 2))
+    problem.minimize("miss", sum((run.final(x[i]) - target[i]) ** 2 for i in range(n)))
+    return problem
+
+
+def keeps_what_came_in(seed: int) -> None:
+    """A refined front has its size, its ends and its spread, and what has no note is right, and no worse than what it was refined from."""
+    rng = np.random.default_rng(seed + 1000)
+    problem = random_problem(seed)
+    method = DFET(int(rng.integers(2, 6)), int(rng.integers(1, 4)), basis=str(rng.choice(["lobatto", "bernstein"])))
+    coarse = sweep(problem, method, points=4)
+    fine = coarse.refine_mesh(tolerance=1e-5)
+    assert len(fine) == len(coarse) > 0
+    span = np.maximum(np.ptp(fine.F, axis=0), 1e-4)
+    simulated = np.array([[*point.simulate(rtol=1e-10, atol=1e-11).objectives.values()] for point in coarse])
+    assert (fine.F.min(axis=0) <= simulated.min(axis=0) + 2e-4 * span).all(), "the best of each objective, flown"
+    gaps = np.linalg.norm(np.diff(fine.F / span, axis=0), axis=1)
+    before = np.linalg.norm(np.diff(coarse.F / np.maximum(np.ptp(coarse.F, axis=0), 1e-4), axis=0), axis=1)
+    assert gaps.max(initial=0.0) <= max(1.5 * before.max(initial=0.0), 0.8), "no hole"
+    for point in fine:
+        if not point.note:
+            found = point.simulate(rtol=1e-11, atol=1e-12)
+            assert np.abs(np.array([*found.objectives.values()]) - point.F).max() <= 1e-3 * span.max()
+            assert (np.abs(np.array([*found.objectives.values()]) - point.F) <= 2e-4 * span).all()
+    assert sum(not point.note for point in fine) >= len(fine) - 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_random_fronts_keep_what_came_in(seed):
+    keeps_what_came_in(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(5, 60))
+def test_many_random_fronts_keep_what_came_in(seed):
+    keeps_what_came_in(seed)
+
+
+def test_what_no_simulation_can_follow_is_said_to_be_that():
+    """x' = x + u over 40 seconds: an error grows by exp(40). The optimum is u = -2 exp(-t), to the last digit: cost 2."""
+    problem = Problem("unstable")
+    run = problem.phase("run", t0=0, tf=40)
+    x = run.state("x", bounds=(-5, 5), initial=1, final=0)
+    u = run.control("u", bounds=(-5, 5))
+    run.dynamics(x=x + u)
+    problem.minimize("effort", run.integral(u**2))
+    fine = optimize(problem, DFET(20, 4)).alone().refine_mesh(tolerance=1e-6)
+    assert fine[0].simulate().max_defect > 1.0
+    assert fine.F[0, 0] == pytest.approx(2.0, rel=1e-6) and fine.message.startswith("1 of 1")
+    assert fine[0].note.startswith("unstable: open-loop simulation cannot follow (errors grow by")
+    assert len(fine[0].trajectory["run"].state.edges) < 42, "no mesh is refined for it"
+
+
+def test_a_basis_that_fails_is_left():
+    """On 20 Bernstein elements of linear controls the mixed constraint of Rayleigh's problem costs 8e-4 of the objective."""
+    point = optimize(load("standard/rayleigh"), parse("dfet:20x3:bernstein:1"))
+    fine = point.alone().refine_mesh(tolerance=1e-5)
+    value = published("rayleigh")[0]
+    assert abs(point.F[0] - value.value) > 1e-2 and value.met(fine.F[0, 0])
+    assert abs(fine.F[0, 0] - value.value) < 1e-3
+
+
+def searched(problem: Problem, wanted: Wanted, coarse=COARSE):
+    compiled = problem.compile()
+    loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_solves=60)
+    m = len(compiled.goals)
+    reference = np.where(np.arange(m) == 0, 0.0, np.inf)
+    found = found_optimum(loop, reference, np.eye(m)[0], lambda nlp: None, 1, np.random.default_rng(0), coarse)
+    return found, loop
+
+
+PLAIN = Wanted(1e-3, 1e-3, 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize("name", ["breakwell", "bryson_denham", "hypersensitive", "linear_tangent", "moon_landing", "catalyst_mixing"])
+def test_a_mesh_is_found(name):
+    value = published(name)[0]
+    found, loop = searched(load(f"standard/{name}"), PLAIN)
+    assert found.good and found.note == ""
+    simulated = found.refinement.best.verdict.simulation.objectives[value.objective]
+    assert value.met(simulated) and loop.solves.counts.gradient_solves <= 12
+
+
+def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
+    hopeless = DFET(1, 1, control_order=0)
+    problem = load("standard/bryson_denham")
+    found, _ = searched(problem, PLAIN, (hopeless,))
+    assert not found.good and found.refinement is None
+    found, loop = searched(problem, PLAIN, (hopeless, DFET(8, 3)))
+    assert found.good and loop.solves.counts.failures
+
+
+def test_work_ends_with_the_solves_that_are_granted():
+    problem = layers(1.5, 1.0, 50.0, 50.0)
+    compiled = problem.compile()
+    loop = MeshLoop(Programs(compiled), GradientSolves(1e-8), Wanted(1e-9, 1e-6), 8, most_solves=3)
+    found = found_optimum(loop, np.zeros(1), np.ones(1), lambda nlp: None, 1, np.random.default_rng(0))
+    assert not found.good and "change" in found.note and 3 <= loop.solves.counts.gradient_solves <= 4
+
+
+def test_programs_of_earlier_meshes_are_not_kept():
+    def alive() -> int:
+        gc.collect()
+        return sum(isinstance(one, NLP) for one in gc.get_objects())
+
+    before = alive()
+    found, _ = searched(layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6))
+    assert len(found.refinement.meshes) >= KEPT and alive() - before <= KEPT + 1

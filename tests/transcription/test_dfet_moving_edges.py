@@ -1,0 +1,244 @@
+"""DFET on elements whose edges are variables of the NLP."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from cases import candidates, integrator, oscillator, propagated, slot
+from test_contract import jump
+
+from macs import MACS, Front, optimize
+from problems import Problem
+from transcription import DFET, Smooth, from_dict
+from transcription.dfet.phase import DFETPhase
+from transcription.phases.mesh import PhaseMesh
+from transcription.phases.writer import PhaseWriter
+from transcription.trajectories.simulate import simulate
+
+EDGES, MOVING = (0.0, 0.1, 0.35, 0.6, 1.0), (1, 3)
+
+
+def moving(basis: str = "lobatto", order: int = 3, control_order: int | None = None) -> DFET:
+    return DFET(2, 2, basis=basis, mesh={"swing": (EDGES, order, control_order, MOVING)})
+
+
+def test_moving_edges_are_free_variables_that_cannot_meet():
+    nlp = moving().transcribe(oscillator())
+    names = [nlp.variables[i].name for i in nlp.free]
+    found = {name: nlp.variables[i] for i, name in zip(nlp.free, names, strict=True) if "edge" in name}
+    assert list(found) == ["swing.edge[1]", "swing.edge[3]"]
+    assert found["swing.edge[1]"].lower == pytest.approx(0.01) and found["swing.edge[1]"].upper == pytest.approx(0.1 + 0.45 * 0.5)
+    assert found["swing.edge[3]"].lower == pytest.approx(0.6 - 0.45 * 0.5) and found["swing.edge[3]"].upper == pytest.approx(0.96)
+    assert all(v.scale == v.upper - v.lower for v in found.values())
+    close = PhaseMesh((0.0, 0.2, 0.4, 1.0), 1, None, (1, 2)).ranges()
+    assert close == pytest.approx(np.array([[0.02, 0.29], [0.31, 0.94]]))
+    assert nlp.guess[names.index("swing.edge[3]")] == 0.6
+
+
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+@pytest.mark.parametrize("order", [0, 1, 4])
+def test_where_the_edges_are_the_equations_are_those_of_a_mesh_with_these_edges(basis, order):
+    nlp = moving(basis, order, 2).transcribe(oscillator())
+    chosen = [slot(nlp, f"swing.edge[{j}]") for j in MOVING]
+    for z in propagated(nlp):
+        one, two = z[chosen]
+        edges = np.array([0.0, one, 0.5 * (one + two), two, 1.0])
+        still = DFET(2, 2, basis=basis, mesh={"swing": (edges, order, 2)}).transcribe(oscillator())
+        same = np.delete(z, chosen)[None]
+        assert np.abs(still.propagate(same) - same).max() < 1e-11
+        for one, two in zip(nlp.evaluate(z[None]), still.evaluate(same), strict=True):
+            assert np.abs(one - two).max() < 1e-12
+        flight, other = nlp.unpack(z)["swing"], still.unpack(same[0])["swing"]
+        assert flight.state.edges == pytest.approx(other.state.edges, abs=1e-14)
+        assert flight.states == pytest.approx(other.states, abs=1e-14)
+
+
+@pytest.mark.parametrize("written_out", [True, False])
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+def test_derivatives_by_the_edges_are_those_of_differences(basis, written_out, monkeypatch):
+    if not written_out:
+        monkeypatch.setattr("transcription.dfet.propagation.SMALL", 0)
+    nlp = moving(basis).transcribe(oscillator())
+    (z,) = propagated(nlp, k=1)
+    rows = np.arange(len(nlp.reduced.scale))
+    derivatives = nlp.reduced.derivatives(nlp.reduced.propagate(z[None]), rows)[0]
+    for column in range(len(nlp.free)):
+        step = 1e-5 * nlp.span[nlp.free[column]]
+        two = np.tile(z, (2, 1))
+        two[:, nlp.free[column]] += [-step, step]
+        low, high = nlp.reduced.propagate(two).values
+        assert derivatives[:, column] == pytest.approx((high - low) / (2 * step), rel=1e-5, abs=1e-5), nlp.variables[nlp.free[column]].name
+    assert np.abs(derivatives[:, [list(nlp.free).index(slot(nlp, f"swing.edge[{j}]")) for j in MOVING]]).max() > 1e-2
+
+
+def test_derivatives_are_those_of_the_equations_in_linked_phases_with_imposed_ends(monkeypatch):
+    method = DFET(2, 2, mesh={"first": (EDGES, 2, 1, MOVING), "second": (EDGES, 3, None, (2,))})
+    problem = jump().compile()
+    own = method.transcribe(problem)
+    Z = own.propagate(own.first_guess(candidates(own, 3)))
+    rows = np.arange(len(own.reduced.scale))
+    derivatives = own.reduced.derivatives(own.reduced.propagate(Z), rows)
+    for name in ("propagate", "sensitivity"):
+        monkeypatch.setattr(DFETPhase, name, getattr(PhaseWriter, name))
+    monkeypatch.setattr(DFETPhase, "compilable", False)
+    plain = method.transcribe(problem)
+    again = plain.reduced.propagate(plain.first_guess(Z[:, plain.free]))
+    assert np.abs(again.Z - Z).max() < 1e-11
+    assert plain.reduced.derivatives(again, rows) == pytest.approx(derivatives, rel=1e-8, abs=1e-10)
+
+
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+def test_a_trajectory_comes_back_from_its_own_mesh_with_its_edges(basis):
+    nlp = moving(basis).transcribe(oscillator())
+    for z in propagated(nlp):
+        assert np.abs((nlp.interpolate(nlp.unpack(z)) - z) / nlp.span).max() < 1e-9
+
+
+def test_in_trajectories_of_other_meshes_the_edges_begin_where_the_mesh_has_them():
+    nlp = moving().transcribe(oscillator())
+    other = DFET(5, 3).transcribe(oscillator())
+    flight = other.unpack(propagated(other, k=1)[0])
+    z = nlp.interpolate(flight)
+    assert [z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING] == [0.1, 0.6]
+    same = nlp.unpack(z)["swing"]
+    assert same.state(same.state.edges) == pytest.approx(flight["swing"].state(same.state.edges), abs=1e-10)
+
+
+def test_a_settled_method_begins_where_the_edges_of_a_trajectory_are():
+    method = moving()
+    nlp = method.transcribe(oscillator())
+    (z,) = propagated(nlp, k=1)
+    flight = nlp.unpack(z)
+    settled = method.settled(flight)
+    mesh = settled.mesh_of("swing")
+    assert mesh.moving == MOVING and mesh.order == 3
+    assert mesh.edges[2] == pytest.approx(0.5 * (mesh.edges[1] + mesh.edges[3]), abs=1e-15)
+    assert [mesh.edges[j] for j in MOVING] == pytest.approx([z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING], abs=1e-12)
+    again = settled.transcribe(oscillator())
+    assert again.evaluate(again.interpolate(flight)[None])[1] < 1e-10
+    assert settled.settled(again.unpack(again.interpolate(flight))).mesh_of("swing").edges == pytest.approx(mesh.edges, abs=1e-12)
+    # Not from a trajectory of another mesh, and not where nothing moves.
+    other = DFET(5, 3).transcribe(oscillator())
+    assert method.settled(other.unpack(propagated(other, k=1)[0])) == method
+    assert DFET(5, 3).settled(flight) == DFET(5, 3)
+
+
+def least_time() -> Problem:
+    """A double integrator from rest at 0 to rest at 1 and back at -0.5, as fast as may be, with unequal bounds of the force.
+
+    With a from 0 to t1 and -b from there, distance d takes sqrt(2 d (1/a + 1/b)), and the switch is at b / (a + b) of it.
+    """
+    problem = Problem("least time")
+    run = problem.phase("run", t0=0, tf=(0.1, 10))
+    x, v = run.state("x", bounds=(-5, 5), initial=0, final=1), run.state("v", bounds=(-5, 5), initial=0, final=0)
+    run.control("u", bounds=(-1, 2))
+    run.dynamics(x=v, v=run["u"])
+    problem.minimize("time", run.tf)
+    assert x is not None
+    return problem
+
+
+@pytest.mark.parametrize(("basis", "control_order"), [("lobatto", 0), ("bernstein", None)])
+def test_a_switch_is_where_it_belongs(basis, control_order):
+    exact, place = np.sqrt(2 * 1.5), 1 / 3
+    still = optimize(least_time(), DFET(2, 2, control_order, basis=basis))
+    assert abs(still.objectives["time"] - exact) > 1e-3
+    method = DFET(2, 2, basis=basis, mesh={"run": ((0, 0.5, 1), 2, control_order, (1,))})
+    point = optimize(least_time(), method)
+    assert point.objectives["time"] == pytest.approx(exact, rel=1e-8)
+    flight = point.trajectory["run"]
+    assert flight.state.edges[1] / flight.tf == pytest.approx(place, abs=1e-8)
+    assert point.simulate().max_defect < 1e-8 and not point.excursions
+    assert method.settled(point.trajectory).mesh_of("run").edges[1] == pytest.approx(place, abs=1e-8)
+
+
+def test_a_constant_control_is_one_variable_on_its_arc():
+    mesh = PhaseMesh(EDGES, 3, 2, MOVING, {"u": [1, 0], "v": (2,)})
+    assert mesh.constant == (("u", (0, 1)), ("v", (2,))) and mesh.arcs.tolist() == [0, 1, 1, 2]
+    assert PhaseMesh.of(json.loads(json.dumps(mesh.to_dict()))) == mesh
+    assert "u constant on 2 of 3 arcs" in repr(mesh)
+    for basis in ("lobatto", "bernstein"):
+        nlp = DFET(2, 2, basis=basis, mesh={"swing": mesh}).transcribe(oscillator())
+        names = [nlp.variables[i].name for i in nlp.free]
+        assert [name for name in names if name.startswith("swing.u[")] == [
+            "swing.u[arc 0]",
+            "swing.u[arc 1]",
+            *(f"swing.u[3,{k}]" for k in range(3)),
+        ]
+        assert sum(name.startswith("swing.v[") for name in names) == 1 + 3 * 3
+        assert [len(profile.columns) for profile in nlp.profiles] == [5, 10]
+        (z,) = propagated(nlp, k=1)
+        flight = nlp.unpack(z)
+        assert np.abs((nlp.interpolate(flight) - z) / nlp.span).max() < 1e-9
+        control = flight["swing"].control.coefficients
+        assert np.ptp(control[1:3, :, 0]) == 0 == np.ptp(control[3, :, 1]) and np.ptp(control[3, :, 0]) > 0.1
+        # The same as where it is free, with the same coefficients.
+        free = DFET(2, 2, basis=basis, mesh={"swing": (EDGES, 3, 2, MOVING)}).transcribe(oscillator())
+        again = free.interpolate(flight)
+        assert np.abs(free.evaluate(again[None])[0] - nlp.evaluate(z[None])[0]).max() < 1e-10 and free.evaluate(again[None])[1] < 1e-9
+        rows = np.arange(len(nlp.reduced.scale))
+        derivatives = nlp.reduced.derivatives(nlp.reduced.propagate(z[None]), rows)[0]
+        column, step = names.index("swing.u[arc 1]"), 1e-6
+        two = np.tile(z, (2, 1))
+        two[:, nlp.free[column]] += [-step, step]
+        low, high = nlp.reduced.propagate(two).values
+        assert derivatives[:, column] == pytest.approx((high - low) / (2 * step), rel=1e-5, abs=1e-5)
+
+
+def test_a_coarse_trajectory_is_constant_at_its_median():
+    coarse = DFET(5, 3).transcribe(oscillator())
+    z = coarse.propagate(coarse.first_guess(candidates(coarse, 1)))[0]
+    flight = coarse.unpack(z)
+    nlp = DFET(2, 2, mesh={"swing": PhaseMesh((0, 0.2, 1), 3, 2, (1,), {"u": (0,)})}).transcribe(oscillator())
+    own = flight["swing"].control.on_element(0, np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]))[:, 0]
+    assert nlp.interpolate(flight)[slot(nlp, "swing.u[arc 0]")] == pytest.approx(np.median(own))
+
+
+@pytest.mark.parametrize("constant", [3, {"u": 3}, {"u": (3,)}, {"u": (0, 0)}, {"u": (-1,)}, "u"])
+def test_what_is_no_constant_control_is_refused(constant):
+    with pytest.raises(ValueError, match="DFET: phase 'swing'"):
+        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, constant)})
+
+
+def test_a_constant_control_that_the_phase_does_not_have_is_refused():
+    with pytest.raises(ValueError, match="phase 'swing' has no control 'w'; its controls are u, v"):
+        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, {"w": (0,)})}).transcribe(oscillator())
+
+
+def test_searches_begin_with_their_edges_and_files_keep_them(tmp_path):
+    method = DFET(2, 2, mesh={"run": ((0, 0.5, 1), 2, 0, (1,))})
+    problem = least_time()
+    drawn = Smooth().draw(problem, method, 20, np.random.default_rng(0))
+    nlp = method.transcribe(problem)
+    edge = list(nlp.free).index(slot(nlp, "run.edge[1]"))
+    assert ((nlp.lower[nlp.free[edge]] <= drawn[:, edge]) & (drawn[:, edge] <= nlp.upper[nlp.free[edge]])).all()
+    front = MACS(refine=False).solve(problem, method, evaluations=300, seed=1)
+    assert front[0].violation < 1e-6
+    front.save(tmp_path / "front.nc")
+    again = Front.load(tmp_path / "front.nc", problem=problem)
+    assert np.array_equal(again.decision, front.decision)
+    assert from_dict(again[0].transcription) == method == from_dict(json.loads(json.dumps(method.to_dict())))
+    edges = again[0].trajectory["run"].state.edges
+    assert edges[1] == pytest.approx(edges[-1] * again[0].decision[slot(nlp, "run.edge[1]")])
+    assert again[0].simulate().max_defect < 1e-8
+
+
+def test_a_candidate_that_is_no_number_is_no_error():
+    nlp = moving().transcribe(oscillator())
+    z = np.full(len(nlp.variables), np.nan)
+    assert np.isnan(nlp.unpack(z)["swing"].state.edges).any()
+
+
+def test_constant_controls_and_paths_and_peaks_follow_the_edges():
+    problem, phase = integrator()
+    phase.path("speed", phase["u"] * phase.time, upper=1.5)
+    problem.minimize("peak", phase.peak(phase["x"] + phase.time))
+    nlp = DFET(2, 2, mesh={"run": ((0, 0.5, 1), 2, 0, (1,))}).transcribe(problem)
+    z = nlp.propagate(nlp.first_guess(np.array([[1.0, -1.0, 0.75]])))
+    F, _ = nlp.evaluate(z)
+    assert F[0, 0] == pytest.approx(2 * 1.5) and simulate(nlp.problem, nlp.unpack(z[0])).objectives["peak"] == pytest.approx(3.0)
+    assert nlp.violations(z[0])["path 'speed' of 'run'"] == pytest.approx(0.0, abs=1e-12)
+    later = nlp.propagate(nlp.first_guess(np.array([[1.0, -1.0, 0.9]])))
+    assert nlp.violations(later[0])["path 'speed' of 'run'"] == pytest.approx((1.8 - 1.5) / nlp.problem.phases[0].paths[0].scale)

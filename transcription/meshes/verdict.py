@@ -1,0 +1,255 @@
+"""One trajectory on its mesh, held against simulations: how wrong it is, where, and whether that is good enough."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+
+from ..base import Meshed
+from ..trajectories.simulate import Simulation, simulate, simulate_elements
+from ..trajectories.trajectory import Trajectory
+from .errors import PhaseErrors, phase_errors
+from .growth import growth
+from .scales import state_scales
+
+SAFETY = 0.5
+"""Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
+COST = 10.0
+"""Multiple of the tolerance by which objectives may be off, unless that is stated: their loss by poorly described controls is of second
+order."""
+ATTAINABLE = 1e-11
+"""Error of an element, in scales, that cannot be undercut: where that, grown along the trajectory, is more than the tolerance, no mesh
+helps."""
+OPTIMISM = 10.0
+"""A trajectory that is feasible only within the tolerance may have objectives that are too low by so many times its violation."""
+HARDLY = 1e-2
+"""An element's share of the defect of the whole below which it is worth finding out whether errors grow."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is good enough.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest defect: of the simulated states from those of the mesh, in units of what the states do.
+    feasible : float
+        Largest excess of constraints, simulated and between nodes, in their scales.
+    leaving : float
+        The same for controls between nodes.
+    objectives : float, optional
+        Largest error of an objective, in its unit; by default `COST` tolerances.
+    """
+
+    tolerance: float
+    feasible: float
+    leaving: float = 0.0
+    objectives: float | None = None
+
+    @property
+    def settled(self) -> float:
+        """Largest error of an objective."""
+        return COST * self.tolerance if self.objectives is None else self.objectives
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The independent assessment of a trajectory on its mesh.
+
+    Attributes
+    ----------
+    simulation : Simulation
+        Of the whole trajectory.
+    by_elements : Simulation
+        Of each element by itself.
+    errors : list of PhaseErrors
+        Element by element.
+    wanted : Wanted
+    defect : float
+        Largest difference between the simulated states and those of the mesh, at the ends of elements, in units of what the states do.
+    missed : float
+        Largest difference between the simulated objectives and those of the mesh, in their units.
+    missed_by_elements : float
+        The same for the simulation of each element by itself: the error of quadratures and of peaks between nodes.
+    growth : float
+        How much errors grow along the trajectory, where that was worth finding out; else 1.
+    narrow : float
+        The least that any state does, in spans of its bounds.
+    """
+
+    simulation: Simulation
+    by_elements: Simulation
+    errors: list[PhaseErrors]
+    wanted: Wanted
+    defect: float
+    missed: float
+    missed_by_elements: float
+    growth: float
+    narrow: float
+
+    @property
+    def doubt(self) -> float:
+        """By how much, in their units, objectives of the simulation may be too low since constraints are not satisfied exactly."""
+        return OPTIMISM * self.simulation.violation / self.narrow
+
+    @property
+    def local(self) -> float:
+        """The largest defect of an element."""
+        return max(float(phase.defect.max()) for phase in self.errors)
+
+    @property
+    def excess(self) -> float:
+        """The largest amount by which states and path constraints leave their limits between nodes, in their scales."""
+        return max((float(phase.excess.max()) for phase in self.errors), default=0.0)
+
+    @property
+    def leaving(self) -> float:
+        """The same for controls."""
+        return max((float(phase.leaving.max()) for phase in self.errors), default=0.0)
+
+    @property
+    def unstable(self) -> bool:
+        """Whether no simulation of the whole can follow the trajectory, so that each element is assessed by itself."""
+        return self.growth * ATTAINABLE > self.wanted.tolerance
+
+    @property
+    def off(self) -> float:
+        """The largest error of an objective that the simulation shows, in its unit."""
+        return self.missed_by_elements if self.unstable else self.missed
+
+    @property
+    def error(self) -> float:
+        """The largest of all errors, in units of what they may be; controls that leave their bounds count like constraints."""
+        wanted = self.wanted
+        defect, violation = (self.local, 0.0) if self.unstable else (self.defect, self.simulation.violation)
+        limits = max(self.excess, violation, self.leaving) / wanted.feasible
+        return max(defect / wanted.tolerance, limits, self.off / wanted.settled)
+
+    @property
+    def remark(self) -> str:
+        """What is to be said of a trajectory that no simulation can follow; else empty."""
+        if not self.unstable:
+            return ""
+        return f"unstable: open-loop simulation cannot follow (errors grow by {self.growth:.0e}); each element is right to {self.local:.0e}"
+
+    def complaints(self) -> list[str]:
+        """Messages about what is not good enough; empty if all is."""
+        found, wanted = [], self.wanted
+        if self.unstable:
+            if not self.local <= wanted.tolerance:
+                found.append(f"simulated by itself, an element ends {self.local:.1e} away")
+        elif not self.defect <= wanted.tolerance:
+            found.append(f"simulated, it ends {self.defect:.1e} of what its states do away")
+        if self.leaving > wanted.leaving:
+            found.append(f"a control leaves its bounds by {self.leaving:.1e} between nodes")
+        if not self.excess <= wanted.feasible:
+            found.append(f"a state or path constraint leaves its limits by {self.excess:.1e} between nodes")
+        violations = self.by_elements.violations if self.unstable else self.simulation.violations
+        if not found and violations and not max(violations.values()) <= wanted.feasible:
+            worst = max(violations, key=lambda key: violations[key])
+            found.append(f"simulated, it violates '{worst}' by {violations[worst]:.1e}")
+        if not found and not self.off <= wanted.settled:
+            found.append(f"when simulated, its objectives differ by {self.off:.1e} of the front's range")
+        return found
+
+    def scores(self) -> list[ElementScores]:
+        """For each phase the errors of its elements, in units of what they may be."""
+        wanted = self.wanted
+        total = sum(float(phase.defect.sum()) for phase in self.errors)
+        # What an error at one element becomes at the end of the trajectory, at least.
+        finite = 0.0 < total < np.inf and np.isfinite(self.defect) and not self.unstable
+        grown = max(1.0, self.defect / total) if finite else 1.0
+        count = sum(len(phase.defect) for phase in self.errors)
+        found = []
+        for phase in self.errors:
+            states = np.maximum(grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible)
+            controls = phase.weight * phase.tail**2 * count / wanted.settled
+            sums = np.zeros(len(states))
+            if not self.missed_by_elements <= SAFETY * wanted.settled:
+                sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
+            found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))
+        return found
+
+    def worst_place(self, method: Meshed, trajectory: Trajectory) -> str:
+        """The place of the largest error, in words."""
+        scores = [score.all for score in self.scores()]
+        names = list(trajectory)
+        i = int(np.argmax([score.max() for score in scores]))
+        j = int(np.argmax(scores[i]))
+        phase, steep = trajectory[names[i]], self.errors[i].steep[j]
+        time = phase.state.times(np.nan_to_num([steep]))[j, 0]
+        why = "" if np.isnan(steep) else ", where a control switches or is steep"
+        return f"the mesh is coarsest for phase '{names[i]}' near {time:.6g} {phase.time_unit}{why}"
+
+
+@dataclass(frozen=True, eq=False)
+class ElementScores:
+    """Errors (N,) of the elements of a phase in units of what they may be: of states and limits; of controls that polynomials of their
+    degree describe poorly; of integrals and peaks."""
+
+    states: np.ndarray
+    controls: np.ndarray
+    sums: np.ndarray
+
+    @property
+    def others(self) -> np.ndarray:
+        """All but those of controls."""
+        return np.maximum(self.states, self.sums)
+
+    @property
+    def all(self) -> np.ndarray:
+        """The largest of all."""
+        return np.maximum(self.others, self.controls)
+
+
+def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray) -> Verdict:
+    """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    trajectory : Trajectory
+    wanted : Wanted
+    F, units : arrays (m,)
+        Its objectives on the mesh, all minimised, and what counts as one in each.
+    """
+    rtol = float(np.clip(1e-3 * wanted.tolerance, 1e-13, 1e-8))
+    scales = {name: state_scales(phase) for name, phase in trajectory.items()}
+    # The integrator's absolute tolerance is stated in spans.
+    spans = {name: np.array([v.span for v in phase.state_variables]) for name, phase in trajectory.items()}
+    narrow = min(float((scales[name] / spans[name]).min(initial=1.0)) for name in scales)
+    atol = max(0.1 * rtol * narrow, 1e-20)
+    whole = simulate(problem, trajectory, rtol=rtol, atol=atol)
+    parts = simulate_elements(problem, trajectory, rtol=rtol, atol=atol)
+    errors = phase_errors(problem, trajectory, parts)
+    away = [
+        float((np.abs(whole.trajectory[name].edge_states - phase.edge_states) / scales[name]).max()) for name, phase in trajectory.items()
+    ]
+    defect = float(np.max(away)) if np.isfinite(away).all() else np.inf
+    total = sum(float(phase.defect.sum()) for phase in errors)
+    grows = defect > wanted.tolerance and total < HARDLY * defect
+    return Verdict(
+        simulation=whole,
+        by_elements=parts,
+        errors=errors,
+        wanted=wanted,
+        defect=defect,
+        missed=_missed(problem, whole, F, units),
+        missed_by_elements=_missed(problem, parts, F, units),
+        growth=growth(problem, trajectory) if grows else 1.0,
+        narrow=narrow,
+    )
+
+
+def _missed(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, units: np.ndarray) -> float:
+    difference = np.abs(simulated_objectives(problem, simulation) - F)
+    return float(np.where(np.isfinite(difference), difference / units, np.inf).max())
+
+
+def simulated_objectives(problem: CompiledProblem, simulation: Simulation) -> np.ndarray:
+    """The objectives (m,) of a simulation, all minimised."""
+    return np.array([simulation.objectives[goal.name] for goal in problem.goals]) * problem.signs
