@@ -54,17 +54,20 @@ class Front(Points):
     ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
-        Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, and by the
-        simulated objectives. Elements are split where the solution is not smooth; elsewhere they get a higher order. Controls that leave
-        their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a point is solved
-        from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along the front; the
-        best point of each objective remains the best.
+        Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, by the simulated
+        objectives, and by their change from mesh to mesh. Elements are split where the solution is not smooth; elsewhere states and controls
+        get a higher order; elements that are not needed become one. Where controls switch, elements end, and these ends move. Controls that
+        leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a point is
+        solved from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along the front;
+        an end of the front is solved as such, and where ends move far, the points between them keep their places between these.
 
         Parameters
         ----------
         tolerance : float
-            Largest defect of a state, in spans of its bounds. In ranges of the front, the objectives may change by ten times this from mesh
-            to mesh, and when simulated. Controls may not leave their bounds at all; states and path constraints by the front's tolerance.
+            Largest defect of a state, in units of what it does on the trajectory. In ranges of the front, the objectives may change by ten
+            times this from mesh to mesh, and when simulated. Controls may not leave their bounds at all; states and path constraints by the
+            front's tolerance. Where dynamics are so unstable that no simulation can follow, each element is simulated by itself, and
+            `Point.note` says so.
         limit : int
             Largest number of meshes for each point.
         time_limit : float, optional
@@ -75,7 +78,8 @@ class Front(Points):
         Returns
         -------
         Front
-            The same number of points, simulated if those of the front were. `Point.note` says why a point does not meet the tolerance;
+            The same number of points, simulated if those of the front were. `Point.note` says why a point does not meet the tolerance, or
+            that it is worse than what its simulation on an earlier mesh achieved;
             `message` says how many do. Costs are added to those of the front. After Ctrl-C, points are on the meshes reached by then.
 
         Raises

@@ -20,7 +20,6 @@ from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription.base import Meshed, Transcription, check_freedom, check_problem
 from transcription.meshes.verdict import Wanted
-from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped
@@ -256,10 +255,10 @@ class _Job:
                     found, costs_so_far = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
                     self.solves.counts = costs_so_far
                     self.begin(found)
+                front = work()
             except Stopped as reason:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
-            front = work()
             self._stopped = interrupts.reason
             front = front.replace(stats=front.stats | self._stats()).verify(verify)
             return front if self.fixed or verify is None else Front.of(again(front))
@@ -283,7 +282,12 @@ class _Job:
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
             self._stopped = interrupts.reason
             points = vectors_points(
-                found.nlp, found.z[None], self._about, self._stats(), notes=[found.note], optimality=[optimality(found.nlp, found.z)]
+                found.nlp,
+                found.z[None],
+                self._about,
+                self._stats(),
+                notes=[found.note],
+                optimality=certificates(found.nlp, found.z[None], None),
             )
             return Front.of(points).verify(verify)
 

@@ -30,8 +30,10 @@ OPTIMAL = 1e-6
 """A point with at most this optimality is not solved again on its first mesh."""
 LEAST_TOLERANCE = 1e-10
 """Smallest tolerance that double precision and the integrator can resolve."""
-SAME_END = 1e-6
-"""A point is an end of the whole front if on its own mesh its best objective cannot get better by more than this, in units."""
+STATIONARY = 1e-4
+"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, is an end of the front."""
+NEARBY = 0.5
+"""Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""
 MOVED = 0.05
 """Where the ends of a front move by more than this part of its range on finer meshes, the points between them move along."""
 NOT_BEGUN = "it was not solved on a finer mesh"
@@ -78,16 +80,24 @@ class FrontRefinement:
         The points to be refined; default: all that converged.
     most_work : float, optional
         Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
+    knots : bool
+        See `MeshLoop`.
     """
 
     def __init__(
-        self, front: Points, wanted: Wanted, limit: int, chosen: Sequence[int] | None = None, most_work: float | None = None
+        self,
+        front: Points,
+        wanted: Wanted,
+        limit: int,
+        chosen: Sequence[int] | None = None,
+        most_work: float | None = None,
+        knots: bool = True,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work)
+        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
@@ -148,13 +158,24 @@ class FrontRefinement:
             i = int(self.good[row])
             if i not in self.methods or i in ends or stopping():
                 continue
-            mine = np.arange(len(self.units)) == objective
-            nlp = self.loop.programs(self.methods[i])
-            solved = self.solves(nlp, self.front[i].decision, np.where(mine, 0.0, np.inf), self.units)
-            better = (self.front.F[i] - solved.F)[objective] / self.units[objective]
-            if len(self.units) == 1 or solved.status != CONVERGED or better <= SAME_END:
+            if len(self.units) == 1 or self._is_end(i, np.arange(len(self.units)) == objective):
                 ends[i] = End(objective, self.units)
         return ends
+
+    def _is_end(self, i: int, mine: np.ndarray) -> bool:
+        """Whether the best point in the objective that is marked (m,) is an optimum of that alone. Another local optimum may be better."""
+        nlp, point = self.loop.programs(self.methods[i]), self.front[i]
+        if self._known(i):
+            return optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY
+        solved = self.solves(nlp, point.decision, np.where(mine, 0.0, np.inf), self.units)
+        others = np.array([self._distance(i, j) for j in self.good.tolist() if j != i])
+        moved = float(np.linalg.norm((solved.F - point.F) / self.units))
+        return solved.status != CONVERGED or moved <= NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+
+    def _known(self, i: int) -> bool:
+        """Whether a point is known to be optimal on its own mesh."""
+        certified = self.front[i].optimality
+        return certified is not None and certified <= OPTIMAL
 
     def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
         """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at
@@ -174,7 +195,7 @@ class FrontRefinement:
     def _refine(self, i: int, task: Task) -> None:
         """Refine one point, and make its row of the new front."""
         point = self.front[i]
-        known = point.optimality is not None and point.optimality <= OPTIMAL
+        known = self._known(i)
         trajectory = self._trajectory(i)
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]

@@ -31,7 +31,10 @@ from problems import Problem, load
 from runs.cli import main
 from transcription import DFET
 from transcription.inner import Newton
-from transcription.nlp.scaling import ipopt_options
+from transcription.nlp import pieces
+from transcription.nlp.program import hessian
+from transcription.nlp.scalarized import scalarize
+from transcription.nlp.scaling import gradients, ipopt_options
 from transcription.nlp.watched import Watched
 from transcription.numerics import compiling
 from transcription.numerics.batched import Batched
@@ -115,6 +118,37 @@ def test_a_search_that_is_cut_within_solves_goes_on_to_the_same_bits(tmp_path):
         cuts += 1
     assert cuts, "the whole takes longer than the limit"
     assert part.F.tobytes() == whole.F.tobytes() and part.decision.tobytes() == whole.decision.tobytes()
+
+
+# Derivatives
+
+
+def test_derivatives_in_pieces_are_those_of_the_whole(monkeypatch):
+    nlp, rng = DFET(3, 3).transcribe(load("orbit_rise")), np.random.default_rng(0)
+    z, lam, mu = nlp.lower + rng.random(len(nlp.lower)) * nlp.span, rng.random(2), rng.random(len(nlp.g_scale))
+    whole = [np.array(ca.DM(one)) for one in (gradients(nlp)(z)[1], hessian(nlp)(z, lam, mu))]
+    monkeypatch.setattr(pieces, "PIECE", 7)
+    again = DFET(3, 3).transcribe(load("orbit_rise"))
+    for one, other in zip(whole, (gradients(again)(z)[1], hessian(again)(z, lam, mu)), strict=True):
+        assert np.abs(np.array(ca.DM(other)) - one).max() <= 1e-12 * np.abs(one).max()
+
+
+@pytest.mark.parametrize("built", range(1, 12, 2))
+def test_they_are_not_built_to_the_end(built, monkeypatch):
+    monkeypatch.setattr(pieces, "PIECE", 7)
+    nlp = DFET(3, 3).transcribe(load("orbit_rise"))
+    questions = iter(range(10**6))
+    with stopped_by(lambda: next(questions) >= built):
+        solved = scalarize(nlp, nlp.first_guess(nlp.lower[nlp.free][None])[0], reference=np.zeros(2), weights=np.ones(2))
+    assert solved.status == "timeout" and solved.clocked and not solved.begun
+
+
+def test_a_time_limit_ends_them_on_a_fine_mesh():
+    nlp = DFET(100, 5).transcribe(load("orbit_rise"))
+    start = nlp.first_guess(nlp.lower[nlp.free][None])[0]
+    with Interrupts(LIMIT), within(BOUND):
+        solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
+    assert solved.status == "timeout" and solved.clocked
 
 
 # Newton loops

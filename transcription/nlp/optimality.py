@@ -43,7 +43,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         Feasible.
     F_scales : array (m,), optional
         What counts as one in each objective, the front's range for instance; by default, and for entries
-        that are not positive, `nlp_scales`.
+        that are not positive, `nlp_scales`. An objective with an infinite one is left out.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     natural = nlp_scales(nlp)
     scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
     unit = _units(nlp)
-    dF = dF * unit / scales[:, None]
+    dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
     dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
     sides, slack = _inequalities(nlp, z, g, dg)
     try:

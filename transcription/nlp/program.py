@@ -10,6 +10,7 @@ from problems.peaks import refuse_peaks
 
 from ..base import NLP
 from ..stopping import check_stopping
+from .pieces import weighted_hessian
 from .scaling import gradients, ipopt_options, origin, symbol
 from .watched import Watched
 
@@ -63,8 +64,8 @@ def hessian(nlp: NLP) -> ca.Function:
     z = symbol(nlp, "z", len(nlp.variables))
     F, g = nlp.functions(z)
     of_F, of_g = symbol(nlp, "of_F", F.numel()), symbol(nlp, "of_g", g.numel())
-    lagrangian = ca.dot(of_F, F) + ca.dot(of_g, g)
-    return ca.Function("hessian", [z, of_F, of_g], [ca.triu(ca.hessian(lagrangian, z)[0])], ["z", "of_F", "of_g"], ["H"])
+    H = weighted_hessian(g, of_g, z, ca.dot(of_F, F))
+    return ca.Function("hessian", [z, of_F, of_g], [H], ["z", "of_F", "of_g"], ["H"])
 
 
 def _scaled(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:

@@ -23,6 +23,9 @@ ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
 PEAK_LIMIT = 3.0
 """Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those that are not minimised."""
+SLACK = 1e-2
+"""Part of the tolerance by which bounds of states, and rows that are no equalities, give way: where a trajectory begins or ends on one, or
+runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge."""
 AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
 AT_LIMIT = "maximum iterations exceeded"
@@ -192,7 +195,10 @@ def scalarize(
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return _not_begun(nlp, start)
-    task = _task(nlp, start, reference, weights, ceiling, margin)
+    try:
+        task = _task(nlp, start, reference, weights, ceiling, margin)
+    except Stopped:  # while derivatives were built
+        return _not_begun(nlp, start)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
@@ -274,15 +280,19 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     except Stopped:
         return _not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
+    slack = min(1e-8, SLACK * tolerance)
+    states = np.where(made_up, 0.0, slack * nlp.scale)
+    states[:, nlp.free] = 0.0
+    ways = np.where(nlp.g_lower < nlp.g_upper, slack, 0.0)
     none, zero = np.full(2 * len(task.used), -np.inf), origin(nlp)
     to_rows = nlp.g_scale / rows
     answer = run(
         x0=np.append((np.clip(start, lower, upper) - zero) / columns, 0.0),
         p=program_parameters(task.shift, 1.0 / task.scale, task.slope, columns, rows),
-        lbx=np.append((lower - zero) / columns, -np.inf),
-        ubx=np.append((upper - zero) / columns, 0.0 if strategy.held else np.inf),
-        lbg=np.concatenate([task.lower * to_rows, none]),
-        ubg=np.concatenate([task.upper * to_rows, np.where(task.used, 0.0, np.inf), task.top]),
+        lbx=np.append((lower - states[0] - zero) / columns, -np.inf),
+        ubx=np.append((upper + states[1] - zero) / columns, 0.0 if strategy.held else np.inf),
+        lbg=np.concatenate([(task.lower - ways) * to_rows, none]),
+        ubg=np.concatenate([(task.upper + ways) * to_rows, np.where(task.used, 0.0, np.inf), task.top]),
     )
     stats = run.stats()
     outcome = stats["return_status"]

@@ -10,6 +10,7 @@ import numpy as np
 from problems.derived import remembered
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
+from .pieces import jacobian
 
 STATUS_OF_IPOPT = {
     "Infeasible_Problem_Detected": INFEASIBLE,
@@ -84,9 +85,9 @@ def _jacobian(rows: Any, z: Any) -> Any:
     counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
     dense = np.flatnonzero(counts > DENSE * max(z.numel(), 1))
     if not len(dense) or len(dense) == len(counts):
-        return ca.jacobian(rows, z)
+        return jacobian(rows, z)
     sparse = np.setdiff1d(np.arange(len(counts)), dense)
-    blocks = ca.vertcat(*(ca.jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
+    blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
     return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
 
 

@@ -49,7 +49,7 @@ def test_points_get_near_the_truth_and_are_confirmed_by_simulation(coarse, fine)
     truth = reference(20001)
     before, after = distance_to_curve(coarse.objectives, truth), distance_to_curve(fine.objectives, truth)
     assert before[0] > 1e-4, "on the first mesh the shortest flight is shorter than simulation confirms"
-    assert after.max() < 2e-5 and after[1:].max() < 2e-8
+    assert after.max() < 1e-6 and after[1:].max() < 2e-8
     assert fine.status.tolist() == ["converged"] * 5 and fine.violation.max() < 1e-8
     for point in fine[1:]:
         assert point.simulate(rtol=1e-12, atol=1e-13).max_defect < 1e-7
@@ -65,11 +65,12 @@ def test_controls_stay_within_bounds_everywhere(coarse, fine):
     assert all(most(point) <= np.pi / 2 for point in fine)
 
 
-def test_the_note_of_an_unrefined_point_has_the_reason(fine):
-    assert fine.message == "4 of 5 points meet the mesh tolerance of 1e-07."
+def test_the_note_of_an_unrefined_point_has_the_reason(coarse):
+    fine = coarse[:1].refine_mesh(limit=2)
+    assert fine.message == "0 of 1 points meet the mesh tolerance of 1e-07."
     assert "objectives still change" in fine[0].note and "phase 'ascent' near" in fine[0].note
     table = fine.table()
-    assert "Point 0: " in table and fine.message in table and "elements" in table and "meshes" in table.splitlines()[0]
+    assert "Point 0: " in table and fine.message in table and "elements" in table
 
 
 def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
@@ -79,7 +80,7 @@ def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
     assert coarse.stats["gradient_solves"] == 0 and fine.stats["wall_time"] > 0
     # Each solve takes at least one iteration.
     assert fine.stats["inner_iterations"] >= coarse.stats["inner_iterations"] + fine.stats["gradient_solves"]
-    assert len(fine[0].decision) > len(fine[3].decision) and fine[0].transcription["settings"]["basis"] == "bernstein"
+    assert len({len(point.decision) for point in fine}) > 1 and fine[0].transcription["settings"]["basis"] == "bernstein"
 
 
 def test_meshes_go_through_files_and_are_verified(tmp_path, fine):

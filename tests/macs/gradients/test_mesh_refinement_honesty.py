@@ -103,8 +103,9 @@ def keeps_what_came_in(seed: int) -> None:
     fine = coarse.refine_mesh(tolerance=1e-5)
     assert len(fine) == len(coarse) > 0
     span = np.maximum(np.ptp(fine.F, axis=0), 1e-4)
-    simulated = np.array([[*point.simulate(rtol=1e-10, atol=1e-11).objectives.values()] for point in coarse])
-    assert (fine.F.min(axis=0) <= simulated.min(axis=0) + 2e-4 * span).all(), "the best of each objective, flown"
+    flown = [point.simulate(rtol=1e-10, atol=1e-11) for point in coarse]
+    simulated = np.array([[*one.objectives.values()] for one in flown if one.violation <= 1e-4]).reshape(-1, 2)
+    assert (fine.F.min(axis=0) <= simulated.min(axis=0, initial=np.inf) + 2e-4 * span).all(), "the best of each objective, flown"
     gaps = np.linalg.norm(np.diff(fine.F / span, axis=0), axis=1)
     before = np.linalg.norm(np.diff(coarse.F / np.maximum(np.ptp(coarse.F, axis=0), 1e-4), axis=0), axis=1)
     assert gaps.max(initial=0.0) <= max(1.5 * before.max(initial=0.0), 0.8), "no hole"

@@ -1,6 +1,6 @@
 """Alp rider: a stiff linear system above four peaks.
 
-Betts 2010, section 4.? ("alpr01"): the state has to stay outside a sphere whose radius rises to four narrow peaks.
+Betts 2010, chapter 4: the state has to stay outside a sphere whose radius rises to four narrow peaks.
 """
 
 from __future__ import annotations

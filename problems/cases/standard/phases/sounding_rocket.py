@@ -1,6 +1,6 @@
 """Sounding rocket: Goddard's rocket in three phases, full thrust, a singular arc and none, each with what is known of it.
 
-Bryson and Ho, "Applied Optimal Control", 1975, section 8.3 and problems; Betts 2010, section 4.14; with the data of YAPSS, in feet and
+Bryson and Ho, "Applied Optimal Control", 1975, section 8.3 and problems; Betts 2010, chapter 4; with the data of YAPSS, in feet and
 slugs.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ....phase import Phase
 from ....problem import Problem
 from ..published import Published
 
@@ -23,7 +24,7 @@ def problem(constrained: bool = False) -> Problem:
     """On the singular arc weight and drag stand in a known ratio, which may be stated as a constraint, or left to be found."""
     problem = Problem("sounding_rocket")
     times = {"full": (0.0, (1.0, 45.0)), "singular": ((1.0, 45.0), (2.0, 60.0)), "coast": ((2.0, 60.0), (5.0, 100.0))}
-    phases = []
+    phases: list[Phase] = []
     for i, (name, (t0, tf)) in enumerate(times.items()):
         phase = problem.phase(name, t0=t0, tf=tf)
         first, last = i == 0, i == 2

@@ -15,7 +15,7 @@ MASS, GRAVITY, AREA, DENSITY = 100.0, 9.80665, 14.0, 1.13
 DRAG, INDUCED = 0.034, 0.069662
 UPDRAFT, RADIUS = 2.5, 100.0
 SPEED, SINK = 13.2275675, -1.28750052
-PUBLISHED = (Published("range", 1248.031, 5e-4, "Betts 2010, section 6.5: 1248.031", scale=1248.031),)
+PUBLISHED = (Published("range", 1248.031, 5e-4, "Betts 2010, section 6.5: 1248.031"),)
 
 
 def problem() -> Problem:

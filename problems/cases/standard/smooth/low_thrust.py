@@ -7,6 +7,7 @@ Betts 2010, section 6.3. Equinoctial elements, in feet and seconds; zonal harmon
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -50,7 +51,7 @@ def problem() -> Problem:
     return problem
 
 
-def _rates(x: list, u: list, factor: object) -> list:
+def _rates(x: list[Any], u: list[Any], factor: Any) -> list[Any]:
     """Rates of the elements and the weight; thrust is radial, tangential and normal."""
     p, f, g, h, k, longitude, w = x
     sin, cos = ca.sin(longitude), ca.cos(longitude)
@@ -78,7 +79,7 @@ def _rates(x: list, u: list, factor: object) -> list:
     ]
 
 
-def _along(x: list) -> list:
+def _along(x: list[Any]) -> list[Any]:
     """The direction of the velocity: radial, tangential and normal."""
     _, f, g, _, _, longitude, _ = x
     radial, tangential = f * ca.sin(longitude) - g * ca.cos(longitude), 1 + f * ca.cos(longitude) + g * ca.sin(longitude)
