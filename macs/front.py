@@ -166,8 +166,10 @@ class Front(Points):
     def mended(self, *, time_limit: float | None = None, progress: bool | None = None) -> Front:
         """The front with those points solved again that a simulation did not confirm.
 
-        Each is solved where it misses: on finer meshes of its own. The others stay as they are. Points that are verified are compared by
-        their simulated objectives; what is still not verified stays only if no verified point is as good.
+        Each is solved where it misses: on finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This
+        takes at most three tenths of what the front cost, in iterations times variables, or sixty iterations for each point. The others
+        stay as they are. Points that are verified are compared by their simulated objectives; what is still not verified stays only if no
+        verified point is as good.
 
         Parameters
         ----------

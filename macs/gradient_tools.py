@@ -20,13 +20,13 @@ from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription.base import Meshed, Transcription, check_freedom, check_problem
 from transcription.meshes.verdict import Wanted
-from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
+from transcription.stopping import Stopped
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import nearest_violation, vectors_points
+from .fronts.builders import certificates, nearest_violation, no_points, vectors_points
 from .fronts.points import Point, Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
@@ -85,7 +85,7 @@ def optimize(
     max_iterations : int
         Most iterations of IPOPT in one strategy of a solve.
     time_limit : float, optional
-        Seconds after which the work ends with its results so far.
+        Seconds after which the work ends with its results so far, as it does after Ctrl-C.
     progress : bool, optional
         Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
@@ -250,13 +250,17 @@ class _Job:
         verify = self._terms.verify
         with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
-            if not self.fixed:
-                found, costs_so_far = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
-                self.solves.counts = costs_so_far
-                self.begin(found)
-            front = work()
+            try:
+                if not self.fixed:
+                    found, costs_so_far = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
+                    self.solves.counts = costs_so_far
+                    self.begin(found)
+                front = work()
+            except Stopped as reason:
+                self._stopped = str(reason)
+                return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             self._stopped = interrupts.reason
-            front = front.replace(stats=self._stats()).verify(verify)
+            front = front.replace(stats=front.stats | self._stats()).verify(verify)
             return front if self.fixed or verify is None else Front.of(again(front))
 
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
@@ -271,10 +275,19 @@ class _Job:
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             loop = MeshLoop(Programs(self.problem), self.solves, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
-            found = found_optimum(loop, reference, weights, partial(beginning, terms.start), int(terms.starts), self._rng, coarse)
+            try:
+                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), int(terms.starts), self._rng, coarse)
+            except Stopped as reason:
+                words = f"{self._about['name']}: {reason} before the first solve"
+                raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
             self._stopped = interrupts.reason
             points = vectors_points(
-                found.nlp, found.z[None], self._about, self._stats(), notes=[found.note], optimality=[optimality(found.nlp, found.z)]
+                found.nlp,
+                found.z[None],
+                self._about,
+                self._stats(),
+                notes=[found.note],
+                optimality=certificates(found.nlp, found.z[None], None),
             )
             return Front.of(points).verify(verify)
 
@@ -350,9 +363,9 @@ class _Job:
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
         """The results as a front, with their optimality; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
-        certificates = [optimality(self.nlp, z, ranges) for z in Z]
+        optimal = certificates(self.nlp, Z, ranges)
         status = [solved.status for solved in found]
-        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, optimality=certificates, **more))
+        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, optimality=optimal, **more))
 
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts

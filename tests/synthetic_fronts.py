@@ -111,6 +111,18 @@ def black_box(n: int = 6, m: int = 2, seed: int = 0, **changes) -> Front:
     return Front(**{**columns, **changes})
 
 
+def marked(front: Front, verified: list[bool], seen: list[bool] | None = None) -> Front:
+    """The front as if it had been simulated, all of it or the points `seen`, with objectives that are off by a hundredth."""
+    saw = np.ones(len(front), dtype=bool) if seen is None else np.array(seen)
+    return front.replace(
+        defect=np.where(saw, 1e-5, np.nan),
+        simulated_violation=np.where(saw, 1e-6, np.nan),
+        simulated_F=np.where(saw[:, None], 1.01 * front.F, np.nan),
+        verified=np.array(verified),
+        stats={**front.stats, "verify": 1e-3},
+    )
+
+
 def empty(**changes) -> Front:
     """A search that found nothing feasible."""
     least = flights(1, violation=[0.25], status=["infeasible"])

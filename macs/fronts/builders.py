@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
 from transcription.nlp.optimality import optimality
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.limits import excursions
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
@@ -51,9 +52,14 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
     )
 
 
-def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray) -> list[float | None]:
-    """Optimality of vectors (k, n), for objectives in `ranges` (m,); None for those left when the work is asked to end early."""
-    return [None if stopping() else optimality(nlp, z, ranges) for z in Z]
+def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> list[float | None]:
+    """Optimality of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left when the work is to end."""
+    found: list[float | None] = [None] * len(Z)
+    with suppress(Stopped):
+        for k, z in enumerate(Z):
+            check_stopping()
+            found[k] = optimality(nlp, z, ranges)
+    return found
 
 
 def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:

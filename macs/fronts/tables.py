@@ -143,9 +143,11 @@ def _footer(front: Points) -> list[str]:
 def _simulated(front: Points) -> list[str]:
     """How many points are verified."""
     count, verify = int(front.verified.sum()), front.stats["verify"]
-    points = "The point is" if len(front) == 1 else f"All {len(front)} points are" if count else ""
+    points = "The point is" if len(front) == 1 else f"All {len(front)} points are"
     if count == len(front):
         return [f"{points} verified: simulated by an independent integrator, nothing differs by more than {verify:g}."]
+    if not count:
+        return ["The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified."]
     return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified."]
 
 

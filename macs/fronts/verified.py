@@ -10,6 +10,7 @@ import numpy as np
 from problems.checks import check_positive
 from problems.compiled import CompiledProblem
 from problems.sanity import objective_spreads
+from transcription.stopping import Stopped
 from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
@@ -43,7 +44,8 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
     ----------
     points : Points
     tolerance : float or None
-        None: the points are returned as they are. So are those of a black box.
+        None: the points are returned as they are. So are those of a black box, and those whose simulation is not over soon after the work
+        was asked to end early (`transcription.stopping`).
 
     Raises
     ------
@@ -56,7 +58,10 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
     rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
     problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
     rtol, atol = accuracy(tolerance)
-    simulations = simulate_all(problem, planned, rtol=rtol, atol=atol)
+    try:
+        simulations = simulate_all(problem, planned, rtol=rtol, atol=atol)
+    except Stopped:
+        return points
     scales = objective_scales(points)
     n, m = points.F.shape
     defect, violation, F, agrees = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan), np.zeros(n, dtype=bool)

@@ -28,10 +28,10 @@ PART = 10.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
 MESHES = 3
 """Most meshes of one end."""
-MOST = 24
+MOST = 40
 """Most elements of a phase: a search evaluates its mesh thousands of times."""
 NEAR = 0.25
-"""Edges of several meshes are one if they are nearer than this part of an element."""
+"""An edge is left out if the element is then longer than the shortest there by at most this part."""
 
 
 def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
@@ -68,20 +68,21 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
-    Z = np.array([one.z for one in solved if one.status == CONVERGED]).reshape(-1, len(nlp.variables))
+    own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
+    Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
     job.go()
     counts = solver.counts.joined(job.solves.counts)
     fine = [found.best.method for found in job.found.values()]
-    return (_common(fine, problem) if fine and not _enough(ends, job, limits) else COARSE), counts
+    return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
 
 
-def _enough(ends: Points, job: FrontRefinement, limits: float) -> bool:
-    """Whether a simulation confirms the ends on the coarse mesh, and finer ones changed nothing."""
-    moved = [np.abs(found.best.F - ends.F[i]) / job.units for i, found in job.found.items()]
-    return bool(verified(ends, limits).verified.all()) and (not moved or float(np.max(moved)) <= limits)
+def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:
+    """Whether a simulation confirms the ends on the coarse mesh, and finer ones changed nothing in the objectives that are their own."""
+    moved = [abs(found.best.F[own[i]] - ends.F[i, own[i]]) / job.units[own[i]] for i, found in job.found.items()]
+    return bool(verified(ends, limits).verified.all()) and max(moved, default=0.0) <= limits
 
 
 def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Transcription:
@@ -92,18 +93,23 @@ def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Transcriptio
 
 
 def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
-    """A mesh with the edges of several, of which those are left out that are much nearer to others than elements are long there."""
-    finest = max(meshes, key=lambda mesh: mesh.elements)
-    edges = list(finest.edges)
-    for mesh in meshes:
-        lengths = np.diff(mesh.edges)
-        for j, edge in enumerate(mesh.edges[1:-1], 1):
-            if np.abs(np.array(edges) - edge).min() > NEAR * min(lengths[j - 1], lengths[j]):
-                edges.append(edge)
-    edges = sorted(edges)
-    while len(edges) - 1 > MOST:
-        # Without the edge whose two elements are the shortest together.
-        del edges[1 + int(np.argmin(np.array(edges[2:]) - np.array(edges[:-2])))]
+    """A mesh with the edges of several, without those that divide what no single mesh divides as finely."""
+    edges = sorted({edge for mesh in meshes for edge in mesh.edges})
+    while len(edges) > 2:
+        joined = np.array(edges[2:]) - np.array(edges[:-2])
+        # How long the element without an edge would be, in those that the meshes have there.
+        excess = joined / np.array([min(_length_at(mesh, edge) for mesh in meshes) for edge in edges[1:-1]])
+        k = int(np.argmin(excess))
+        if excess[k] > 1.0 + NEAR and len(edges) - 1 <= MOST:
+            break
+        del edges[k + 1]
     orders = [mesh.control_order for mesh in meshes]
     controls = None if None in orders else max(order for order in orders if order is not None)
     return PhaseMesh(tuple(edges), max(mesh.order for mesh in meshes), controls)
+
+
+def _length_at(mesh: PhaseMesh, place: float) -> float:
+    """The length of the shortest element of a mesh that has a place in it or at its end."""
+    edges = np.array(mesh.edges)
+    touching = (edges[:-1] <= place) & (place <= edges[1:])
+    return float(np.diff(edges)[touching].min())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from transcription import DFET
 from transcription.base import NLP, Meshed
 from transcription.nlp.scalarized import Solved
+from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
 from .mesh_loop import MeshLoop, Refinement
@@ -85,19 +87,29 @@ def found_optimum(
         Of the random starts.
     coarse : sequence of Meshed
         The meshes to begin on. The next one is tried only where the one before leads to no good point.
+
+    Raises
+    ------
+    Stopped
+        If the work is to end before there is any result.
     """
     found: list[Found] = []
     for method in coarse:
-        nlp = loop.programs(method)
+        try:
+            nlp = loop.programs(method)
+        except Stopped:
+            if not found:
+                raise
+            break
         solver = MultistartSolver(nlp, given(nlp), starts, rng, loop.solves)
         solved = solver.solve(reference, weights)
+        found.append(Found(nlp, solved, None))
         if solved.status == CONVERGED:
             units = loop.units(solved.F[None], nlp, solved.z)
-            begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
-            refinement = loop.refine(begun, Along(reference, weights, units))
-            found.append(Found(loop.programs(refinement.best.method), solved, refinement))
-        else:
-            found.append(Found(nlp, solved, None))
+            with suppress(Stopped):
+                begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
+                refinement = loop.refine(begun, Along(reference, weights, units))
+                found[-1] = Found(loop.programs(refinement.best.method), solved, refinement)
         if found[-1].good or loop.ended:
             break
     return min(found, key=_rank)

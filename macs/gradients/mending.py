@@ -1,24 +1,35 @@
-"""Points that a simulation does not confirm, solved again on finer meshes."""
+"""Points that a simulation does not confirm, solved again: on finer meshes, or inside of the limits that they exceed."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from transcription import from_dict
 from transcription.base import Meshed
+from transcription.inner import Propagate
 from transcription.meshes.verdict import Wanted
 
+from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED
+from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
-from ..fronts.verified import verified
+from ..fronts.provenance import more_costs
+from ..fronts.verified import objective_scales, verified
 from ..io.console import working
+from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
 
 PART = 0.1
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
+EVALUATION, SOLVE = 0.15, 20.0
+"""What an evaluation and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
+SHARE, LEAST = 0.3, 60.0
+"""What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 
 def mended(points: Points, time_limit: float | None, progress: bool | None) -> Points:
@@ -28,16 +39,48 @@ def mended(points: Points, time_limit: float | None, progress: bool | None) -> P
 
 
 def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None) -> Points:
-    """The points in their order, of which those that are not verified have been solved again on finer meshes."""
+    """The points in their order, of which those that are not verified have been solved again."""
     points.compiled()
-    missing = points.was_simulated & ~points.verified & (points.status == CONVERGED)
-    rows = [i for i in np.flatnonzero(missing).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
-    if not rows:
+    missing = np.flatnonzero(points.was_simulated & ~points.verified & (points.status == CONVERGED)).tolist()
+    if not missing:
         return points
+    meshed = [i for i in missing if isinstance(from_dict(points[i].transcription or {}), Meshed)]
     verify = points.stats["verify"]
-    wanted = Wanted(PART * verify, feasible=PART * verify, leaving=PART * verify, objectives=PART * verify)
     with working(time_limit, progress) as (show, interrupts):
-        job = FrontRefinement(points, wanted, MESHES, rows)
-        job.go(show)
-        elapsed, stopped = interrupts.elapsed, interrupts.reason
-    return verified(job.points(elapsed, stopped), verify).replace(message=points.message)
+        again = points
+        if meshed:
+            wanted = Wanted(PART * verify, feasible=PART * verify, leaving=PART * verify, objectives=PART * verify)
+            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed))
+            job.go(show)
+            again = job.points(0.0, interrupts.reason)
+        others = [i for i in missing if i not in meshed and points.simulated_violation[i] > verify]
+        if others:
+            show("points that are infeasible when simulated are solved again")
+            again = _inside_limits(again, others, verify)
+        stats = again.stats | {"wall_time": again.stats["wall_time"] + interrupts.elapsed}
+    return verified(again.replace(stats=stats, message=points.message), verify)
+
+
+def _most_work(points: Points, rows: list[int]) -> float:
+    """What may be spent on some of the points, in iterations times variables: a share of what the front cost, and a little for each."""
+    spent = EVALUATION * points.stats["evaluations"] + SOLVE * points.stats["gradient_solves"]
+    variables = float(np.mean([len(points[i].variables) for i in rows]))
+    return max(SHARE * spent, LEAST * len(rows)) * variables
+
+
+def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:
+    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated."""
+    moved: dict[int, Points] = {}
+    for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
+        own = [i for i in rows if points.transcriptions[i] is transcription]
+        nlp = from_dict(transcription or {}).nlp(points.compiled())
+        evaluator = Bilevel(nlp, Propagate(), float(points.stats["tolerance"]))
+        if not evaluator.has_gradients:
+            continue
+        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), objective_scales(points), verify)
+        points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
+        for k in np.flatnonzero(feasible & changed).tolist():
+            moved[own[k]] = vectors_points(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
+    if not moved:
+        return points
+    return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)

@@ -18,7 +18,7 @@ from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objec
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, TIMEOUT
 from .multistart import GradientSolves
 from .tasks import Task
 
@@ -147,19 +147,19 @@ class MeshLoop:
     wanted : Wanted
     limit : int
         Largest number of meshes for each point.
-    most_solves : int, optional
-        Number of gradient solves, of those that `solves` counts, after which no new mesh is begun.
+    most_work : float, optional
+        Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
     """
 
-    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_solves: int | None = None) -> None:
-        self.programs, self.solves, self.wanted, self.limit, self.most_solves = programs, solves, wanted, limit, most_solves
+    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_work: float | None = None) -> None:
+        self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
     @property
     def ended(self) -> bool:
         """Whether no new mesh is to be begun."""
-        return stopping() or (self.most_solves is not None and self.solves.counts.gradient_solves >= self.most_solves)
+        return stopping() or (self.most_work is not None and self.solves.work >= self.most_work)
 
     def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
@@ -243,11 +243,14 @@ class MeshLoop:
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
-        nlp = self.programs(method)
-        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-        if status != CONVERGED:
-            return None, status
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        try:
+            nlp = self.programs(method)
+            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+            if status != CONVERGED:
+                return None, status
+            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        except Stopped:
+            return None, TIMEOUT
         # On the same mesh nothing can be seen of what that has wrong.
         same = method == present.method
         return replace(reached, change=np.inf if same else _change(present, F, task, self.wanted.settled)), status

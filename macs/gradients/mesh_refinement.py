@@ -78,18 +78,18 @@ class FrontRefinement:
         Largest number of meshes for each point.
     chosen : sequence of int, optional
         The points to be refined; default: all that converged.
-    most_solves : int, optional
-        Largest number of gradient solves, up to the end of a mesh.
+    most_work : float, optional
+        Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
     """
 
     def __init__(
-        self, front: Points, wanted: Wanted, limit: int, chosen: Sequence[int] | None = None, most_solves: int | None = None
+        self, front: Points, wanted: Wanted, limit: int, chosen: Sequence[int] | None = None, most_work: float | None = None
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_solves)
+        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}

@@ -115,7 +115,7 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
-        check_problem(problem)
+        check_problem(problem, transcription)
         if evaluations is None:
             evaluations = problem.default_evaluations if isinstance(problem, Problem) else DEFAULT_EVALUATIONS
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)

@@ -258,7 +258,7 @@ def describe(front: Front, point: Point) -> str:
 
 def _verdict(front: Front, point: Point) -> str:
     """Whether a point is verified, and within what."""
-    return f"{'verified' if point.verified else 'not verified'}: simulated, against {front.stats.get('verify', 0.0):g}"
+    return f"simulated: {'verified' if point.verified else 'not verified'} within {front.stats.get('verify', 0.0):g}"
 
 
 def _simulated(front: Front, point: Point) -> dict[str, str]:

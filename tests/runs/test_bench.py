@@ -138,14 +138,14 @@ def test_what_does_not_end_or_crashes_is_told(capfd):
     [
         ({}, "right"),
         ({"simulated": 1.4213}, "WRONG"),
-        ({"ours": 1.4219, "simulated": 1.4219}, "WRONG"),
-        ({"simulated": 1.43}, "not verified"),
-        ({"violation": 2e-3}, "not verified"),
+        ({"simulated": 1.4193}, "WRONG"),
+        ({"verified": 0.0}, "not verified"),
+        ({"simulated": 1.43, "verified": 0.0}, "not verified"),
         ({"status": "failed"}, "FAILED"),
     ],
 )
 def test_verdicts(change, verdict):
-    found = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "seconds": 1.0} | change
+    found = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "verified": 1.0, "seconds": 1.0} | change
     assert standard.compared("moon_landing", standard.published("moon_landing")[0], found).who == verdict
 
 

@@ -44,6 +44,7 @@ runs = 2
 seed = 1
 inner = "propagate"
 nominal = "light"
+verify = false
 
 [problems]
 heavy = {problem = "cart.py:cart", mass = 4.0}

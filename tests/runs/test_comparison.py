@@ -169,6 +169,33 @@ def test_reports_of_runs_that_are_not_there_yet(folder, tmp_path):
     assert "nsga2: 2 missing" in text and "points claimed, and points verified" in text
 
 
+def test_points_are_simulated_unless_a_study_says_no(tmp_path):
+    given = {"problems": braking(), "solvers": "macs", "evaluations": 160, "runs": 1, "seed": 1}
+    assert Study("plain", **given).verify == 1e-3 and Study("plain", **given, verify=None).verify is None
+    text = 'problems = "goddard"\nsolvers = "macs"\nevaluations = 50\nruns = 1\nseed = 1\n'
+    for words, expected in (("", 1e-3), ("verify = false\n", None), ("verify = 0.5\n", 0.5)):
+        (tmp_path / "mine.toml").write_text(text + words, encoding="utf-8")
+        read = Study.load(tmp_path / "mine.toml")
+        assert read.verify == expected and read.definition()["verify"] == expected
+    (tmp_path / "mine.toml").write_text(text + "verify = true\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="verify must be a positive number, not True"):
+        Study.load(tmp_path / "mine.toml")
+
+
+def test_a_run_keeps_only_final_states_beside_its_front(folder):
+    for run in Store.open(folder).runs():
+        front = Front.load(run.path)
+        assert front.stats["verify"] == 0.01 and front.was_simulated.all()
+        assert set(run.simulated) == {"ends"} and {len(values) for values in run.simulated["ends"]["run"].values()} == {len(front)}
+
+
+def test_a_problem_without_a_transcription_gets_the_first_mesh():
+    problem = braking()
+    problem.default_transcription = None
+    (cell,) = Study("plain", problems=problem, solvers="nsga2", evaluations=50, runs=1, seed=1).cells
+    assert cell.transcription == "dfet:8x3:bernstein"
+
+
 @pytest.mark.parametrize(("value", "message"), [(0.0, "verify must be a positive number"), ("much", "verify must be a positive number")])
 def test_how_much_may_be_violated_is_a_number(value, message):
     with pytest.raises(ValueError, match=message):

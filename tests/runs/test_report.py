@@ -33,7 +33,8 @@ PAPER = [
 
 
 def study(**more) -> Study:
-    return Study("gliders", **{"problems": glide(), "solvers": SOLVERS, "evaluations": 60, "runs": 3, "seed": 1, "paper": PAPER} | more)
+    given = {"problems": glide(), "solvers": SOLVERS, "evaluations": 60, "runs": 3, "seed": 1, "paper": PAPER, "verify": None}
+    return Study("gliders", **given | more)
 
 
 @pytest.fixture(scope="module")

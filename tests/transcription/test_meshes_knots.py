@@ -164,22 +164,38 @@ def test_nothing_is_proposed_where_nothing_switches_or_moves():
     assert phase_switches(crude.trajectory["fall"])["u"] and switched(Euler(20), landing, crude.trajectory) is None
 
 
+def test_a_phase_of_no_length_and_one_that_switches():
+    problem, *_ = moon_landing()
+    wait = problem.phase("wait", t0=0.0, tf=(0.0, 5.0))
+    x, u = wait.state("x", bounds=(-1, 1), initial=0), wait.control("u", bounds=(0, 1))
+    wait.dynamics(x=u)
+    problem.constraint("no time", wait.tf, upper=0.0)
+    method = DFET(6, 4)
+    point = optimize(problem, method)
+    assert point.trajectory["wait"].tf == 0.0 and x is not None
+    proposed = switched(method, problem, point.trajectory)
+    assert list(proposed.meshes) == ["fall"] and len(proposed.mesh_of("fall").moving) == 1
+
+
 def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
     mesh = PhaseMesh.uniform(4, 3)
     found = {
         "u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.7, UPPER, LOWER, 1.0)],
         "v": [Switch(0.41, UPPER, LOWER, 1.0), Switch(0.9995, LOWER, UPPER, 0.3)],
     }
-    assert knots(found, mesh, NOTHING) == pytest.approx([0.405, 0.7])
+    assert knots(found, {}, mesh, NOTHING) == pytest.approx([0.405, 0.7])
     # Two of one control are not one, however near.
-    assert knots({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, mesh, NOTHING) == [0.4, 0.401]
+    assert knots({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, {}, mesh, NOTHING) == [0.4, 0.401]
+    # A contact beside a switch is this; others have knots of their own.
+    touching = {"state x": [Switch(0.45, INSIDE, UPPER, 0.5), Switch(0.07, UPPER, INSIDE, 0.5)]}
+    assert knots(found, touching, mesh, NOTHING) == pytest.approx([0.07, 0.405, 0.7])
     # Near a moving edge they are there; two that were pressed together leave nothing, or one.
     moving = PhaseMesh((0, 0.3, 0.31, 1), 3, 1, (1, 2))
     pair = [Switch(0.3, LOWER, UPPER, 1.0), Switch(0.31, UPPER, LOWER, 1.0)]
-    assert knots({"u": pair}, moving, np.array([0, 0])) == [0.3, 0.31]
-    assert knots({"u": pair}, moving, np.array([1, -1])) == []
+    assert knots({"u": pair}, {}, moving, np.array([0, 0])) == [0.3, 0.31]
+    assert knots({"u": pair}, {}, moving, np.array([1, -1])) == []
     through = [Switch(0.3, LOWER, INSIDE, 1.0), Switch(0.31, INSIDE, UPPER, 1.0)]
-    assert knots({"u": through}, moving, np.array([1, -1])) == [pytest.approx(0.305)]
+    assert knots({"u": through}, {}, moving, np.array([1, -1])) == [pytest.approx(0.305)]
 
 
 @settings(max_examples=100, deadline=None)
@@ -199,7 +215,7 @@ def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, b
     mesh = with_knots(PhaseMesh(edges, order), places.tolist(), {"u": bang})
     assert [mesh.edges[j] for j in mesh.moving] == places.tolist()
     assert mesh.order == max(order, 4) and mesh.control_order == mesh.order - 2
-    assert mesh.elements <= len(widths) + len(places) + 1
+    assert mesh.elements <= len(widths) + (len(places) + 1) + (2 * (len(places) + 1 - len(bang)) if bang else 0)
     assert mesh.constant == ((("u", tuple(bang)),) if bang else ())
     again = with_knots(mesh, places.tolist(), {"u": range(len(places) + 1)})
     assert np.allclose(again.edges, mesh.edges) and (again.order, again.control_order) == (mesh.order, mesh.control_order)
@@ -209,10 +225,10 @@ def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, b
         assert length <= np.diff(edges).max() * (1.5 if few else 2.5) + 1e-12
 
 
-def test_long_arcs_of_constant_controls_have_half_the_elements():
+def test_long_arcs_of_constant_controls_have_half_the_elements_and_others_two_more():
     mesh = with_knots(PhaseMesh.uniform(40, 3), [0.25, 0.35], {"u": [0, 1], "v": [0, 1, 2]})
-    assert np.bincount(mesh.arcs).tolist() == [5, 4, 26]
-    assert np.bincount(with_knots(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 26]
+    assert np.bincount(mesh.arcs).tolist() == [5, 4, 28]
+    assert np.bincount(with_knots(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 28]
 
 
 def test_controls_are_constant_where_they_are_on_bounds():
@@ -225,6 +241,27 @@ def test_controls_are_constant_where_they_are_on_bounds():
     assert on_bounds(flight, {"u": []}, [switch.place]) == {"u": []}
     inside = {"u": [Switch(0.2, LOWER, INSIDE, 0.5), Switch(0.5, INSIDE, UPPER, 0.5)]}
     assert on_bounds(flight, inside, [0.2, 0.3, 0.5]) == {"u": [0, 3]}
+
+
+@pytest.mark.parametrize(("wall", "word"), [(0.1, "dfet:8x3:bernstein"), (0.1, "dfet:6x4"), (0.14, "dfet:6x4")])
+def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word):
+    """Bryson, Denham and Dreyfus, AIAA Journal 1, 1963: on the wall l from 3 l to 1 - 3 l, effort 4 / (9 l)."""
+    problem = Problem("Bryson-Denham")
+    move = problem.phase("move", t0=0, tf=1.0)
+    x, v = move.state("x", bounds=(-10, wall), initial=0, final=0), move.state("v", bounds=(-10, 10), initial=1, final=-1)
+    u = move.control("u", bounds=(-20, 20))
+    move.dynamics(x=v, v=u)
+    problem.minimize("effort", move.integral(u**2 / 2))
+    assert x is not None
+    found, method = followed(problem, parse(word), rounds=1)
+    exact = 4 / (9 * wall)
+    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=1e-7)
+    # The effort depends on the places to the third order.
+    edges = np.array(method.settled(found[1][1]).mesh_of("move").edges)
+    assert edges[list(method.mesh_of("move").moving)] == pytest.approx([3 * wall, 1 - 3 * wall], abs=2e-3)
+    assert not method.mesh_of("move").constant
+    simulation = simulate(problem.compile(), found[1][1])
+    assert simulation.max_defect < 1e-9 and simulation.violation < 1e-8
 
 
 def test_a_control_that_leaves_its_bound_gradually_is_no_optimum():

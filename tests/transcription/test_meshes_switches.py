@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from transcription.meshes.switches import INSIDE, LOWER, UPPER, labels, stretches, switches
+from transcription.meshes.switches import INSIDE, LOWER, UPPER, contacts, labels, stretches, switches
 from transcription.numerics.polynomials import bernstein_matrix
 
 TAU = np.linspace(-1.0, 1.0, 65)
@@ -126,6 +126,29 @@ def test_a_smooth_control_has_none_and_one_that_jumps_inside_has_one():
     assert described(found) == [(INSIDE, INSIDE)] and found[0].place == 0.5
     # Ringing jumps as well, but not more than it changes on the elements.
     assert not switches(*sampled(edges, [[0.1, 0.6], [0.2, 0.7], [0.1, 0.8], [0.3, 0.6]]))
+
+
+def test_contacts_begin_and_end():
+    edges = np.linspace(0, 1, 11)
+    places = edges[:-1, None] + 0.05 * (1.0 + TAU)
+    # On the limit between 0.35 and 0.6, which is reached and left as a power of time: what is near it is much longer.
+    for power in (1, 2, 3, 4):
+        values = 1.0 - np.maximum(0.35 - places, 0.0) ** power - np.maximum(places - 0.6, 0.0) ** power
+        found = contacts(places, values, -5.0, 1.0)
+        assert described(found) == [(INSIDE, UPPER), (UPPER, INSIDE)]
+        assert [one.place for one in found] == pytest.approx([0.35, 0.6], abs=0.003)
+    # Reached from both sides at once, it is touched.
+    (touch,) = contacts(places, 1.0 - (places - 0.45) ** 2, -5.0, 1.0)
+    assert (touch.before, touch.after) == (INSIDE, INSIDE) and touch.place == pytest.approx(0.45, abs=0.002)
+    assert described(contacts(places, -values, -1.0, np.inf)) == [(INSIDE, LOWER), (LOWER, INSIDE)]
+    assert not contacts(places, values, -5.0, 1.2) and not contacts(places, values, -np.inf, np.inf)
+    # No contact: one that is short, also where the phase begins or ends there; an equation; a constant.
+    assert not contacts(places, places, 0.0, 1.0)
+    assert not contacts(places, 1.0 - 50 * np.abs(places - 0.5), -100.0, 1.0)
+    assert not contacts(places, values, 1.0, 1.0) and not contacts(places, 0 * values, 0.0, 1.0)
+    # A short gap in a contact is none.
+    gap = np.where(np.abs(places - 0.5) < 0.02, 0.9, values)
+    assert [one.place for one in contacts(places, gap, -5.0, 1.0)] == pytest.approx([one.place for one in found], abs=1e-3)
 
 
 def test_the_stretches_of_a_phase_follow_each_other():

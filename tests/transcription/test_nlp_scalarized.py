@@ -219,11 +219,18 @@ def test_too_few_iterations_are_a_failure_even_where_feasible() -> None:
     assert solved.status != "converged"
 
 
-def test_without_persistence_a_solve_out_of_iterations_is_not_begun_again() -> None:
+def test_a_solve_says_which_limit_ended_it() -> None:
+    solved = solve(goddard(), [150, -0.5], RANGES.tolist(), feasible(goddard(), 1), max_iterations=6)
+    assert solved.status == "failed" and solved.message == "the limit of 6 iterations was reached" and solved.iterations <= 6
+    assert solve(goddard(), [150, -0.5], RANGES.tolist(), feasible(goddard(), 1)).message == ""
+
+
+def test_without_persistence_the_first_way_has_all_iterations() -> None:
     start = feasible(goddard(), 1)
-    short = {"start": start, "max_iterations": 3}
+    short = {"start": start, "max_iterations": 6}
     once, again = (solve(goddard(), [150, -0.5], RANGES.tolist(), persistent=stays, **short) for stays in (False, True))
-    assert once.status == "failed" and once.iterations < again.iterations
+    assert once.status == again.status == "failed" and once.iterations == 6 >= again.iterations
+    assert not np.array_equal(once.F, again.F)
     # One that converges, or ends for another reason, is the same.
     F = [solve(goddard(), [150, -0.5], RANGES.tolist(), start, persistent=stays).F for stays in (False, True)]
     assert np.array_equal(*F)

@@ -12,7 +12,8 @@ from ..numerics.periodic import unwrapped_law, wrapped_controls
 
 
 def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, peaks, controls at both ends, sizes)."""
+    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, the same at the nodes of equalities, peaks,
+    controls at both ends, sizes)."""
     nx, nu = len(phase.states), len(phase.controls)
     X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
     left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
@@ -30,12 +31,12 @@ def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
     first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
     weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
     integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
-    paths = over(phase.path, tables.points, closed @ ca.DM(tables.collocation(tables.points)).T)
+    paths, equalities = (over(phase.path, tau, closed @ ca.DM(tables.collocation(tau)).T) for tau in (tables.points, tables.exact))
     peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.collocation(tables.dense)).T)
     sizes = over(phase.sizes, tables.tau, inside)
     ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
-    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "peaks", "ends", "sizes"]
-    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, peaks, ends, sizes], *names)
+    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "equalities", "peaks", "ends", "sizes"]
+    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, equalities, peaks, ends, sizes], *names)
 
 
 class Tables:
@@ -53,6 +54,9 @@ class Tables:
         Gauss-Legendre quadrature, nq = max(l, q) + 1.
     points, dense : arrays
         Where path constraints are imposed: both ends and the quadrature nodes; where peaks are sampled: also halfway between these.
+    exact : array (q + 1,)
+        Where path constraints are imposed that are equalities: as many Gauss-Legendre nodes as a control has coefficients. At more of them
+        the equations would determine more than there is to choose.
     stages : array (l + 1,)
         Gauss-Legendre nodes of the equivalent Runge-Kutta method. Through the states there and at both ends passes its collocation
         polynomial, which is more accurate by one order than the states' own polynomial of degree l.
@@ -77,6 +81,7 @@ class Tables:
         self.control_nodes = polynomials.nodes(self.control_basis, control_order)
         self.tau, self.weights = polynomials.gauss_legendre(max(order, control_order) + 1)
         self.points = np.array([-1.0, *self.tau, 1.0])
+        self.exact = polynomials.gauss_legendre(control_order + 1)[0]
         self.dense = np.sort(np.concatenate([self.points, 0.5 * (self.points[1:] + self.points[:-1])]))
         self.stages = polynomials.gauss_legendre(order + 1)[0]
         derivative = polynomials.basis_derivative(basis, order + 1, self.tau)

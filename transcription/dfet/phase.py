@@ -79,11 +79,11 @@ class DFETPhase(PhaseWriter):
         """See `PhaseWriter.write`."""
         n, tables, phase, pick = self.n, self.tables, self.phase, self.layout.pick
         left, right, (U, *times) = pick(extended, self.B[:-1]), pick(extended, self.B[1:]), self._inputs(extended)
-        weak, integrals, paths, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
+        weak, integrals, paths, equalities, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
         tests = tables.order + 2
         residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
         self.add_dynamics(rows, residual)
-        self.add_paths(rows, paths)
+        self.add_paths(rows, paths, equalities)
         nu, totals = len(phase.controls), ca.sum2(integrals)
         if self._sizes:
             totals = self._with_sizes(totals, pick(extended, self.S), sizes, times[1], rows)

@@ -57,13 +57,7 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
         more = max(degrees(e, r) for e, r in zip(scores.controls[poor & smooth], errors.control_rate[poor & smooth], strict=True))
         raised = int(min(order, max(degree + min(more, order), LEAST_CONTROL_ORDER)))
         control_order = raised if raised > degree else control_order
-    return remeshed(old, edges, order, control_order)
-
-
-def remeshed(old: PhaseMesh, edges: np.ndarray, order: int, control_order: int | None) -> PhaseMesh:
-    """A mesh with these edges, among which are all of `old`, and those of them moving that move there."""
-    moving = tuple(int(np.argmin(np.abs(edges - old.edges[j]))) for j in old.moving)
-    return PhaseMesh(tuple(edges.tolist()), order, control_order, moving)
+    return old.with_elements(edges.tolist(), order, control_order)
 
 
 SMOOTH = 0.8

@@ -1,4 +1,4 @@
-"""Meshes whose edges lie at the switches of the controls, and move with them."""
+"""Meshes whose edges lie at the switches of the controls, and at the ends of contacts with limits, and move with them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
 from ..base import Meshed
 from ..phases.mesh import PhaseMesh
+from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
-from .switches import INSIDE, LOWER, UPPER, Switch, stretches, switches
+from .switches import INSIDE, LOWER, UPPER, Switch, contacts, stretches, switches
 
 Method = TypeVar("Method", bound=Meshed)
 
@@ -24,14 +25,16 @@ TAU = np.linspace(-1.0, 1.0, 65)
 NEAR, NEAREST = 0.05, 1e-3
 """Switches of two controls that are no further apart than so many elements, or than this relative to the phase, share a knot; no knot
 is so near to an end of the phase."""
+BESIDE = 1.0
+"""Elements within which a contact with a limit begins, or ends, at the switch of a control beside it."""
 PRESSED = 0.01
 """A moving edge at an end of its range, but for this share of it, would go on."""
 ORDER, LESS = 4, 2
 """Least degree of the states on a mesh with knots, and how much lower the degree of the controls is. On singular arcs, where controls enter
 linearly and hardly matter, those of the degree of the states oscillate; two degrees lower they do not."""
-ENOUGH = 4
+ENOUGH, MORE = 4, 2
 """An arc on which all controls are constant keeps so many elements of the mesh before, but of more only half, if that is more: nothing but
-the states has to be described there."""
+the states has to be described there. Other arcs of controls that switch get so many more: there they are of a lower degree than before."""
 MOSTLY = 0.9
 """Share of a phase on which a control without switches is on a bound, to count as being there."""
 
@@ -44,8 +47,8 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
     went, and edges that could move no further, begin anew; once they stay, all controls are free, so that an arc on which none should be
     constant shows. Called with what that method found: None, unless there are other switches now.
 
-    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, and fewer where all controls
-    are on bounds. Not every proposal is better: compare.
+    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, or finer, and fewer where
+    all controls are on bounds. Not every proposal is better: compare.
 
     Parameters
     ----------
@@ -61,13 +64,16 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
     """
     if not method.moves_edges:
         return None
-    proposed = {phase.name: next_mesh(method, trajectory[phase.name]) for phase in problem.compile().phases}
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.compile().parameters])
+    proposed = {phase.name: next_mesh(method, phase, trajectory[phase.name], parameters) for phase in problem.compile().phases}
     found = {name: mesh for name, mesh in proposed.items() if mesh is not None}
     return method.settled(trajectory).remeshed(found, bounded=True) if found else None
 
 
-def next_mesh(method: Meshed, phase: PhaseTrajectory) -> PhaseMesh | None:
-    """The mesh of one phase that `switched` proposes, if any."""
+def next_mesh(method: Meshed, statement: CompiledPhase, phase: PhaseTrajectory, parameters: np.ndarray) -> PhaseMesh | None:
+    """The mesh of one phase that `switched` proposes, if any; `parameters` are those of the problem."""
+    if not phase.tf > phase.t0:
+        return None
     given = method.mesh_of(phase.name)
     mesh = given.found_in(phase.state.edges)
     known = np.array(mesh.edges)[list(mesh.moving)]
@@ -75,7 +81,7 @@ def next_mesh(method: Meshed, phase: PhaseTrajectory) -> PhaseMesh | None:
     slack = PRESSED * (high - low)
     pressed = np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0))
     found = phase_switches(phase)
-    places = knots(found, mesh, pressed)
+    places = knots(found, phase_contacts(statement, phase, parameters), mesh, pressed)
     # Within the ranges the solver has moved the edges itself: where a control comes near a bound slowly, it knows better.
     if len(places) == len(known) and (low <= places).all() and (places <= high).all():
         return mesh if pressed.any() else replace(mesh, constant=()) if mesh.constant else None
@@ -87,6 +93,19 @@ def next_mesh(method: Meshed, phase: PhaseTrajectory) -> PhaseMesh | None:
 def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
     """The switches of each control of a phase by its name; periodic controls have no bounds, and none."""
     return {name: switches(*values) for name, values in _samples(phase).items()}
+
+
+def phase_contacts(statement: CompiledPhase, phase: PhaseTrajectory, parameters: np.ndarray) -> dict[str, list[Switch]]:
+    """Where each state and each path constraint of a phase reaches and leaves its limits."""
+    edges = phase.control.edges
+    times = edges[:-1, None] + 0.5 * (1.0 + TAU) * np.diff(edges)[:, None]
+    states, controls = phase.state(np.minimum(times, edges[1:, None])), phase.controls_on_elements(TAU)
+    s = np.array([phase.t0, phase.tf, *parameters])
+    x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
+    paths = paths_and_peaks(statement, x, u, times.ravel(), s)[0].reshape(*times.shape, len(statement.paths))
+    places = (times - phase.t0) / (phase.tf - phase.t0)
+    found = {f"state {v.name}": contacts(places, states[:, :, i], v.lower, v.upper) for i, v in enumerate(statement.states)}
+    return found | {f"path {v.name}": contacts(places, paths[:, :, i], v.lower, v.upper) for i, v in enumerate(statement.paths)}
 
 
 def on_bounds(phase: PhaseTrajectory, found: Mapping[str, Sequence[Switch]], places: Sequence[float]) -> dict[str, list[int]]:
@@ -126,13 +145,16 @@ class _Knot:
         return any(self.before[name] != self.after[name] or self.after[name] == INSIDE for name in self.after)
 
 
-def knots(found: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.ndarray) -> list[float]:
+def knots(
+    found: Mapping[str, Sequence[Switch]], touching: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.ndarray
+) -> list[float]:
     """Where edges are to move, increasing.
 
     Parameters
     ----------
-    found : mapping
-        The switches of each control.
+    found, touching : mappings
+        The switches of each control, and the contacts of each state and path constraint, which are known less well: near a switch of a
+        control they are this.
     mesh : PhaseMesh
         The mesh on which they were found. A switch at one of its moving edges is put exactly there.
     pressed : array (m,)
@@ -145,9 +167,16 @@ def knots(found: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.nd
     for i in np.flatnonzero((pressed[:-1] > 0) & (pressed[1:] < 0)).tolist():
         target[i : i + 2] = target[i : i + 2].mean()
     groups: list[_Knot] = []
-    for control, switch in sorted(((name, one) for name in found for one in found[name]), key=lambda pair: pair[1].place):
-        j = int(np.clip(np.searchsorted(edges, switch.place, side="right") - 1, 0, mesh.elements - 1))
-        near, place = max(NEAREST, NEAR * (edges[j + 1] - edges[j])), switch.place
+    sharp = np.array([one.place for those in found.values() for one in those])
+
+    def length(place: float) -> float:
+        return float(np.diff(edges)[np.clip(np.searchsorted(edges, place, side="right") - 1, 0, mesh.elements - 1)])
+
+    events = [(name, one) for name, those in found.items() for one in those]
+    for name, those in touching.items():
+        events += [(name, one) for one in those if (np.abs(sharp - one.place) > BESIDE * length(one.place)).all()]
+    for control, switch in sorted(events, key=lambda pair: pair[1].place):
+        near, place = max(NEAREST, NEAR * length(switch.place)), switch.place
         nearest = int(np.argmin(np.abs(known - place))) if len(known) else 0
         if len(known) and abs(known[nearest] - place) <= near:
             place = float(target[nearest])
@@ -163,16 +192,17 @@ def with_knots(mesh: PhaseMesh, places: Sequence[float], constant: Mapping[str, 
     """A mesh with moving edges at `places`; between these, controls are `constant` on arcs.
 
     Each arc has as many elements as the mesh has there, spread likewise. Where the mesh has no moving edges, its degrees become those of a
-    mesh with knots, and arcs on which all controls are constant have fewer.
+    mesh with knots, arcs on which all controls are constant have fewer elements, and the others more, if any are constant anywhere.
     """
-    first = not mesh.moving
+    first, switching = not mesh.moving, any(len(arcs) for arcs in constant.values())
     index = np.arange(mesh.elements + 1.0)
     ends = np.interp([0.0, *places, 1.0], mesh.edges, index)
     edges, moving = [0.0], []
     for j, ((low, high), end) in enumerate(zip(pairwise(ends), [*places, 1.0], strict=True)):
         bang = bool(constant) and all(j in arcs for arcs in constant.values())
         count = max(1, round(high - low))
-        count = max(min(count, ENOUGH), round(0.5 * count)) if bang and first else count
+        if first:
+            count = max(min(count, ENOUGH), round(0.5 * count)) if bang else count + (MORE if switching else 0)
         edges += [*np.interp(np.linspace(low, high, count + 1)[1:-1], index, mesh.edges).tolist(), end]
         moving.append(len(edges) - 1)
     order = max(mesh.order, ORDER) if first else mesh.order

@@ -1,4 +1,5 @@
-"""Switches of controls: where, along a phase, a control passes from one bound to the other, leaves or reaches one, or jumps.
+"""Switches: where, along a phase, a control passes from one bound to the other, leaves or reaches one, or jumps, and where a state or a
+path constraint reaches or leaves a limit.
 
 On a coarse mesh a switch is smeared over the element in which it lies: the control leaves its bound somewhere before and reaches the other
 somewhere behind. What survives is its integral, since the states depend on it. A switch is therefore put where a control that jumps has
@@ -18,6 +19,13 @@ ON_BOUND = 1e-2
 """A value is on a bound if it is nearer than this, in spans."""
 SMEARED, PULSE = 1.25, 2.25
 """Elements over which a switch, and a pulse, may be smeared; what takes longer is an arc of its own."""
+CONTACT, LASTING = 5e-3, 0.5
+"""A state, or a path constraint, is at a limit if it is nearer than this, in its own range on the phase, for at least so many elements.
+A gap of less is none."""
+LEVELS = (1.0, 4.0, 16.0)
+"""Multiples of that distance at which it is seen how fast a limit is reached."""
+SLOWEST = 1.25
+"""Ratio of the times between these levels below which nothing is concluded: the distance grows as the sixth power of time."""
 BRIEF = 0.1
 """Contact with a bound of less than so many elements, between two stretches inside, is a touch of one stretch."""
 HUMP = 0.25
@@ -78,16 +86,15 @@ def stretches(places: np.ndarray, values: np.ndarray) -> list[Stretch]:
     firsts, lasts = np.append(0, changes + 1), np.append(changes, len(t) - 1)
     ends = 0.5 * (t[changes] + t[changes + 1])
     starts, ends = np.append(t[0], ends), np.append(ends, t[-1])
-    found = [
+    return [
         Stretch(*one) for one in zip(starts.tolist(), ends.tolist(), firsts.tolist(), lasts.tolist(), marks[firsts].tolist(), strict=True)
     ]
-    return _without_touches(found, places)
 
 
 def switches(places: np.ndarray, values: np.ndarray) -> list[Switch]:
     """The switches of a control, in the order of time; places and values as for `stretches`."""
     t, u = places.ravel(), np.clip(values.ravel(), 0.0, 1.0)
-    parts, found = stretches(places, values), []
+    parts, found = _without(stretches(places, values), places, (LOWER, UPPER), INSIDE, BRIEF), []
     for i, part in enumerate(parts):
         before = parts[i - 1].label if i else None
         after = parts[i + 1].label if i + 1 < len(parts) else None
@@ -98,6 +105,56 @@ def switches(places: np.ndarray, values: np.ndarray) -> list[Switch]:
         elif before is not None and before != INSIDE:
             found.append(Switch(part.start, before, part.label, 1.0))
     return sorted((one for one in found if t[0] < one.place < t[-1]), key=lambda one: one.place)
+
+
+def contacts(places: np.ndarray, values: np.ndarray, lower: float, upper: float) -> list[Switch]:
+    """Where a state or a path constraint reaches and leaves its limits, or only touches one: from INSIDE to INSIDE.
+
+    Parameters
+    ----------
+    places, values : arrays (N, k)
+        As for `stretches`, but values in their own unit.
+    lower, upper : float
+        The limits; infinite where there is none.
+    """
+    near = CONTACT * float(np.ptp(values))
+    if not near > 0.0 or lower == upper:
+        return []
+    parts = stretches(places, np.where(values <= lower + near, 0.0, np.where(values >= upper - near, 1.0, 0.5)))
+    for limit in (LOWER, UPPER):
+        parts = _without(parts, places, (INSIDE,), limit, LASTING)
+    # At the ends of a phase, too: a limit is often the first value, or the last.
+    ends = Stretch(parts[0].start, parts[0].start, 0, 0, INSIDE), Stretch(parts[-1].end, parts[-1].end, 0, 0, INSIDE)
+    parts = [one for one in _without([ends[0], *parts, ends[1]], places, (LOWER, UPPER), INSIDE, LASTING) if one.length > 0.0]
+    t, found = places.ravel(), []
+    for i, part in enumerate(parts):
+        if part.label == INSIDE:
+            continue
+        distance = (values - lower if part.label == LOWER else upper - values).ravel() / near
+        before = parts[i - 1].label if i else None
+        after = parts[i + 1].label if i + 1 < len(parts) else None
+        start = _reached(t[part.first :: -1], distance[part.first :: -1]) if before == INSIDE else part.start
+        end = _reached(t[part.last :], distance[part.last :]) if after == INSIDE else part.end
+        if start >= end:
+            found.append(Switch(0.5 * (part.start + part.end), INSIDE, INSIDE, 0.25))
+            continue
+        found += [Switch(start, before, part.label, 0.5)] if before is not None else []
+        # A limit that follows at once has its own beginning.
+        found += [Switch(end, part.label, after, 0.5)] if after == INSIDE else []
+    return found
+
+
+def _reached(t: np.ndarray, distance: np.ndarray) -> float:
+    """Where a limit is reached, seen from there: the distance grows as some power of the time from it, which three levels tell."""
+    beyond = [np.flatnonzero(distance >= level) for level in LEVELS]
+    if not all(len(one) for one in beyond):
+        return float(t[0])
+    near, middle, far = (
+        float(np.interp(level, distance[k[0] - 1 : k[0] + 1], t[k[0] - 1 : k[0] + 1])) if k[0] else float(t[0])
+        for level, k in zip(LEVELS, beyond, strict=True)
+    )
+    growth = (far - middle) / (middle - near) if middle != near else np.inf
+    return near - (middle - near) / (growth - 1.0) if growth > SLOWEST else near
 
 
 def _passages(part: Stretch, t: np.ndarray, u: np.ndarray, before: int | None, after: int | None, elements: float) -> list[Switch]:
@@ -147,13 +204,13 @@ def _elements(places: np.ndarray, part: Stretch) -> float:
     return float((np.clip(np.minimum(part.end, ends) - np.maximum(part.start, starts), 0.0, None) / (ends - starts)).sum())
 
 
-def _without_touches(parts: Sequence[Stretch], places: np.ndarray) -> list[Stretch]:
-    """The stretches, where those that only touch a bound are part of what lies around them."""
+def _without(parts: Sequence[Stretch], places: np.ndarray, labels: Sequence[int], around: int, least: float) -> list[Stretch]:
+    """The stretches, where those with one of `labels` that cover less than `least` elements, between two with the label `around`, are part
+    of these."""
     kept: list[Stretch] = []
     for i, part in enumerate(parts):
-        inner = 0 < i < len(parts) - 1
-        touch = part.label != INSIDE and inner and parts[i - 1].label == parts[i + 1].label == INSIDE and _elements(places, part) < BRIEF
-        label = INSIDE if touch else part.label
+        between = 0 < i < len(parts) - 1 and parts[i - 1].label == parts[i + 1].label == around
+        label = around if between and part.label in labels and _elements(places, part) < least else part.label
         if kept and kept[-1].label == label:
             kept[-1] = Stretch(kept[-1].start, part.end, kept[-1].first, part.last, label)
         else:

@@ -11,53 +11,63 @@ objectives of a feasible point as the reference, alpha <= 0 means that none got 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from problems.derived import remembered
-from problems.peaks import refuse_peaks
-
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
-from ..stopping import Stopped, check_stopping, stopping
-from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, nlp_scales, origin, scaled_bounds, symbol
-from .watched import Watched
+from ..stopping import Stopped, stopping
+from .program import Options, program_parameters, solver
+from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, nlp_scales, origin
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
 PEAK_LIMIT = 3.0
 """Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those that are not minimised."""
+SLACK = 1e-2
+"""Part of the tolerance by which bounds of states, and rows that are no equalities, give way: where a trajectory begins or ends on one, or
+runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge."""
 AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
+AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
 class _Strategy:
-    """A strategy of IPOPT: its options, how far free variables may move in spans, whether alpha may not exceed the start's."""
+    """A strategy of IPOPT: its options, the share of the iterations that it may take, how far free variables may move in spans, whether
+    alpha may not exceed the start's, and whether variables and rows are equilibrated."""
 
-    options: tuple[tuple[str, object], ...]
+    options: Options
+    share: float
     radius: float = np.inf
     held: bool = False
+    equilibrated: bool = True
 
 
-ADAPTIVE = _Strategy((
-    ("mu_strategy", "adaptive"),
+COMMON: Options = (
+    ("tol", ACCURACY),
+    ("acceptable_tol", 100 * ACCURACY),
+    ("nlp_scaling_method", "none"),
+    ("bound_relax_factor", 0.0),
     ("fast_step_computation", "yes"),
     ("mumps_scaling", 0),
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
-))  # fmt: skip
-"""Few iterations from good points and poor ones, and cheap ones: what is scaled already needs neither scaling nor refinement."""
+)
+"""Options of all strategies: what is scaled already needs neither scaling nor refinement."""
+ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.3)
+"""Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
     (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4)),
+    share=0.3,
     radius=0.1,
     held=True,
 )
 """Stays in the basin of a feasible start."""
-SLOW = _Strategy((("mu_init", 0.1),))
-"""IPOPT as it comes."""
+MONOTONE = _Strategy((("mu_init", 0.1),), share=0.4)
+"""A barrier that only falls: slower, and not misled by constraints of which many are active at once."""
+UNSCALED = _Strategy((("mu_strategy", "adaptive"),), share=0.3, equilibrated=False)
+"""In the scales of the problem, where the derivatives at the start say little about those at the optimum."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,7 +85,9 @@ class Solved:
     status : str
         "converged" (a local optimum, and feasible by `NLP.evaluate` and within all limits), "infeasible", "failed" or "timeout".
     iterations : int
-        Of IPOPT.
+        Of IPOPT, by all strategies together.
+    message : str
+        Why the solve ended where it did not converge: the limit that was reached, or what IPOPT says.
     clocked : bool
         Whether a clock ended any of the work: then the same solve need not give the same again.
     begun : bool
@@ -89,6 +101,7 @@ class Solved:
     iterations: int
     clocked: bool = False
     begun: bool = True
+    message: str = ""
 
     def __repr__(self) -> str:
         return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
@@ -162,9 +175,10 @@ def scalarize(
     tolerance : float
         Largest scaled residual of a feasible point.
     max_iterations, seconds : int, float
-        Limits of IPOPT. The time is a safety net: what it ends is not reproducible.
+        Most iterations of IPOPT by all strategies together, and the time of each run. The time is a safety net: what it ends is not
+        reproducible.
     persistent : bool
-        Try another way where the first reached the limit of iterations. It is always tried where the first ended badly before.
+        Give each strategy a share of the iterations. Otherwise the first may take them all, and others what is left where it ended badly.
 
     Returns
     -------
@@ -181,19 +195,28 @@ def scalarize(
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return _not_begun(nlp, start)
-    task = _task(nlp, start, reference, weights, ceiling, margin)
+    try:
+        task = _task(nlp, start, reference, weights, ceiling, margin)
+    except Stopped:  # while derivatives were built
+        return _not_begun(nlp, start)
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    first = _unstuck(nlp, task, start, settings, ADAPTIVE)
-    worse = feasible and task.value(first.F) > tolerance
-    tired = first.iterations >= max_iterations and not persistent
-    if first.clocked or tired or (first.status == CONVERGED and not worse):
-        return first
-    second = _unstuck(nlp, task, start, settings, NEAR if feasible else SLOW)
-    best = min((first, second), key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
-    return replace(best, iterations=first.iterations + second.iterations, clocked=second.clocked)
+    found: list[Solved] = []
+    for strategy in (ADAPTIVE, NEAR, MONOTONE) if feasible else (ADAPTIVE, MONOTONE, UNSCALED):
+        share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
+        if sum(solved.iterations for solved in found) + share > max_iterations:
+            break
+        found.append(_unstuck(nlp, task, start, replace(settings, max_iterations=share), strategy))
+        worse = feasible and task.value(found[-1].F) > tolerance
+        if found[-1].clocked or (found[-1].status == CONVERGED and not worse):
+            break
+    best = min(found, key=lambda solved: (solved.status != CONVERGED, _rank(task, solved, tolerance)))
+    iterations = sum(solved.iterations for solved in found)
+    ended = best.status != CONVERGED and found[-1].message == AT_LIMIT
+    message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
+    return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
 
 
 def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
@@ -239,7 +262,7 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     for _ in range(RESTARTS + 1):
         solved, stuck = _attempt(nlp, task, start, settings, strategy)
         iterations += solved.iterations
-        if not stuck or solved.clocked:
+        if not stuck or solved.clocked or iterations >= settings.max_iterations:
             break
         start = solved.z
     if stuck and solved.status == CONVERGED:
@@ -250,26 +273,34 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
+    columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
+    options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
-        solver = _program(nlp, settings, strategy.options)
+        run = solver(nlp, settings.seconds, settings.max_iterations, options)
     except Stopped:
         return _not_begun(nlp, start), False
-    y = np.clip((start - origin(nlp)) / nlp.scale, *scaled_bounds(nlp))
-    lower, upper, made_up = _box(nlp, y, strategy.radius)
-    none = np.full(2 * len(task.used), -np.inf)
-    answer = solver(
-        x0=np.append(y, 0.0),
-        p=np.concatenate([task.shift, 1.0 / task.scale, task.slope]),
-        lbx=np.append(lower, -np.inf),
-        ubx=np.append(upper, 0.0 if strategy.held else np.inf),
-        lbg=np.concatenate([task.lower, none]),
-        ubg=np.concatenate([task.upper, np.where(task.used, 0.0, np.inf), task.top]),
+    lower, upper, made_up = _box(nlp, start, strategy.radius)
+    slack = min(1e-8, SLACK * tolerance)
+    states = np.where(made_up, 0.0, slack * nlp.scale)
+    states[:, nlp.free] = 0.0
+    ways = np.where(nlp.g_lower < nlp.g_upper, slack, 0.0)
+    none, zero = np.full(2 * len(task.used), -np.inf), origin(nlp)
+    to_rows = nlp.g_scale / rows
+    answer = run(
+        x0=np.append((np.clip(start, lower, upper) - zero) / columns, 0.0),
+        p=program_parameters(task.shift, 1.0 / task.scale, task.slope, columns, rows),
+        lbx=np.append((lower - states[0] - zero) / columns, -np.inf),
+        ubx=np.append((upper + states[1] - zero) / columns, 0.0 if strategy.held else np.inf),
+        lbg=np.concatenate([(task.lower - ways) * to_rows, none]),
+        ubg=np.concatenate([(task.upper + ways) * to_rows, np.where(task.used, 0.0, np.inf), task.top]),
     )
-    stats = solver.stats()
-    outcome, iterations = stats["return_status"], int(stats["iter_count"])
-    y = np.array(answer["x"]).ravel()[:-1]
-    stuck = bool((made_up & (np.stack([y - lower, upper - y]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
-    z = nlp.tighten(back_in_bounds(nlp, origin(nlp) + y * nlp.scale)[None])[0]
+    stats = run.stats()
+    outcome = stats["return_status"]
+    # Where IPOPT does not begin, nothing is written there.
+    iterations = int(stats["iter_count"]) if 0 <= stats["iter_count"] <= settings.max_iterations else 0
+    z = zero + np.array(answer["x"]).ravel()[:-1] * columns
+    stuck = bool((made_up & (np.stack([z - lower, upper - z]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
+    z = nlp.tighten(back_in_bounds(nlp, z)[None])[0]
     F, violation = nlp.evaluate(z[None])
     status = STATUS_OF_IPOPT.get(outcome, FAILED)
     if not (np.isfinite(F).all() and np.isfinite(violation[0])):
@@ -277,16 +308,18 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
         F, violation = nlp.evaluate(z[None])
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
-    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT), stuck
+    message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
+    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT, message=message), stuck
 
 
-def _box(nlp: NLP, y: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds of the scaled variables around y, (n,) each, and which of them the problem does not have, (2, n)."""
-    lower, upper = scaled_bounds(nlp)
-    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(1.0, np.abs(y)), upper)
-    reach = np.full(len(y), np.inf)
-    reach[nlp.free] = radius * (nlp.span / nlp.scale)[nlp.free]
-    low, high = np.maximum(lower, y - reach), np.minimum(upper, y + reach)
+def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bounds of the variables around z, (n,) each, and which of them the problem does not have, (2, n). Periodic variables get one more
+    period on either side, so that a bound never stops them; peaks, which have none, a multiple of what they are."""
+    lower, upper = nlp.lower - nlp.period, nlp.upper + nlp.period
+    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(nlp.scale, np.abs(z)), upper)
+    reach = np.full(len(z), np.inf)
+    reach[nlp.free] = radius * nlp.span[nlp.free]
+    low, high = np.maximum(lower, z - reach), np.minimum(upper, z + reach)
     return low, high, np.stack([low > lower, high < upper]) | (nlp.period > 0)
 
 
@@ -295,38 +328,3 @@ def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
     missed = max(solved.violation, task.excess(solved.F))
     value = task.value(solved.F)
     return (missed if missed > tolerance else 0.0, value if np.isfinite(value) else np.inf)
-
-
-@remembered
-def _program(nlp: NLP, settings: _Settings, strategy: tuple[tuple[str, object], ...]) -> Watched:
-    """The program of `_parts` for IPOPT, with these settings and options."""
-    parts, derivatives = _parts(nlp)
-    options = ipopt_options(settings.seconds, settings.max_iterations) | {
-        "ipopt.tol": ACCURACY,
-        "ipopt.acceptable_tol": 100 * ACCURACY,
-        "ipopt.constr_viol_tol": min(1e-8, 0.1 * settings.tolerance),
-        "ipopt.nlp_scaling_method": "none",
-        "ipopt.bound_relax_factor": 0.0,
-    }
-    return Watched("scalarized", parts, options | derivatives | {f"ipopt.{name}": value for name, value in strategy})
-
-
-@remembered
-def _parts(nlp: NLP) -> tuple[dict[str, Any], dict[str, ca.Function]]:
-    """The program in x = (y, a), y the scaled variables, and its derivatives; its parameters are shift, 1 / scale and slope of `_Task`."""
-    refuse_peaks(nlp.problem)
-    n, m = len(nlp.variables), len(nlp.problem.goals)
-    x, p = symbol(nlp, "x", n + 1), symbol(nlp, "p", 3 * m)
-    shift, inverse, slope = ca.vertsplit(p, m)
-    F, g = nlp.functions(origin(nlp) + x[:n] * nlp.scale)
-    above = (F - shift) * inverse
-    blocks = g / nlp.g_scale, above - x[n] * slope, above
-    rows = ca.vertcat(*blocks)
-    # Block by block: a row of an integral is dense, and one sweep for many columns is lost where there is such a row among sparse ones.
-    jacobian = ca.Function("jac_g", [x, p], [rows, ca.vertcat(*(ca.jacobian(block, x) for block in blocks))], ["x", "p"], ["g", "jac_g_x"])
-    check_stopping()
-    lam_f, lam_g = symbol(nlp, "lam_f", 1), symbol(nlp, "lam_g", rows.numel())
-    # The objective is linear.
-    curvature = ca.triu(ca.hessian(ca.dot(lam_g, rows), x)[0])
-    hessian = ca.Function("hess_lag", [x, p, lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"])
-    return {"x": x, "p": p, "f": x[n], "g": rows}, {"jac_g": jacobian, "hess_lag": hessian}

@@ -10,6 +10,7 @@ import numpy as np
 from problems.derived import remembered
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
+from .pieces import jacobian
 
 STATUS_OF_IPOPT = {
     "Infeasible_Problem_Detected": INFEASIBLE,
@@ -53,6 +54,8 @@ def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
     return np.clip(z, nlp.lower, nlp.upper)
 
 
+DENSE = 0.25
+"""Share of the variables that a row is dense with."""
 SAMPLES = 31
 """Number of places where the slopes of objectives are evaluated for their scales."""
 
@@ -71,10 +74,47 @@ def nlp_scales(nlp: NLP) -> np.ndarray:
 
 @remembered
 def gradients(nlp: NLP) -> ca.Function:
-    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse)."""
+    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
     z = symbol(nlp, "z", len(nlp.variables))
     F, g = nlp.functions(z)
-    return ca.Function("gradients", [z], [ca.jacobian(F, z), ca.jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"])
+    return ca.Function("gradients", [z], [ca.jacobian(F, z), _jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"])
+
+
+def _jacobian(rows: Any, z: Any) -> Any:
+    """Derivatives of the rows; dense ones, those of integrals, apart: one sweep for many columns is lost where there is one such row."""
+    counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
+    dense = np.flatnonzero(counts > DENSE * max(z.numel(), 1))
+    if not len(dense) or len(dense) == len(counts):
+        return jacobian(rows, z)
+    sparse = np.setdiff1d(np.arange(len(counts)), dense)
+    blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
+    return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
+
+
+ROUNDS = 5
+"""Of equilibration."""
+LEAST_SCALE, ROW_SCALES = 1e-3, (1e-3, 1e2)
+"""How small the scale of a variable may become, and how small or large that of a row, in their own."""
+
+
+def equilibrated(nlp: NLP, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scales of the variables (n,) and of the rows (r,) by which the largest derivative in each row and each column is near one at z.
+
+    Ruiz, "A scaling algorithm to equilibrate both rows and columns norms in matrices", RAL-TR-2001-034. Bounds may be much wider than what
+    a variable does: its scale may become less than its own, never more.
+    """
+    derivatives = gradients(nlp)(z)[1]
+    sparsity, sizes = derivatives.sparsity(), np.abs(np.array(derivatives.nonzeros()))
+    sizes[~np.isfinite(sizes)] = 0.0
+    i, j = (np.array(index, dtype=int) for index in sparsity.get_triplet())
+    columns, rows = nlp.scale.copy(), nlp.g_scale.copy()
+    for _ in range(ROUNDS):
+        for scales, index, power in ((rows, i, 0.5), (columns, j, -0.5)):
+            largest = np.zeros(len(scales))
+            np.maximum.at(largest, index, sizes * columns[j] / rows[i])
+            scales *= np.where(largest > 0, largest, 1.0) ** power
+    columns = np.clip(columns, LEAST_SCALE * nlp.scale, nlp.scale)
+    return columns, np.clip(rows, ROW_SCALES[0] * nlp.g_scale, ROW_SCALES[1] * nlp.g_scale)
 
 
 def symbol(nlp: NLP, name: str, size: int) -> Any:

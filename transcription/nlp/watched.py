@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from collections.abc import Mapping
+from types import FrameType
 from typing import Any
 
 import casadi as ca
@@ -38,11 +41,20 @@ class Watched:
         self._solver = ca.nlpsol(name, "ipopt", parts, {**options, "iteration_callback": self._watch})
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
-        """The answer, by the names of CasADi."""
-        self._watch.begin()
-        answer = self._solver(**inputs)
-        if self._watch.raised is not None:
-            raise self._watch.raised
+        """The answer, by the names of CasADi. Raises KeyboardInterrupt after Ctrl-C, unless that is handled otherwise."""
+        watch, usual = self._watch, signal.default_int_handler
+        watch.begin()
+        # CasADi would swallow the exception of the usual handler.
+        heard = signal.getsignal(signal.SIGINT) is usual and threading.current_thread() is threading.main_thread()
+        if heard:
+            signal.signal(signal.SIGINT, watch.interrupt)
+        try:
+            answer = self._solver(**inputs)
+        finally:
+            if heard:
+                signal.signal(signal.SIGINT, usual)
+        if watch.raised is not None:
+            raise watch.raised
         return answer
 
     def stats(self) -> dict[str, Any]:
@@ -60,8 +72,12 @@ class _Watch(ca.Callback):
 
     def begin(self) -> None:
         """Begin a solve."""
-        self._asked = time.monotonic()
+        self._asked, self._end = time.monotonic(), False
         self.raised: BaseException | None = None
+
+    def interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Handler of Ctrl-C."""
+        self.raised = KeyboardInterrupt()
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -77,12 +93,11 @@ class _Watch(ca.Callback):
 
     def eval_buffer(self, inputs: Any, outputs: Any) -> int:
         """Ends the solve (1) or not (0)."""
-        end = False
         try:
             now = time.monotonic()
             if now - self._asked >= EVERY:
-                self._asked, end = now, stopping()
-        except BaseException as error:  # Ctrl-C; CasADi would swallow it
-            self.raised, end = error, True
-        np.frombuffer(outputs[0])[0] = float(end)
+                self._asked, self._end = now, stopping()
+        except BaseException as error:  # CasADi would swallow it
+            self.raised = error
+        np.frombuffer(outputs[0])[0] = float(self._end or self.raised is not None)
         return 0

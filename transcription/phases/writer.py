@@ -237,10 +237,12 @@ class PhaseWriter(ABC):
         ]
         rows.add(residual, 0, 0, np.tile([v.scale for v in states], k), names * (k - 1) + last, propagated=True)
 
-    def add_paths(self, rows: Rows, values: ca.MX) -> None:
-        """Add the path constraints, of which `values` (npath, k) are samples."""
+    def add_paths(self, rows: Rows, values: ca.MX, equalities: ca.MX | None = None) -> None:
+        """Add the path constraints, of which `values` (npath, k) are samples; those that are equalities at `equalities` (npath, j) instead,
+        if that is given."""
         for k, limit in enumerate(self.phase.paths):
-            rows.add(values[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+            samples = values if equalities is None or limit.lower < limit.upper else equalities
+            rows.add(samples[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

@@ -183,7 +183,9 @@ class _SimulatedPhase:
     control_excess: np.ndarray
 
     def defect(self, phase: CompiledPhase) -> dict[str, float]:
-        difference = np.abs(self.trajectory.edge_states - self.planned.edge_states) / np.array([v.span for v in phase.states])
+        # At an end of two elements the trajectory has two values where each element is simulated by itself.
+        both = [self.trajectory.edge_states - self.planned.edge_states, self.trajectory.state.ends()[1] - self.planned.edge_states[1:]]
+        difference = np.abs(np.vstack(both)) / np.array([v.span for v in phase.states])
         return {v.name: _or_infinite(amount) for v, amount in zip(phase.states, difference.max(axis=0), strict=True)}
 
     def violations(self, phase: CompiledPhase) -> dict[str, float]:

@@ -16,7 +16,7 @@ import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from synthetic_fronts import black_box, compiled, empty, flights, state_problem
+from synthetic_fronts import black_box, compiled, empty, flights, marked, state_problem
 
 import problems
 from macs import MACS
@@ -718,6 +718,51 @@ def test_csv_names_units_and_keeps_every_bit(tmp_path):
     cells = [line.split(",") for line in lines[1:]]
     assert same(np.array([[float(c) for c in row[:2]] for row in cells]), front.objectives)
     assert same(np.array([[float(c) for c in row[4:]] for row in cells]), front.decision)
+
+
+def test_csv_has_what_a_simulation_found(tmp_path):
+    front = marked(flights(3), [True, False, False], [True, True, False])
+    front.to_csv(tmp_path / "front.csv")
+    lines = (tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()
+    heads = 'defect,"time, simulated [s]","height, simulated [km]","violation, simulated",verified,'
+    assert lines[0].startswith("time [s],height [km],violation,status," + heads)
+    cells = [line.split(",") for line in lines[1:]]
+    assert [row[8] for row in cells] == ["yes", "no", ""] and [row[4] for row in cells] == ["1e-05", "1e-05", ""]
+    assert same(np.array([[float(c) for c in row[5:7]] for row in cells[:2]]), 1.01 * front.objectives[:2])
+    assert cells[2][4:9] == [""] * 5 and [row[7] for row in cells[:2]] == ["1e-06"] * 2
+    assert same(np.array([[float(c) for c in row[9:]] for row in cells]), front.decision)
+
+
+def test_what_a_simulation_found_comes_back(tmp_path):
+    front = marked(flights(3), [True, False, False], [True, True, False]).replace(notes=["", "simulated, its states differ", ""])
+    front.save(tmp_path / "front.nc")
+    again = Front.load(tmp_path / "front.nc")
+    assert_same(front, again)
+    for name in ("defect", "simulated_violation", "simulated_F", "verified"):
+        assert same(getattr(front, name), getattr(again, name))
+    assert [point.verified for point in again] == [True, False, None] and again.stats["verify"] == 1e-3
+    assert again[2].simulated is None and again[0].simulated == front[0].simulated
+    assert again.table() == front.table()
+
+
+@pytest.mark.parametrize("name", ["format1.nc.gz", "format2.nc.gz"])
+def test_points_of_older_files_were_not_simulated(name, tmp_path):
+    (tmp_path / "old.nc").write_bytes(gzip.decompress((Path(__file__).parent / "files" / name).read_bytes()))
+    with pytest.warns(UserWarning, match="checksum"):
+        front = Front.load(tmp_path / "old.nc")
+    assert len(front) and not front.was_simulated.any() and not front.verified.any() and "verify" not in front.stats
+    assert [point.verified for point in front] == [None] * len(front) and "verified" not in front.table()
+    front.save(tmp_path / "new.nc")
+    assert not Front.load(tmp_path / "new.nc").was_simulated.any()
+
+
+@pytest.mark.parametrize("wrong", [None, 0.0, -1.0, "much", True])
+def test_files_whose_points_were_judged_by_nothing_are_refused(wrong, tmp_path):
+    front = marked(flights(2), [True, False])
+    front.stats = {key: value for key, value in front.stats.items() if key != "verify"} | ({} if wrong is None else {"verify": wrong})
+    front.save(tmp_path / "front.nc")
+    with pytest.raises(ValueError, match="may miss"):
+        Front.load(tmp_path / "front.nc")
 
 
 def test_a_phase_may_have_the_name_of_anything_in_the_file(tmp_path):

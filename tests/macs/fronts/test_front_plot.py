@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from synthetic_fronts import black_box, empty, flights
+from synthetic_fronts import black_box, empty, flights, marked
 
 from macs.fronts.pictures.flight_plot import _dense
 from macs.fronts.pictures.style import blank_figure
@@ -47,6 +47,10 @@ def draw(figure: Figure) -> bytes:
         black_box(0, 3),
         black_box(0, 4),
         black_box(2, 4, F=np.ones((2, 4))),
+        marked(flights(3), [False] * 3),
+        marked(flights(3, status=["converged", "infeasible", "failed"]), [True, False, False], [True, True, False]),
+        *(marked(black_box(4, m), [True, False, True, False]) for m in (1, 2, 3, 5)),
+        marked(black_box(3, 5), [False] * 3),
     ],
 )
 def test_every_front_can_be_drawn(front):
@@ -60,6 +64,52 @@ def test_axes_are_labelled_with_units_and_senses():
     assert "best height" in ax.get_legend().get_texts()[1].get_text()
     offsets = ax.collections[0].get_offsets()
     assert np.array_equal(offsets, flights().objectives)
+
+
+def told(ax) -> dict[str, np.ndarray]:
+    """What is drawn as a scatter plot, by its label."""
+    return {drawn.get_label(): np.asarray(drawn.get_offsets()) for drawn in ax.collections}
+
+
+def test_points_that_are_not_verified_are_hollow_and_never_the_best():
+    """The first point has the least time, the last the greatest height; a simulation confirms neither."""
+    front = marked(flights(5), [False, True, True, True, False])
+    assert front.F.argmin(axis=0).tolist() == [0, 4]
+    ax = front.plot()
+    found = told(ax)
+    assert np.array_equal(found["not verified"], front.objectives[[0, 4]])
+    assert np.array_equal(ax.collections[0].get_offsets(), front.objectives[1:4])
+    hollow = next(drawn for drawn in ax.collections if drawn.get_label() == "not verified")
+    assert len(hollow.get_facecolors()) == 0 < len(ax.collections[0].get_facecolors())
+    best = {label: place for label, place in found.items() if label.startswith("best ")}
+    assert sorted(label[-4:] for label in best) == ["(#1)", "(#3)"]
+    assert "not verified" in [text.get_text() for text in ax.get_legend().get_texts()]
+    nothing = told(marked(flights(5), [False] * 5).plot())
+    assert "not verified" in nothing and not any(label.startswith("best ") for label in nothing)
+
+
+def test_points_that_were_not_simulated_are_drawn_in_full():
+    front = marked(flights(3), [False, True, False], [False, True, True])
+    ax = front.plot()
+    assert np.array_equal(ax.collections[0].get_offsets(), front.objectives[:2])
+    assert "not verified" not in told(flights(3).plot())
+
+
+def test_infeasible_and_unverified_points_have_words_of_their_own():
+    front = marked(flights(4, status=["converged", "converged", "infeasible", "converged"]), [True, False, False, True])
+    found = told(front.plot())
+    assert np.array_equal(found["not verified"], front.objectives[[1]]) and np.array_equal(found["not feasible"], front.objectives[[2]])
+
+
+def test_parallel_coordinates_end_where_verified_points_do():
+    """The axes' ends are the best and worst of these; a point that is not verified has a broken line, which may leave them."""
+    F = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 4.0, 2.0, 3.0], [3.0, 2.0, 4.0, 1.0]])
+    ax = marked(black_box(3, 4, F=F), [False, True, True]).plot()
+    lines = {line.get_linestyle(): line.get_ydata() for line in ax.lines if len(line.get_xdata()) == 4}
+    assert sorted(lines) == ["-", "--"] and (lines["--"] > 1.0).all()
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["not verified"]
+    assert [text.get_text() for text in ax.texts] == ["1", "3", "2", "4", "2", "4", "1", "3"]
+    assert black_box(3, 4).plot().get_legend() is None
 
 
 def test_given_axes_are_used_and_style_does_not_leak():

@@ -37,7 +37,7 @@ from transcription.nlp.scalarized import Solved
 MESH = DFET(3, 2)
 BOX = [(0.0, 1.0)] * 5
 SMALL = MACS(agents=4, archive=6)
-POLISHED = MACS(agents=4, archive=6, polish_every=4)
+POLISHED = MACS(agents=4, archive=6, polish_every=4, mesh="fixed")
 
 
 def function(X: np.ndarray) -> np.ndarray:
@@ -399,7 +399,8 @@ def logged(*arguments, **more):
     return found
 
 bilevel.scalarize = logged
-front = MACS(agents=4, archive=6, polish_every=4).solve(load("orbit_rise"), DFET(3, 2), evaluations=160, checkpoint="run.ckpt", seed=1)
+solver = MACS(agents=4, archive=6, polish_every=4, mesh="fixed")
+front = solver.solve(load("orbit_rise"), DFET(3, 2), evaluations=160, checkpoint="run.ckpt", seed=1)
 front.save("front.nc")
 """
 

@@ -121,7 +121,7 @@ def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch)
 
 
 def test_one_evaluation_is_one() -> None:
-    front = MACS().solve(load("goddard"), MESH, evaluations=1, seed=1)
+    front = MACS(mesh="fixed").solve(load("goddard"), MESH, evaluations=1, seed=1)
     assert "MACS, 1 evaluation, seed 1" in front.table()
 
 
@@ -138,7 +138,7 @@ def test_a_start_is_used_and_never_made_worse() -> None:
 def test_a_guess_is_among_the_first() -> None:
     problem = load("orbit_rise")
     problem.phases["rise"].guess(u=1.5, tf=50.0)
-    front = MACS().solve(problem, MESH, evaluations=1, seed=1)
+    front = MACS(mesh="fixed").solve(problem, MESH, evaluations=1, seed=1)
     assert len(front) == 1
     assert front[0].objectives["flight time"] == 50.0
     np.testing.assert_allclose(front[0].trajectory["rise"]["u"], 1.5)

@@ -1,7 +1,7 @@
 """Rayleigh's oscillator with a mixed constraint: a tunnel diode whose current and voltage limit each other.
 
 Augustin and Maurer, "Sensitivity analysis and real-time control of a parametric control problem with mixed constraints", in "Online
-Optimization of Large Scale Systems", 2001; Betts 2010, section 4.11.
+Optimization of Large Scale Systems", 2001; Betts 2010, chapter 4.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Linear tangent steering: the shortest time to a height and a horizontal speed, at a thrust of constant size.
 
 Bryson and Ho, "Applied Optimal Control", 1975, section 2.4; "particle steering" of Dolan, More and Munson, "Benchmarking optimization
-software with COPS 3.0", Argonne ANL/MCS-TM-273, 2004; Betts 2010, example 4.1.
+software with COPS 3.0", Argonne ANL/MCS-TM-273, 2004.
 """
 
 from __future__ import annotations

@@ -1,0 +1,254 @@
+"""Points marked by a simulation: scales, notes, and what is not simulated. x' = u is integrated exactly by every method that is used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from synthetic_fronts import black_box
+
+from macs import MACS, NSGA2, Front, optimize
+from macs.fronts.builders import vectors_points
+from macs.fronts.verified import COARSEST, FINEST, VERIFY, accuracy, objective_scales
+from problems import Problem
+from problems.compiled import Limit, Variable, verified_scale
+from transcription import DFET, SingleShooting
+
+MESH = DFET(2, 1)
+
+
+def cart(of_objective: float | None = None, **limits: float) -> Problem:
+    """x' = u with u in [0, 2] for two seconds; `limits` are those of a hundred times the final x."""
+    problem = Problem("cart")
+    phase = problem.phase("run", t0=0.0, tf=2.0)
+    x = phase.state("x", bounds=(-5, 5), initial=0)
+    u = phase.control("u", bounds=(0, 2))
+    phase.dynamics(x=u)
+    if limits:
+        problem.constraint("enough", 100.0 * phase.final(x), **limits)
+    problem.maximize("distance", phase.final(x), unit="m", scale=of_objective)
+    problem.minimize("effort", phase.integral(u**2), scale=of_objective)
+    return problem
+
+
+def points(problem: Problem, *controls: list[float], method: DFET = MESH) -> Front:
+    """A front of these controls at the nodes, one row a point."""
+    nlp = method.transcribe(problem)
+    Z = nlp.propagate(nlp.first_guess(np.array(controls, dtype=float)))
+    some = {"status": ["converged"] * len(Z), "optimality": [None] * len(Z)}
+    return Front.of(vectors_points(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
+
+
+def constant(*values: float) -> list[list[float]]:
+    """Controls that are constant on `MESH`."""
+    return [[value] * 4 for value in values]
+
+
+def slowed(front: Front, share: float) -> Front:
+    """The same points, but with controls that are less by a share."""
+    changed = []
+    for trajectory in front.trajectories:
+        (phase,) = trajectory.phases
+        control = replace(phase.control, coefficients=(1.0 - share) * phase.control.coefficients)
+        changed.append(replace(trajectory, phases=(replace(phase, control=control),)))
+    return front.replace(trajectories=changed)
+
+
+def test_what_agrees_is_verified():
+    front = points(cart(), *constant(0.5, 1.0, 1.5)).verify()
+    assert front.verified.all() and front.stats["verify"] == VERIFY == 1e-3 and not any(front.notes)
+    assert front.defect == pytest.approx(0.0, abs=1e-9) and front.simulated_violation == pytest.approx(0.0, abs=1e-9)
+    assert front.simulated_F == pytest.approx(front.F, abs=1e-7)
+    fast = next(point for point in front if point.objectives["distance"] > 2.5)
+    assert fast.simulated == pytest.approx({"distance": 3.0, "effort": 4.5}) and fast.verified is True
+    assert "All 3 points are verified" in front.table()
+
+
+# What counts as one
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_objectives_are_judged_by_their_ranges_over_the_front(share, good):
+    """Distances from 1 to 3: the tolerance is a hundredth of that range."""
+    front = points(cart(), *constant(0.5, 1.0, 1.5))
+    found = front.replace(F=front.F - [[0.0, 0.0], [share * 0.02, 0.0], [0.0, 0.0]]).verify(0.01)
+    assert found.verified.tolist() == [True, good, True]
+    assert found.notes[1] == ("" if good else "simulated, its objectives differ by 1.1e-02 of the front's range")
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_an_objective_of_a_stated_scale_is_judged_by_that(share, good):
+    front = points(cart(of_objective=50.0), *constant(0.5, 1.0))
+    found = front.replace(F=front.F - [[0.0, 0.05 * share], [0.0, 0.0]]).verify()
+    assert found.verified.tolist() == [good, True]
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_an_objective_that_hardly_varies_is_judged_by_its_size(share, good):
+    front = points(cart(), *constant(1.0, 1.0 + 1e-9))
+    assert objective_scales(front) == pytest.approx([2.0, 2.0])
+    assert front.replace(F=front.F - [0.0, 0.002 * share]).verify().verified.tolist() == [good, good]
+
+
+@pytest.mark.parametrize(("off", "good"), [(1e-10, True), (1e-8, False)])
+def test_an_objective_near_zero_is_judged_by_how_much_it_varies_within_the_bounds(off, good):
+    """All of its values are 0, or as good as that; anywhere within the bounds it is of the order of 1."""
+    front = points(cart(), [1e-7] * 4)
+    assert 1e-7 < objective_scales(front)[1] < 1e-5
+    assert front.replace(F=[[-2e-7, 2e-14 + off]]).verify().verified.tolist() == [good]
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_states_are_judged_by_the_spans_of_their_bounds(share, good):
+    """After two seconds x, within [-5, 5], is 0.01 times `share` less than planned."""
+    found = slowed(points(cart(of_objective=1e6), *constant(1.0)), 0.005 * share).verify()
+    assert found[0].verified is good and found.defect[0] == pytest.approx(1e-3 * share, rel=1e-6)
+    assert found.notes[0] == ("" if good else "simulated, its states differ by 1.1e-03 of their bounds")
+
+
+@pytest.mark.parametrize("limits", [{"lower": 200.0}, {"lower": 200.0, "upper": 200.0}, {"lower": 200.0, "scale": 0.1}])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_equalities_and_limits_on_one_side_have_at_least_their_size_as_scale(limits, share, good):
+    """By default their scale is 1, and what is 0.2 short of 200 would violate it by 20 %."""
+    found = slowed(points(cart(of_objective=1e6, **limits), *constant(1.0)), 1e-3 * share).verify()
+    assert found[0].verified is good and found.simulated_violation[0] == pytest.approx(1e-3 * share, rel=1e-6)
+    assert found.notes[0] == ("" if good else "simulated, it violates 'constraint 'enough'' by 1.1e-03")
+    assert found[0].simulate().violation > 0.05
+
+
+@pytest.mark.parametrize(
+    ("limit", "scale"),
+    [
+        (Limit("a", -np.inf, -300.0), 300.0),
+        (Limit("a", 0.0, np.inf), 1.0),
+        (Limit("a", 0.0, 0.0, 5.0), 5.0),
+        (Limit("a", 299.0, 300.0), 1.0),
+        (Variable("a", 7.0, 7.0, scale=2.0), 7.0),
+    ],
+)
+def test_the_scale_of_a_limit(limit, scale):
+    assert verified_scale(limit) == scale
+
+
+def test_controls_may_not_leave_their_bounds_between_nodes():
+    """Values at the three Gauss points of one element: the parabola through 2, 2, 1 is more than 2 between the first two."""
+    inside, outside = points(cart(), [1.0, 1.0, 1.0], [2.0, 2.0, 1.0], method=DFET(1, 2)).verify()
+    assert inside.verified and not outside.verified and outside.violation < 1e-9
+    # With nodes at -s, 0 and s, where s^2 = 3 / 5, u = 2 - t / (2 s) - 5 t^2 / 6 is greatest at t = -s / 2.
+    assert outside.simulated_violation == pytest.approx(0.125 / 2.0, rel=1e-2)
+    assert outside.note.startswith("simulated, it violates 'bounds of run.u' by") and ", " not in outside.note.removeprefix("simulated, ")
+
+
+# Marks and notes
+
+
+def test_a_point_that_is_not_feasible_is_not_verified():
+    front = points(cart(), *constant(0.5, 1.0)).replace(status=["converged", "infeasible"])
+    assert front.verify().verified.tolist() == [True, False]
+
+
+def test_a_point_without_a_trajectory_is_not_simulated():
+    front = points(cart(), *constant(0.5, 1.0))
+    found = front.replace(trajectories=[None, front.trajectories[1]], status=["failed", "converged"]).verify()
+    assert [point.verified for point in found] == [None, True]
+    assert found[0].defect is found[0].simulated is found[0].simulated_violation is None
+    assert "failed" in found.table()
+
+
+def test_notes_of_an_earlier_simulation_are_replaced():
+    front = slowed(points(cart(), *constant(1.0)), 0.01).replace(notes=["solved twice"])
+    strict = front.verify()
+    assert strict[0].note.startswith("solved twice; simulated, its states differ by 2.0e-03 of their bounds")
+    loose = strict.verify(0.1)
+    assert loose.verified.all() and loose.notes == ("solved twice",) and loose.stats["verify"] == 0.1
+    again = loose.verify(1e-3)
+    assert again.notes == strict.notes and again.stats == strict.stats
+
+
+def test_an_error_that_grows_by_itself_is_called_unstable():
+    """x' = 40 x + u multiplies what is off in the first element by e^40, whatever the mesh; a mesh that is too coarse is not excused so."""
+    problem = Problem("pole")
+    phase = problem.phase("run", t0=0.0, tf=1.0)
+    x = phase.state("x", bounds=(-2, 2), initial=0.0)
+    u = phase.control("u", bounds=(-100, 100))
+    phase.dynamics(x=40.0 * x + u)
+    problem.minimize("miss", phase.integral((x - 1.0) ** 2 + 1e-4 * u**2))
+    fine, coarse = (optimize(problem, mesh) for mesh in (DFET(20, 5), DFET(3, 1)))
+    assert fine.status == coarse.status == "converged" and fine.verified is coarse.verified is False
+    assert "the dynamics are unstable, and no simulation without feedback can follow them" in fine.note
+    assert "its states differ by" in coarse.note and "unstable" not in coarse.note
+
+
+def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
+    """A wind that changes too fast for the first element, while the second, without thrust, is exact."""
+    problem = Problem("gust")
+    phase = problem.phase("run", t0=0.0, tf=2.0)
+    x = phase.state("x", bounds=(-5, 5), initial=0)
+    u = phase.control("u", bounds=(0, 2))
+    phase.dynamics(x=u * ca.sin(9.0 * phase.time))
+    problem.maximize("distance", phase.final(x))
+    (point,) = points(problem, [2.0, 2.0, 0.0, 0.0]).verify()
+    assert not point.verified and "its states differ by" in point.note and "unstable" not in point.note
+
+
+# What is not simulated
+
+
+def test_black_boxes_are_not_simulated():
+    front = black_box(4)
+    again = front.verify()
+    assert again is front and [point.verified for point in again] == [None] * 4 and "verified" not in again.table()
+
+
+def test_none_means_that_nothing_is_simulated():
+    front = MACS(agents=4, archive=4).solve(cart(), MESH, evaluations=40, seed=1, verify=None)
+    assert len(front) and not front.was_simulated.any() and not front.verified.any() and "verify" not in front.stats
+    assert "defect" not in front.table() and "between nodes" in front.table()
+    assert optimize(cart(), MESH, verify=None).verified is None
+    once = NSGA2(population=4).solve(cart(), SingleShooting(4), evaluations=8, seed=1)
+    assert once.was_simulated.all() and once.verify(None).stats["verify"] == VERIFY
+
+
+@pytest.mark.parametrize("wrong", [0, -1e-3, float("nan"), "much", True])
+def test_a_tolerance_is_a_positive_number(wrong):
+    front = points(cart(), *constant(1.0))
+    for call in (
+        front.verify,
+        lambda verify: MACS().solve(cart(), MESH, evaluations=10**9, verify=verify),
+        lambda verify: optimize(cart(), MESH, verify=verify),
+    ):
+        with pytest.raises(ValueError, match="verify must be a positive number"):
+            call(wrong)
+
+
+@pytest.mark.parametrize(("tolerance", "rtol"), [(1e-3, COARSEST), (1e-5, 1e-9), (1e-9, FINEST), (1.0, COARSEST)])
+def test_the_integrator_is_finer_than_what_it_judges(tolerance, rtol):
+    assert accuracy(tolerance) == pytest.approx((rtol, 0.1 * rtol))
+
+
+# After a search
+
+
+def test_a_search_is_not_lost_if_its_points_cannot_be_simulated(monkeypatch, caplog):
+    def fails(*_, **__):
+        raise RuntimeError("no\nair")
+
+    monkeypatch.setattr("macs.fronts.verified.simulate_all", fails)
+    front = MACS(agents=4, archive=4).solve(cart(), MESH, evaluations=40, seed=1)
+    assert len(front) and not front.was_simulated.any() and "no air" in front.message and "no air" in front.table()
+    assert "the search left it" in caplog.text
+    with pytest.raises(RuntimeError, match="no"):
+        front.verify()
+
+
+def test_tables_set_apart_what_is_not_verified():
+    front = points(cart(), *constant(0.5, 1.0, 1.5))
+    found = front.replace(F=front.F - [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]]).verify()
+    lines = found.table().split("\n")
+    at = lines.index("Not verified: simulated, these differ by more than 0.001.")
+    assert [line.split()[0] for line in lines[at - 3 : at + 2] if line] == ["0", "2", "Not", "1"]
+    assert lines[at + 1].endswith("not verified") and "2 of 3 points are verified." in lines
+    assert "Point 1: simulated, its objectives differ by 5.0e-02 of the front's range." in lines
+    assert "The point is not verified." in found[[1]].table() and "None of 2 points is verified." in found[[1, 1]].table()

@@ -1,0 +1,117 @@
+"""Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_front_polish_back_off import bryson_denham
+
+from macs import MACS, NSGA2, Front, payoff, sweep
+from macs.gradients.front_polish import KEPT_INSIDE
+from problems import Problem, load
+from transcription import DFET, SingleShooting
+
+MESH = DFET(4, 6)
+LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
+"""Seconds up to 10 km with full thrust up, then down: v = (a - g) t1 = (a + g) t2, and v (t1 + t2) / 2 is the height."""
+
+
+@pytest.fixture(scope="module")
+def marked() -> Front:
+    """Three points of the ascent's front; at its least time the polynomials of the thrust's angle leave their bounds."""
+    return sweep(load("goddard"), MESH, points=3)
+
+
+@pytest.fixture(scope="module")
+def mended(marked) -> Front:
+    return marked.mended()
+
+
+def test_a_mesh_that_is_given_is_kept_and_points_are_only_marked(marked):
+    assert marked.verified.tolist() == [False, True, True]
+    assert {point.transcription["settings"]["mesh"] for point in marked} == {None}
+    assert marked.objectives[0, 0] < LEAST - 1e-2, "better than there is"
+
+
+def test_the_least_time_is_mended_to_the_closed_form(marked, mended):
+    assert abs(LEAST - 109.10894511799619) < 1e-9
+    assert len(mended) == 3 and mended.verified.all() and mended.violation.max() < 1e-6
+    assert LEAST - 1e-6 * 141 < mended.objectives[0, 0] < LEAST + 1e-3 * 141
+    assert mended.simulated_F[0, 0] == pytest.approx(LEAST, rel=1e-5)
+    check = mended[0].simulate(rtol=1e-11, atol=1e-12)
+    assert check.max_defect < 1e-3 and check.violation < 1e-3
+
+
+def test_points_that_are_verified_stay_as_they_are(marked, mended):
+    for before, after in zip(list(marked)[1:], list(mended)[1:], strict=True):
+        np.testing.assert_array_equal(before.decision, after.decision)
+        assert before.transcription == after.transcription
+    again = mended.mended()
+    np.testing.assert_array_equal(again.decision, mended.decision)
+    assert again.stats["gradient_solves"] == mended.stats["gradient_solves"]
+
+
+def test_the_work_is_counted(marked, mended):
+    assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"]
+    assert mended.stats["wall_time"] > marked.stats["wall_time"] and mended.stats["verify"] == marked.stats["verify"]
+    assert mended.solver == marked.solver and mended.message == marked.message
+
+
+def test_the_same_bits_again(marked, mended):
+    np.testing.assert_array_equal(marked.mended().F, mended.F)
+
+
+def test_without_time_points_are_left_as_they_are(marked):
+    found = marked.mended(time_limit=1e-9)
+    assert found.verified.tolist() == [False, True, True] and found.stats["stopped"] == "time limit"
+    np.testing.assert_array_equal(found.F, marked.F)
+
+
+def test_ends_keep_their_places_when_they_are_mended():
+    """The first objective is maximised, so that the ends are not in the order of a sorted front; on two elements both miss."""
+    problem = Problem("pendulum")
+    phase = problem.phase("swing", t0=0.0, tf=(3.0, 6.0))
+    x, v = phase.state("x", bounds=(-3, 3), initial=1.0), phase.state("v", bounds=(-3, 3), initial=0.0)
+    u = phase.control("u", bounds=(-0.3, 0.3))
+    phase.dynamics(x=v, v=u - x + x**3 / 6)
+    problem.maximize("end", phase.final(x))
+    problem.minimize("time", phase.tf)
+    problem.default_transcription = "dfet:2x1:bernstein"
+    given, ends = payoff(problem, DFET(2, 1, basis="bernstein")), payoff(problem)
+    assert not given.verified.any() and ends.verified[0] and len(ends) == 2
+    assert ends[0].simulated["end"] > ends[1].simulated["end"] + 1e-3
+    assert ends[1].objectives["time"] == pytest.approx(3.0) and ends[0].objectives["time"] > 3.5
+
+
+def small() -> dict:
+    return {"evaluations": 60, "seed": 1}
+
+
+def test_who_mends():
+    """MACS with gradients does, unless its mesh is fixed; MACS without, `paper()` and the baselines only mark."""
+    problem = load("goddard")
+    marking = [
+        MACS(agents=4, archive=3, mesh="fixed"),
+        MACS(agents=4, archive=3, refine=False),
+        MACS.paper(agents=4, archive=3),
+        NSGA2(population=4),
+    ]
+    for solver in marking:
+        front = solver.solve(problem, DFET(2, 3), **small())
+        assert front.was_simulated.all() and not front.verified.all()
+        assert all(one["settings"]["mesh"] is None for one in front.transcriptions)
+    plain, front = (MACS(agents=4, archive=3, **mesh).solve(problem, DFET(2, 3), **small()) for mesh in ({"mesh": "fixed"}, {}))
+    assert front.verified.sum() > plain.verified.sum() and any(one["settings"]["mesh"] is not None for one in front.transcriptions)
+
+
+def test_points_of_shooting_are_moved_inside_their_limits():
+    """Bryson and Denham's problem, whose least effort at a height l up to 1/6 is 4 / (9 l); three nodes do not see the height between."""
+    rough = MACS(agents=4, archive=4, refine=False).solve(bryson_denham(), SingleShooting(3, control="linear"), evaluations=200, seed=1)
+    again = rough.mended()
+    assert rough.verified.sum() < len(rough) == len(again) and again.verified.all()
+    moved = [point for point in again if KEPT_INSIDE in point.note]
+    assert len(moved) == len(rough) - rough.verified.sum() and again.stats["gradient_solves"] >= len(moved)
+    for point in moved:
+        effort, height = point.simulated.values()
+        assert effort > (1 - 3e-3) * 4 / (9 * height)
+        assert point.transcription["method"] == "SingleShooting"
