@@ -192,9 +192,9 @@ def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
     assert abs(fine.F[0, 0] - value.value) < 1e-3
 
 
-def searched(problem: Problem, wanted: Wanted, coarse=COARSE):
+def searched(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float | None = None):
     compiled = problem.compile()
-    loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_solves=60)
+    loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_work)
     m = len(compiled.goals)
     reference = np.where(np.arange(m) == 0, 0.0, np.inf)
     found = found_optimum(loop, reference, np.eye(m)[0], lambda nlp: None, 1, np.random.default_rng(0), coarse)
@@ -222,12 +222,12 @@ def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
     assert found.good and loop.solves.counts.failures
 
 
-def test_work_ends_with_the_solves_that_are_granted():
-    problem = layers(1.5, 1.0, 50.0, 50.0)
-    compiled = problem.compile()
-    loop = MeshLoop(Programs(compiled), GradientSolves(1e-8), Wanted(1e-9, 1e-6), 8, most_solves=3)
-    found = found_optimum(loop, np.zeros(1), np.ones(1), lambda nlp: None, 1, np.random.default_rng(0))
-    assert not found.good and "change" in found.note and 3 <= loop.solves.counts.gradient_solves <= 4
+def test_work_ends_where_it_is_to_end():
+    problem, wanted = layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6)
+    whole, free = searched(problem, wanted)
+    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.work)
+    assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
+    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.work < 0.8 * free.solves.work
 
 
 def test_programs_of_earlier_meshes_are_not_kept():
