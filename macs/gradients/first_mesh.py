@@ -24,9 +24,9 @@ from .multistart import GradientSolves, MultistartSolver, guessed_start
 
 COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
-PART = 10.0
+PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
-MESHES = 3
+MESHES = 5
 """Most meshes of one end."""
 MOST = 40
 """Most elements of a phase: a search evaluates its mesh thousands of times."""
@@ -72,7 +72,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
     limits = PART * verify
-    job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+    job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go()
     counts = solver.counts.joined(job.solves.counts)
     fine = [found.best.method for found in job.found.values()]

@@ -18,7 +18,7 @@ from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objec
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED, TIMEOUT
+from ..evaluation.evaluator import CONVERGED
 from .multistart import GradientSolves
 from .tasks import Task
 
@@ -149,10 +149,21 @@ class MeshLoop:
         Largest number of meshes for each point.
     most_work : float, optional
         Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
+    knots : bool
+        Whether edges may move to the switches of controls, where meshes then suit one point alone.
     """
 
-    def __init__(self, programs: Programs, solves: GradientSolves, wanted: Wanted, limit: int, most_work: float | None = None) -> None:
+    def __init__(
+        self,
+        programs: Programs,
+        solves: GradientSolves,
+        wanted: Wanted,
+        limit: int,
+        most_work: float | None = None,
+        knots: bool = True,
+    ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
+        self._knots = knots
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
@@ -198,7 +209,7 @@ class MeshLoop:
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
-            for method, better in self._proposals(present, waiting, detours > 0):
+            for method, better in self._proposals(present, waiting, self._knots and detours > 0):
                 try:
                     reached, last = self._solved(method, present, task, others, least)
                 except Stopped:
@@ -254,14 +265,11 @@ class MeshLoop:
 
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
-        try:
-            nlp = self.programs(method)
-            z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-            if status != CONVERGED:
-                return None, status
-            reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
-        except Stopped:
-            return None, TIMEOUT
+        nlp = self.programs(method)
+        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
+        if status != CONVERGED:
+            return None, status
+        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
         # On the same mesh nothing can be seen of what that has wrong.
         same = method == present.method
         return replace(reached, change=np.inf if same else _change(present, F, task, self.wanted.settled)), status

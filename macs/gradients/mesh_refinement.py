@@ -80,16 +80,24 @@ class FrontRefinement:
         The points to be refined; default: all that converged.
     most_work : float, optional
         Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
+    knots : bool
+        See `MeshLoop`.
     """
 
     def __init__(
-        self, front: Points, wanted: Wanted, limit: int, chosen: Sequence[int] | None = None, most_work: float | None = None
+        self,
+        front: Points,
+        wanted: Wanted,
+        limit: int,
+        chosen: Sequence[int] | None = None,
+        most_work: float | None = None,
+        knots: bool = True,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work)
+        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
