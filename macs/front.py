@@ -55,11 +55,11 @@ class Front(Points):
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
         Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, by the simulated
-        objectives, and by their change from mesh to mesh. Elements are split where the solution is not smooth; elsewhere states and controls
-        get a higher order; elements that are not needed become one. Where controls switch, elements end, and these ends move. Controls that
-        leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a point is
-        solved from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along the front;
-        an end of the front is solved as such, and where ends move far, the points between them keep their places between these.
+        objectives, and by their change from mesh to mesh. Elements are split where the solution is not smooth; elsewhere states and
+        controls get a higher order; elements that are not needed become one. Where controls switch, elements end, and these ends move.
+        Controls that leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a
+        point is solved from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along
+        the front; an end of the front is solved as such, and where ends move far, the points between them keep their places between these.
 
         Parameters
         ----------

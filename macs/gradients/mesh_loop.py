@@ -216,7 +216,7 @@ class MeshLoop:
                     # In the middle of it: the point stays on its best mesh so far.
                     break
                 found.meshes.append(method)
-                if better and reached is not None and reached.verdict.error > max(1.0, present.verdict.error):
+                if better and reached is not None and not self._improves(reached, present, task, least):
                     reached = None
                 status = status or last
                 if reached is not None or self.ended or not detours:
@@ -228,16 +228,27 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
-            found.best = min((found.best, present), key=lambda one: (bool(one.complaints()), one.error))
-            history.append(present.error)
-            if not present.complaints():
+            found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
+            history.append(self._rank(present, task, least)[1])
+            if not self._rank(present, task, least)[0]:
                 break
             if len(history) > PATIENCE and min(history[-PATIENCE:]) > PROGRESS * min(history[:-PATIENCE]):
                 found.trouble = "finer meshes do not help"
                 break
         beyond = task.loss(found.best.F) - least
-        found.worse = beyond if beyond > 2.0 * self.wanted.settled else 0.0
+        found.worse = beyond if beyond > self.wanted.settled else 0.0
         return found
+
+    def _rank(self, one: OnMesh, task: Task, least: float) -> tuple[bool, float]:
+        """Whether something is wrong with a point, and its largest error, in units of what it may be; what it is worse than what was
+        achieved counts like an error of its objectives."""
+        beyond = (task.loss(one.F) - least) / self.wanted.settled
+        return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
+
+    def _improves(self, reached: OnMesh, present: OnMesh, task: Task, least: float) -> bool:
+        """Whether a mesh with knots is one to go on with: its errors are not larger, and its optimum is no worse than what was achieved."""
+        errors = reached.verdict.error <= max(1.0, present.verdict.error)
+        return errors and task.loss(reached.F) <= least + self.wanted.settled
 
     def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[tuple[Meshed, bool]]:
         """The next mesh, and others to be tried where no solve converges on it; each with whether it must be an improvement to be taken."""

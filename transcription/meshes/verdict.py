@@ -23,7 +23,7 @@ order."""
 ATTAINABLE = 1e-11
 """Error of an element, in scales, that cannot be undercut: where that, grown along the trajectory, is more than the tolerance, no mesh
 helps."""
-OPTIMISM = 10.0
+OPTIMISM = 3.0
 """A trajectory that is feasible only within the tolerance may have objectives that are too low by so many times its violation."""
 HARDLY = 1e-2
 """An element's share of the defect of the whole below which it is worth finding out whether errors grow."""
