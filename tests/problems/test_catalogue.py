@@ -64,7 +64,7 @@ def test_every_case_loads_compiles_and_names_its_defaults(name):
     assert len(problem.compile().goals) >= (1 if name.startswith(("betts", "standard/")) else 2)
     assert describe(name) and "\n" not in describe(name)
     parse(problem.default_transcription or "dfet:8x3:bernstein").transcribe(problem)
-    assert problem.default_evaluations > 0 and problem.verify_tolerance > 0
+    assert problem.default_evaluations > 0 and problem.default_verify > 0
     assert load(name).compile().fingerprint == problem.compile().fingerprint
 
 
