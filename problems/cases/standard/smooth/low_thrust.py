@@ -24,11 +24,11 @@ START = {"p": 21837080.052835, "f": 0.0, "g": 0.0, "h": -0.25396764647494, "k": 
 BOUNDS = {"p": (1e7, 6e7), "f": (-0.2, 0.2), "g": (-0.1, 1.0), "h": (-1.0, 1.0), "k": (-0.2, 0.2), "L": (pi, 20 * pi), "w": (0.01, 2.0)}
 FINAL_P, FINAL_E, FINAL_I = 40007346.015232, 0.73550320568829, 0.61761258786099
 """Semi-latus rectum, eccentricity, and the tangent of half the inclination, at the end."""
-GUESSED_TIME, GUESSED_FACTOR = 90000.0, -9.09081
+GUESSED_TIME, GUESSED_FACTOR = 86810.0, -25.0
 
 
 def problem() -> Problem:
-    """The guess is a flight with the thrust along the velocity."""
+    """The guess is that of Betts and PSOPT: a flight with the thrust along the velocity."""
     problem = Problem("low_thrust")
     factor = problem.parameter("throttle", bounds=(-50.0, 0.0))
     transfer = problem.phase("transfer", t0=0.0, tf=(50000.0, 100000.0))
