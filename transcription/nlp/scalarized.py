@@ -55,7 +55,7 @@ COMMON: Options = (
     ("mumps_pivot_order", 0),
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
-ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.3)
+ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
     (("mu_init", 1e-4), ("bound_push", 1e-4), ("bound_frac", 1e-4), ("slack_bound_push", 1e-4), ("slack_bound_frac", 1e-4)),
@@ -64,10 +64,10 @@ NEAR = _Strategy(
     held=True,
 )
 """Stays in the basin of a feasible start."""
-MONOTONE = _Strategy((("mu_init", 0.1),), share=0.4)
-"""A barrier that only falls: slower, and not misled by constraints of which many are active at once."""
 UNSCALED = _Strategy((("mu_strategy", "adaptive"),), share=0.3, equilibrated=False)
 """In the scales of the problem, where the derivatives at the start say little about those at the optimum."""
+MONOTONE = _Strategy((("mu_init", 0.1),), share=0.46)
+"""A barrier that only falls: slower, and not misled by constraints of which many are active at once."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,7 +201,7 @@ def scalarize(
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     found: list[Solved] = []
-    for strategy in (ADAPTIVE, NEAR, MONOTONE) if feasible else (ADAPTIVE, MONOTONE, UNSCALED):
+    for strategy in (ADAPTIVE, NEAR, MONOTONE) if feasible else (ADAPTIVE, UNSCALED, MONOTONE):
         share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
         if sum(solved.iterations for solved in found) + share > max_iterations:
             break
