@@ -205,7 +205,9 @@ def scalarize(
         share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
         if sum(solved.iterations for solved in found) + share > max_iterations:
             break
-        found.append(_unstuck(nlp, task, start, replace(settings, max_iterations=share), strategy))
+        # What is feasible and ran out of iterations goes on, scaled anew.
+        going = [solved.z for solved in found if solved.message == AT_LIMIT and not feasible and _rank(task, solved, tolerance)[0] == 0.0]
+        found.append(_unstuck(nlp, task, going[-1] if going else start, replace(settings, max_iterations=share), strategy))
         worse = feasible and task.value(found[-1].F) > tolerance
         if found[-1].clocked or (found[-1].status == CONVERGED and not worse):
             break
