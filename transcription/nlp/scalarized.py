@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
+from .optimality import optimality
 from .program import Options, program_parameters, solver
 from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, nlp_scales, origin
 
@@ -28,6 +29,8 @@ SLACK = 1e-2
 runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge."""
 AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
+USEFUL = 1e-6
+"""Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended."""
 AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -87,7 +90,7 @@ class Solved:
     iterations : int
         Of IPOPT, by all strategies together.
     message : str
-        Why the solve ended where it did not converge: the limit that was reached, or what IPOPT says.
+        Why the solve ended where it did not converge by itself: the limit that was reached, or what IPOPT says.
     clocked : bool
         Whether a clock ended any of the work: then the same solve need not give the same again.
     begun : bool
@@ -215,6 +218,11 @@ def scalarize(
     iterations = sum(solved.iterations for solved in found)
     ended = best.status != CONVERGED and found[-1].message == AT_LIMIT
     message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
+    if best.status == FAILED and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
+        # Of several objectives, the certificate would not know which was asked for.
+        residual = optimality(nlp, best.z)
+        if residual <= USEFUL:
+            best, message = replace(best, status=CONVERGED), f"{message}; the conditions of optimality hold to {residual:.0e}"
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
 
 
