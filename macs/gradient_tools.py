@@ -252,9 +252,9 @@ class _Job:
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             try:
                 if not self.fixed:
-                    found, costs_so_far = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
-                    self.solves.counts = costs_so_far
-                    self.begin(found)
+                    chosen = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
+                    self.solves.counts = chosen.counts
+                    self.begin(chosen.fine or chosen.search)
                 front = work()
             except Stopped as reason:
                 self._stopped = str(reason)

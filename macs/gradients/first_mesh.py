@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,17 +41,35 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
     return COARSE if word is None else parse(word)
 
 
-def search_transcription(
-    problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float
-) -> tuple[Transcription, Counts]:
-    """The problem's own default, or the transcription of `found_mesh`; and what it cost."""
+@dataclass(frozen=True)
+class Chosen:
+    """Where a problem is solved for which no transcription is given.
+
+    Attributes
+    ----------
+    search : Transcription
+        For the candidates of a search: cheap.
+    fine : Meshed or None
+        A finer mesh, where one is needed for points that a simulation confirms.
+    counts : Counts
+        What it cost to find out.
+    """
+
+    search: Transcription
+    fine: Meshed | None
+    counts: Counts
+
+
+def search_transcription(problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float) -> Chosen:
+    """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
-        return parse(problem.default_transcription), Counts()
-    return found_mesh(compiled, verify, tolerance)
+        return Chosen(parse(problem.default_transcription), None, Counts())
+    fine, counts = found_mesh(compiled, verify, tolerance)
+    return Chosen(COARSE, None if fine == COARSE else fine, counts)
 
 
-def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Transcription, Counts]:
-    """DFET on a mesh for a search, and what it cost to find.
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
+    """DFET on a mesh for all points of a front, and what it cost to find.
 
     Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
     simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
@@ -85,7 +104,7 @@ def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: floa
     return bool(verified(ends, limits).verified.all()) and max(moved, default=0.0) <= limits
 
 
-def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Transcription:
+def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:
     """DFET on one mesh that has the elements and degrees of several."""
     meshes = {phase.name: _together([method.mesh_of(phase.name) for method in methods]) for phase in problem.phases}
     basis = "lobatto" if all(getattr(method, "basis", "") == "lobatto" for method in methods) else COARSE.basis

@@ -22,23 +22,24 @@ from ..io.console import working
 from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
 
-PART = 0.1
+PART = 0.3
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
 EVALUATION, SOLVE = 0.15, 20.0
 """What an evaluation and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-SHARE, LEAST = 0.3, 60.0
+SHARE, LEAST = 0.3, 1000.0
 """What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 
-def mended(points: Points, time_limit: float | None, progress: bool | None) -> Points:
-    """The front of the points of which those that are not verified have been solved again; see `Front.mended`."""
-    again = solved_again(points, time_limit, progress)
+def mended(points: Points, time_limit: float | None, progress: bool | None, first: Sequence[Meshed] = ()) -> Points:
+    """The front of the points of which those that are not verified have been solved again, on the meshes `first`, if there are any; see
+    `Front.mended`."""
+    again = solved_again(points, time_limit, progress, first)
     return again[best_rows(again)].sorted()
 
 
-def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None) -> Points:
+def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, first: Sequence[Meshed] = ()) -> Points:
     """The points in their order, of which those that are not verified have been solved again."""
     points.compiled()
     missing = np.flatnonzero(points.was_simulated & ~points.verified & (points.status == CONVERGED)).tolist()
@@ -49,8 +50,9 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
     with working(time_limit, progress) as (show, interrupts):
         again = points
         if meshed:
-            wanted = Wanted(PART * verify, feasible=PART * verify, leaving=PART * verify, objectives=PART * verify)
-            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed))
+            limits = PART * verify
+            wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
+            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed), first=first)
             job.go(show)
             again = job.points(0.0, interrupts.reason)
         others = [i for i in missing if i not in meshed and points.simulated_violation[i] > verify]

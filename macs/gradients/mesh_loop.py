@@ -86,11 +86,14 @@ class OnMesh:
     @property
     def error(self) -> float:
         """The largest error, or change from the mesh before, in units of what it may be."""
-        return max(self.verdict.error, self.change / self.verdict.wanted.settled)
+        wanted = self.verdict.wanted
+        return max(self.verdict.error, self.change / wanted.settled if wanted.confirmed else 0.0)
 
     def complaints(self) -> list[str]:
         """Reasons why the point is not good enough; empty if it is."""
         found = self.verdict.complaints()
+        if not self.verdict.wanted.confirmed:
+            return found
         if np.isinf(self.change):
             found.append("it was not solved on a finer mesh")
         elif not self.change <= self.verdict.wanted.settled:

@@ -82,6 +82,8 @@ class FrontRefinement:
         Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
     knots : bool
         See `MeshLoop`.
+    first : sequence of Meshed
+        Meshes that are tried first, for all points.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class FrontRefinement:
         chosen: Sequence[int] | None = None,
         most_work: float | None = None,
         knots: bool = True,
+        first: Sequence[Meshed] = (),
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
@@ -99,6 +102,7 @@ class FrontRefinement:
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
         self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
+        self._first = first
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -202,7 +206,7 @@ class FrontRefinement:
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
         hints = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
         # Rough controls would need finer meshes than optimal ones.
-        hints = hints if known or hints else [self.methods[i]]
+        hints = [*self._first, *(hints if known or hints or self._first else [self.methods[i]])]
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self._rows[i] = self._row(i, found.best, found.note)
 

@@ -14,6 +14,7 @@ from transcription.catalogue import parse
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
+from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
 from ..pareto import archive as archives
 from ..pareto import directions
@@ -112,7 +113,12 @@ class MACS(Settings, Solver):
         if not solves.stopped:
             state.polishing = None
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None) -> Front:
+    @property
+    def mends(self) -> bool:
+        """Whether points that a simulation does not confirm are solved again."""
+        return self.mesh == "mended" and self.refines
+
+    def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
         if self.polish_on is not None:
@@ -128,9 +134,9 @@ class MACS(Settings, Solver):
             refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
             return refined[best_rows(refined)]
         marked = front.verify(verify)
-        if self.mesh == "fixed" or not self.refines or verify is None:
+        if not self.mends or verify is None:
             return marked
-        return marked.mended(progress=progress)
+        return Front.of(mended(marked, None, progress, [] if fine is None else [fine]))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

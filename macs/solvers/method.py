@@ -11,7 +11,7 @@ import numpy as np
 
 from problems.checks import short_repr
 from problems.compiled import CompiledProblem
-from transcription.base import Transcription
+from transcription.base import Meshed, Transcription
 
 from ..evaluation.evaluator import Evaluator
 from ..front import Front
@@ -77,10 +77,16 @@ class SearchMethod(ABC):
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None) -> Front:
+    @property
+    def mends(self) -> bool:
+        """Whether `finish` solves points again that a simulation does not confirm."""
+        return False
+
+    def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
         """The front, marked by a simulation of its points unless `verify` is None, after further work.
 
-        Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too.
+        Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too. `fine` is a
+        finer mesh on which points are solved again first, if there is one.
         """
         return front.verify(verify)
 

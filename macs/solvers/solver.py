@@ -123,11 +123,13 @@ class Solver(SearchMethod):
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
-        earlier = Counts()
+        earlier, fine = Counts(), None
         with Interrupts(time_limit) as interrupts:
             try:
                 if transcription is None:
-                    transcription, earlier = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
+                    chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
+                    earlier, fine = chosen.counts, chosen.fine if self.mends else None
+                    transcription = chosen.search if self.mends else chosen.fine or chosen.search
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
             except Stopped as reason:
                 costs_so_far = costs(
@@ -138,7 +140,7 @@ class Solver(SearchMethod):
             front = run.go(None, progress, callback, checkpoint)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
-                return self.finish(front, verify, progress) if front.stats["stopped"] in ENDED else front.verify(verify)
+                return self.finish(front, verify, progress, fine) if front.stats["stopped"] in ENDED else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:

@@ -43,12 +43,15 @@ class Wanted:
         The same for controls between nodes.
     objectives : float, optional
         Largest error of an objective, in its unit; by default `COST` tolerances.
+    confirmed : bool
+        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does.
     """
 
     tolerance: float
     feasible: float
     leaving: float = 0.0
     objectives: float | None = None
+    confirmed: bool = True
 
     @property
     def settled(self) -> float:
