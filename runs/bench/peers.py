@@ -19,6 +19,7 @@ import numpy as np
 from macs import optimize
 from macs.io.console import Steps
 from problems import Problem, load
+from problems.cases.standard.phases import delta_iii as launcher
 from transcription import parse
 
 from . import peers_rockit
@@ -69,12 +70,31 @@ def goddard() -> Problem:
     return problem
 
 
+def delta_iii() -> Problem:
+    """The Delta III with the guess of YAPSS: round the earth at a steady rate, from the pad to the perigee; velocities on a line."""
+    problem = load("standard/delta_iii")
+    phases = list(problem.phases.values())
+    ends = np.array([list(launcher.START.values()), list(launcher.perigee().values())])
+    place, speed = ends[:, :3], ends[:, 3:]
+    radius = np.linalg.norm(place, axis=1)
+    latitude, longitude = np.arcsin(place[:, 2] / radius), np.arctan2(place[:, 1], place[:, 0])
+    edges = launcher.TIMES
+    for phase, first, last in zip(phases, edges[:-1], edges[1:], strict=True):
+        t = np.linspace(first, last, 9)
+        r, phi, lam = (np.interp(t, [0.0, edges[-1]], pair) for pair in (radius, latitude, longitude))
+        way = (r * np.cos(phi) * np.cos(lam), r * np.cos(phi) * np.sin(lam), r * np.sin(phi))
+        pace = [np.interp(t, [0.0, edges[-1]], pair) for pair in speed.T]
+        phase.guess(**{axis: (t, along) for axis, along in zip(("x", "y", "z", "vx", "vy", "vz"), (*way, *pace), strict=True)})
+    phases[-1].guess(tf=edges[-1])
+    return problem
+
+
 def _standard(name: str, **data: bool) -> Callable[[], Problem]:
     return lambda: load(f"standard/{name}", **data)
 
 
 EXAMPLES = (
-    Example("Delta III", _standard("delta_iii"), "dfet:5x4", "delta_iii_ascent"),
+    Example("Delta III", delta_iii, "dfet:5x4", "delta_iii_ascent"),
     Example("minimum time to climb", _standard("climb"), "dfet:15x4", "minimum_time_to_climb"),
     Example("Goddard, one phase", goddard, "dfet:20x4", "goddard_problem_1_phase", rockit=peers_rockit.goddard),
     Example("Goddard, three phases", _standard("sounding_rocket", constrained=True), "dfet:6x4", "goddard_problem_3_phase"),

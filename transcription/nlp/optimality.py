@@ -109,13 +109,18 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarr
 
 def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
     """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it."""
-    solution = factors.solve(right)
+    solution = _each(factors, right)
     for _ in range(REFINEMENTS):
         left = right - matrix @ solution
         if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
             break
-        solution += factors.solve(left)
+        solution += _each(factors, left)
     return solution
+
+
+def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
+    """The solution for each column by itself: for all at once, BLAS starts threads for every small block, which wait for each other."""
+    return np.stack([factors.solve(column) for column in right.T], axis=1) if right.shape[1] else right
 
 
 def _least(A: np.ndarray, slack: np.ndarray) -> float:

@@ -34,7 +34,7 @@ def problem() -> Problem:
     """The guess stays on the pad for two phases and is in orbit, at its perigee, for the others."""
     problem = Problem("delta_iii")
     total = 9 * BOOSTER[0] + FIRST[0] + SECOND[0] + PAYLOAD
-    goal = _perigee()
+    goal = perigee()
     phases: list[Phase] = []
     for i, (boosters, name) in enumerate(((6, "six boosters"), (3, "three boosters"), (0, "first stage"), (None, "second stage"))):
         engines = [(1, SECOND)] if boosters is None else [(boosters, BOOSTER), (1, FIRST)]
@@ -90,7 +90,7 @@ def _elements(place: list[ca.MX], speed: list[ca.MX]) -> dict[str, ca.MX]:
     }
 
 
-def _perigee() -> dict[str, float]:
+def perigee() -> dict[str, float]:
     """Place and velocity at the perigee of the orbit."""
     size, e, inclination, node, perigee = ORBIT.values()
     out = (cos(node), sin(node), 0.0)
