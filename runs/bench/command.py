@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import inner, population, search, standard, study
+from . import inner, peers, population, search, standard, study
 from .measured import Row, save
 
-BENCHMARKS = {"inner": inner, "population": population, "search": search, "standard": standard, "study": study}
+BENCHMARKS = {"inner": inner, "peers": peers, "population": population, "search": search, "standard": standard, "study": study}
 KINDS = tuple(BENCHMARKS)
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
@@ -37,6 +37,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
+        "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
         "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),

@@ -134,7 +134,8 @@ def _contenders(example: Example) -> Iterator[tuple[str, Callable[[], float]]]:
 
 def _ours(example: Example) -> float:
     """The optimum as this program finds it; not a number where it does not converge."""
-    point = optimize(example.problem(), parse(example.word))
+    # Without a simulation, which the others do not make either.
+    point = optimize(example.problem(), parse(example.word), verify=None)
     return next(iter(point.objectives.values())) if point.status == "converged" else np.nan
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from math import pi
 from typing import Any
 
@@ -10,8 +11,7 @@ import casadi as ca
 
 def _solved(ocp: Any, objective: Any, elements: int) -> float:
     """The optimum of what is to be minimised."""
-    import rockit
-
+    rockit = import_module("rockit")
     ocp.add_objective(objective)
     ocp.solver("ipopt", {"ipopt.print_level": 0, "print_time": False})
     ocp.method(rockit.DirectCollocation(N=elements))
@@ -20,8 +20,7 @@ def _solved(ocp: Any, objective: Any, elements: int) -> float:
 
 def goddard() -> float:
     """Height of Goddard's rocket, in one phase; mass and height in units near one."""
-    import rockit
-
+    rockit = import_module("rockit")
     ocp = rockit.Ocp(t0=0, T=rockit.FreeTime(40))
     h, v, m, thrust = ocp.state(scale=18000), ocp.state(scale=800), ocp.state(scale=3), ocp.control(scale=193.044)
     drag = 5.49153484923381010e-05 * v**2 * ca.exp(-h / 23800.0)
@@ -32,7 +31,7 @@ def goddard() -> float:
     ocp.subject_to(ocp.at_tf(m) == 1)
     for value, low, high in ((h, 0, 30000), (v, 0, 15000), (m, 1, 3), (thrust, 0, 193.044)):
         ocp.subject_to(low <= (value <= high))
-    ocp.subject_to(20 <= (ocp.T <= 100))
+    ocp.subject_to((ocp.T <= 100) >= 20)
     for value, guess in ((h, 400 * ocp.t), (v, 400), (m, 2), (thrust, 90)):
         ocp.set_initial(value, guess)
     return -_solved(ocp, -ocp.at_tf(h), 40)
@@ -40,8 +39,7 @@ def goddard() -> float:
 
 def orbit_raising() -> float:
     """Radius of the final orbit."""
-    import rockit
-
+    rockit = import_module("rockit")
     ocp = rockit.Ocp(t0=0, T=3.32)
     r, vr, vt = (ocp.state() for _ in range(3))
     ur, ut = ocp.control(order=1), ocp.control(order=1)
@@ -60,8 +58,7 @@ def orbit_raising() -> float:
 
 def isoperimetric() -> float:
     """The largest area within a closed curve of length 1."""
-    import rockit
-
+    rockit = import_module("rockit")
     ocp = rockit.Ocp(t0=0, T=1)
     x, y = ocp.state(), ocp.state()
     angle = ocp.control(order=1)
@@ -79,15 +76,14 @@ def isoperimetric() -> float:
 
 def newton() -> float:
     """Least drag of Newton's nose, with a flat front."""
-    import rockit
-
+    rockit = import_module("rockit")
     ocp = rockit.Ocp(t0=rockit.FreeTime(0.3), T=rockit.FreeTime(0.7))
     y, slope = ocp.state(), ocp.control(order=1)
     ocp.set_der(y, -slope)
     ocp.subject_to(ocp.at_t0(y) == 1)
     ocp.subject_to(ocp.at_tf(y) == 0)
     ocp.subject_to(ocp.t0 + ocp.T == 1)
-    ocp.subject_to(0.01 <= (ocp.t0 <= 0.99))
-    ocp.subject_to(0 <= (slope <= 20))
+    ocp.subject_to((ocp.t0 <= 0.99) >= 0.01)
+    ocp.subject_to((slope <= 20) >= 0)
     ocp.set_initial(slope, 1)
     return _solved(ocp, ocp.integral(8 * ocp.t / (1 + slope**2)) + 4 * ocp.t0**2, 40)

@@ -106,6 +106,17 @@ def test_in_trajectories_of_other_meshes_the_edges_begin_where_the_mesh_has_them
     assert same.state(same.state.edges) == pytest.approx(flight["swing"].state(same.state.edges), abs=1e-10)
 
 
+def test_a_mesh_is_found_in_trajectories_of_its_own_only():
+    mesh = PhaseMesh(EDGES, 3, None, MOVING)
+    own = np.array([0.0, 0.2, 0.35, 0.5, 1.0])
+    assert mesh.found_in(3.0 + 2.0 * own).edges == pytest.approx(own, abs=1e-12)
+    assert mesh.found_in(own).ranges() != pytest.approx(mesh.ranges())
+    other, beyond = own.copy(), own.copy()
+    other[2], beyond[[2, 3]] = 0.4, (0.585, 0.97)
+    for edges in (other, beyond, own[[0, 1, 3, 4]], 0.0 * own):
+        assert mesh.found_in(edges) is mesh
+
+
 def test_a_settled_method_begins_where_the_edges_of_a_trajectory_are():
     method = moving()
     nlp = method.transcribe(oscillator())

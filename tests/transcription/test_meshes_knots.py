@@ -15,7 +15,7 @@ from macs import optimize
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, parse
-from transcription.meshes.knots import knots, on_bounds, phase_switches, switched, with_knots
+from transcription.meshes.knots import knots, next_mesh, on_bounds, phase_switches, switched, with_knots
 from transcription.meshes.switches import INSIDE, LOWER, UPPER, Switch
 from transcription.nlp.scalarized import scalarize
 from transcription.phases.mesh import PhaseMesh
@@ -164,17 +164,14 @@ def test_nothing_is_proposed_where_nothing_switches_or_moves():
     assert phase_switches(crude.trajectory["fall"])["u"] and switched(Euler(20), landing, crude.trajectory) is None
 
 
-def test_a_phase_of_no_length_and_one_that_switches():
+def test_a_phase_of_no_length_has_no_switches():
     problem, *_ = moon_landing()
-    wait = problem.phase("wait", t0=0.0, tf=(0.0, 5.0))
-    x, u = wait.state("x", bounds=(-1, 1), initial=0), wait.control("u", bounds=(0, 1))
-    wait.dynamics(x=u)
-    problem.constraint("no time", wait.tf, upper=0.0)
-    method = DFET(6, 4)
-    point = optimize(problem, method)
-    assert point.trajectory["wait"].tf == 0.0 and x is not None
-    proposed = switched(method, problem, point.trajectory)
-    assert list(proposed.meshes) == ["fall"] and len(proposed.mesh_of("fall").moving) == 1
+    flight = optimize(problem, DFET(6, 4)).trajectory["fall"]
+    still = replace(
+        flight, state=replace(flight.state, edges=0 * flight.state.edges), control=replace(flight.control, edges=0 * flight.state.edges)
+    )
+    assert next_mesh(DFET(6, 4), problem.compile().phases[0], flight, NOTHING) is not None
+    assert next_mesh(DFET(6, 4), problem.compile().phases[0], still, NOTHING) is None
 
 
 def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
@@ -255,31 +252,56 @@ def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word
     assert x is not None
     found, method = followed(problem, parse(word), rounds=1)
     exact = 4 / (9 * wall)
-    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=1e-7)
+    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=3e-6)
     # The effort depends on the places to the third order.
     edges = np.array(method.settled(found[1][1]).mesh_of("move").edges)
     assert edges[list(method.mesh_of("move").moving)] == pytest.approx([3 * wall, 1 - 3 * wall], abs=2e-3)
     assert not method.mesh_of("move").constant
     simulation = simulate(problem.compile(), found[1][1])
-    assert simulation.max_defect < 1e-9 and simulation.violation < 1e-8
+    assert simulation.max_defect < 1e-7 and simulation.violation < 1e-6
 
 
-def test_a_control_that_leaves_its_bound_gradually_is_no_optimum():
-    """Where all controls are free from the beginning, the solver stops with a dose that fades out, and a worse tumour."""
-    problem = tumour()
-    found, method = followed(problem, DFET(8, 3, basis="bernstein"))
+def test_a_dose_ends_at_once():
+    """Were all controls free from the beginning, it could fade out, with the edge behind: another local optimum, of 7586."""
+    found, method = followed(tumour(), DFET(8, 3, basis="bernstein"))
     values = [value for value, _ in found]
     # Ledzewicz and Schaettler's tumour anti-angiogenesis: Patterson and Rao, ACM Trans. Math. Softw. 41, 2014, report 7571.6712.
     assert values[0] > 7575 and values[1:] == pytest.approx([7571.6712] * 2, abs=5e-3)
+    care = found[2][1]["care"]
+    end = care.state.edges[method.mesh_of("care").moving[0]]
+    assert care.control(np.array([end - 1e-6, end + 1e-6]))[:, 0] == pytest.approx([75.0, 0.0], abs=0.1)
     assert not method.mesh_of("care").constant
-    free = switched(DFET(8, 3, basis="bernstein"), problem, found[0][1]).mesh_of("care")
-    nlp = DFET(8, 3, basis="bernstein", mesh={"care": replace(free, constant=())}).transcribe(problem)
-    worse = scalarize(nlp, nlp.interpolate(found[0][1]), reference=np.zeros(1), weights=np.ones(1))
-    assert worse.status == "converged" and worse.F[0] > 7580
+
+
+def flown(edges, moving, coefficients, places, constant=()):
+    """A method for the moon landing, and a trajectory of it: thrust by Bernstein coefficients of degree 2, moving edges at `places`."""
+    problem, *_ = moon_landing()
+    method = DFET(2, 2, basis="bernstein", mesh={"fall": PhaseMesh(edges, 4, 2, moving, constant)})
+    nlp = method.transcribe(problem)
+    values = {f"fall.u[{j},{k}]": value for j, row in enumerate(coefficients) for k, value in enumerate(row)}
+    values |= {f"fall.u[arc {j}]": row[0] for j, row in enumerate(coefficients)} | {"fall.tf": 4.0}
+    values |= {f"fall.edge[{j}]": place for j, place in zip(moving, places, strict=True)}
+    return problem, method, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[values[nlp.variables[i].name] for i in nlp.free]])))[0])
+
+
+def test_an_edge_that_can_go_no_further_begins_anew():
+    off, full = [0.0, 0.0, 0.0], [3.0, 3.0, 3.0]
+    for held in ((), {"u": (0, 1)}):
+        problem, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.95], held)
+        mesh = switched(method, problem, flight).mesh_of("fall")
+        assert mesh.edges == pytest.approx((0, 0.95, 1), abs=1e-12) and mesh.constant == method.mesh_of("fall").constant
+    # Elsewhere it does not, and where a control comes near its bound slowly, the solver has chosen the place.
+    problem, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8])
+    assert switched(method, problem, flight) is None
+    problem, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, [3.0, 1.5, 0.0], off], [0.5])
+    (found,) = phase_switches(flight["fall"])["u"]
+    assert found.place == pytest.approx(0.625, abs=0.01) and switched(method, problem, flight) is None
 
 
 def test_moving_edges_stay_when_elements_are_cut():
     mesh = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,))
     assert mesh.with_elements((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None) == PhaseMesh((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None, (4,))
+    held = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,), {"u": (1,)})
+    assert held.with_elements((0, 0.3, 0.6, 0.8, 1), 3, 2) == PhaseMesh((0, 0.3, 0.6, 0.8, 1), 3, 2, (2,), {"u": (1,)})
     with pytest.raises(ValueError, match="has to stay"):
         mesh.with_elements((0, 0.3, 0.61, 1), 4, None)

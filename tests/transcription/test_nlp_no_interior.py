@@ -10,6 +10,7 @@ import pytest
 
 from problems import Problem
 from transcription import parse
+from transcription.nlp import scalarized
 from transcription.nlp.scalarized import Solved, scalarize
 
 
@@ -55,3 +56,19 @@ def test_the_widths_of_bounds_do_not_matter(wide: float) -> None:
     problem.minimize("effort", phase.integral(x**2 + u**2))
     found = solved(problem, "dfet:4x5", max_iterations=60)
     assert found.status == "converged" and abs(found.F[0] - 1 / np.tanh(1)) < 1e-6
+
+
+def test_what_is_solved_to_a_useful_accuracy_has_not_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As above: the last iterations are quick, so that few limits end a solve where it is nearly done.
+    problem = Problem("regulator")
+    phase = problem.phase("phase", t0=0, tf=1)
+    x, u = phase.state("x", bounds=(-5, 5), initial=0, final=1), phase.control("u", bounds=(-10, 10))
+    phase.dynamics(x=u)
+    problem.minimize("effort", phase.integral(x**2 + u**2))
+    failed = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
+    assert failed.status == "failed" and failed.message == "the limit of 4 iterations was reached"
+    monkeypatch.setattr(scalarized, "USEFUL", 1e-4)
+    useful = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
+    assert useful.status == "converged" and "the limit of 4 iterations" in useful.message and "optimality hold to" in useful.message
+    assert abs(useful.F[0] - 1 / np.tanh(1)) < 1e-6
+    assert solved(problem, "dfet:4x5", max_iterations=2, persistent=False).status == "failed"

@@ -73,6 +73,13 @@ def nlp_scales(nlp: NLP) -> np.ndarray:
 
 
 @remembered
+def _places(nlp: NLP) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the derivatives of g that may differ from 0."""
+    i, j = gradients(nlp).sparsity_out(1).get_triplet()
+    return np.array(i, dtype=int), np.array(j, dtype=int)
+
+
+@remembered
 def gradients(nlp: NLP) -> ca.Function:
     """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
     z = symbol(nlp, "z", len(nlp.variables))
@@ -103,10 +110,9 @@ def equilibrated(nlp: NLP, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Ruiz, "A scaling algorithm to equilibrate both rows and columns norms in matrices", RAL-TR-2001-034. Bounds may be much wider than what
     a variable does: its scale may become less than its own, never more.
     """
-    derivatives = gradients(nlp)(z)[1]
-    sparsity, sizes = derivatives.sparsity(), np.abs(np.array(derivatives.nonzeros()))
+    sizes = np.abs(np.array(gradients(nlp)(z)[1].nonzeros()))
     sizes[~np.isfinite(sizes)] = 0.0
-    i, j = (np.array(index, dtype=int) for index in sparsity.get_triplet())
+    i, j = _places(nlp)
     columns, rows = nlp.scale.copy(), nlp.g_scale.copy()
     for _ in range(ROUNDS):
         for scales, index, power in ((rows, i, 0.5), (columns, j, -0.5)):
