@@ -219,12 +219,13 @@ class MeshLoop:
                     # In the middle of it: the point stays on its best mesh so far.
                     break
                 found.meshes.append(method)
+                failed = reached is None
                 if better and reached is not None and not self._improves(reached, present, task, least):
                     reached = None
                 status = status or last
                 if reached is not None or self.ended or not detours:
                     break
-                detours -= 1
+                detours -= failed
             if reached is None:
                 if not stopping():
                     found.trouble = f"on the next finer mesh its status is '{status}'" if status else "its mesh cannot be refined further"
@@ -249,7 +250,8 @@ class MeshLoop:
         return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Task, least: float) -> bool:
-        """Whether a mesh with knots is one to go on with: its errors are not larger, and its optimum is no worse than what was achieved."""
+        """Whether a mesh with knots, or another point's, is one to go on with: its errors are not larger, and its optimum is no worse than
+        what was achieved."""
         errors = reached.verdict.error <= max(1.0, present.verdict.error)
         return errors and task.loss(reached.F) <= least + self.wanted.settled
 
@@ -257,7 +259,8 @@ class MeshLoop:
         """The next mesh, and others to be tried where no solve converges on it; each with whether it must be an improvement to be taken."""
         seen = {present.method}
         while waiting:
-            yield waiting.pop(0), False
+            hint = waiting.pop(0)
+            yield hint, hint != present.method
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield knots, True

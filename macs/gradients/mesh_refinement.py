@@ -30,7 +30,7 @@ OPTIMAL = 1e-6
 """A point with at most this optimality is not solved again on its first mesh."""
 LEAST_TOLERANCE = 1e-10
 """Smallest tolerance that double precision and the integrator can resolve."""
-STATIONARY = 1e-4
+STATIONARY = 1e-2
 """An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, is an end of the front."""
 NEARBY = 0.5
 """Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""

@@ -60,7 +60,8 @@ class Along(Task):
     def loss(self, F: np.ndarray) -> float:
         """See `Task.loss`."""
         moving, hard = self.used & (self.weights > 0), self.used & (self.weights <= 0)
-        alpha = np.max((F - self.reference)[moving] / self.units[moving])
+        # As the solve has it: by the weights, of which the largest is given in units.
+        alpha = np.max((F - self.reference)[moving] / self.weights[moving]) * np.max((self.weights / self.units)[moving])
         return float(alpha + np.maximum((F - self.reference)[hard] / self.units[hard], 0.0).sum())
 
     @property
