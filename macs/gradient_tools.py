@@ -32,7 +32,7 @@ from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.first_mesh import default_transcription, search_transcription
 from .gradients.found_mesh import COARSE, found_optimum
-from .gradients.mending import MESHES, PART, mended, solved_again
+from .gradients.mending import mended, solved_again
 from .gradients.mesh_loop import MeshLoop, Programs
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
 from .gradients.targets import METHODS, check_points, targets
@@ -40,6 +40,8 @@ from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
+PART, MESHES = 0.1, 8
+"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
 ROUNDS = 3
 """Largest number of times that points or ends of a sweep are solved again from a better start that another point gave."""
 

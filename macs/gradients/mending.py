@@ -22,7 +22,7 @@ from ..io.console import working
 from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
 
-PART = 0.3
+PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
