@@ -62,8 +62,12 @@ def test_the_layers_of_zero_hamiltonian():
     def layer(x, sign):  # the integral of sqrt(x^6 + x^2) + sign x^3
         return quad(lambda s: np.sqrt(s**6 + s**2) + sign * s**3, 0, x, epsabs=1e-14)[0]
 
-    for i, (start, end) in enumerate([(1.5, 1.0), (1.5, 1.0), (1.0, 1.5), (1.0, 1.5)]):
+    for i, (start, end) in enumerate([(1.5, 1.0), (1.5, 1.0), (1.0, 1.5)]):
         assert value("hypersensitive", i) == pytest.approx(layer(start, -1) + layer(end, 1), rel=1e-11)
+    # With a control of at most 5, the last layer ends on that bound; the Hamiltonian is zero there, too.
+    bound = brentq(lambda s: s**3 + np.sqrt(s**6 + s**2) - 5, 0.5, 1.5, xtol=1e-15)
+    on_it, _ = quad(lambda s: 0.5 * (s**2 + 25) / (5 - s**3), bound, 1.5, epsabs=1e-14)
+    assert value("hypersensitive", 3) == pytest.approx(layer(1.0, -1) + layer(bound, 1) + on_it, rel=1e-11)
 
 
 def test_newtons_nose():
