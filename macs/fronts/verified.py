@@ -33,7 +33,7 @@ MISSES = "simulated, "
 """Beginning of a note on what a point misses."""
 
 
-def verified(points: Kind, tolerance: float | None) -> Kind:
+def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = None) -> Kind:
     """The same points with the columns of a simulation, and with a note where it does not agree.
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
@@ -62,7 +62,7 @@ def verified(points: Kind, tolerance: float | None) -> Kind:
         simulations = simulate_all(problem, planned, rtol=rtol, atol=atol)
     except Stopped:
         return points
-    scales = objective_scales(points)
+    scales = objective_scales(points) if scales is None else scales
     n, m = points.F.shape
     defect, violation, F, agrees = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan), np.zeros(n, dtype=bool)
     notes = [_without_misses(note) for note in points.notes]

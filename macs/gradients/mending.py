@@ -19,24 +19,36 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import objective_scales, verified
 from ..io.console import working
+from .filling import filled
 from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
+from .multistart import GradientSolves
 
 PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
+PATIENCE = 150
+"""Iterations after which a solve is given up: the time of a long one is better spent on other points."""
 EVALUATION, SOLVE = 0.15, 20.0
 """What an evaluation and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-SHARE, LEAST = 0.3, 1000.0
+SHARE, LEAST = 0.3, 700.0
 """What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 
 def mended(points: Points, time_limit: float | None, progress: bool | None, first: Sequence[Meshed] = ()) -> Points:
     """The front of the points of which those that are not verified have been solved again, on the meshes `first`, if there are any; see
     `Front.mended`."""
-    again = solved_again(points, time_limit, progress, first)
-    return again[best_rows(again)].sorted()
+    with working(time_limit, False) as (_, interrupts):
+        again = solved_again(points, None, progress, first)
+        kept = again[best_rows(again)].sorted()
+        lost = len(points) - int(kept.verified.sum())
+        if again is points or not lost:
+            return kept
+        solves = GradientSolves(float(points.stats["tolerance"]))
+        full = filled(kept, len(points), solves, LEAST * lost * _size(kept))
+        # The ranges of the objectives may be others now.
+        return verified(full.sorted().replace(stats=more_costs(kept.stats, solves.counts, 0.0, interrupts.reason)), points.stats["verify"])
 
 
 def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, first: Sequence[Meshed] = ()) -> Points:
@@ -52,7 +64,7 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
         if meshed:
             limits = PART * verify
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
-            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed), first=first)
+            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed), first=first, max_iterations=PATIENCE)
             job.go(show)
             again = job.points(0.0, interrupts.reason)
         others = [i for i in missing if i not in meshed and points.simulated_violation[i] > verify]
@@ -66,8 +78,12 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
 def _most_work(points: Points, rows: list[int]) -> float:
     """What may be spent on some of the points, in iterations times variables: a share of what the front cost, and a little for each."""
     spent = EVALUATION * points.stats["evaluations"] + SOLVE * points.stats["gradient_solves"]
-    variables = float(np.mean([len(points[i].variables) for i in rows]))
-    return max(SHARE * spent, LEAST * len(rows)) * variables
+    return max(SHARE * spent, LEAST * len(rows)) * _size(points)
+
+
+def _size(points: Points) -> float:
+    """The mean number of variables of a point."""
+    return float(np.mean([len(variables) for variables in points.places]))
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:

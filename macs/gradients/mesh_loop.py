@@ -246,7 +246,7 @@ class MeshLoop:
     def _rank(self, one: OnMesh, task: Task, least: float) -> tuple[bool, float]:
         """Whether something is wrong with a point, and its largest error, in units of what it may be; what it is worse than what was
         achieved counts like an error of its objectives."""
-        beyond = (task.loss(one.F) - least) / self.wanted.settled
+        beyond = (task.loss(one.F) - least) / self.wanted.settled if self.wanted.confirmed else 0.0
         return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Task, least: float) -> bool:

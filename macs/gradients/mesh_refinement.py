@@ -23,7 +23,7 @@ from ..fronts.provenance import more_costs
 from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
-from .multistart import GradientSolves
+from .multistart import MOST_ITERATIONS, GradientSolves
 from .tasks import Along, End, Task
 
 OPTIMAL = 1e-6
@@ -40,6 +40,8 @@ NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
 HINTED = 1e2
 """A point whose error is larger than this, in units of what it may be, begins on the meshes of its nearest neighbour."""
+OF_END, OF_ONE = 6.0, 2.0
+"""What an end, and any other point, may take of the work that is allowed, in equal shares of it."""
 NEIGHBOURS = 2
 """Number of neighbours whose trajectories are further starts of a point."""
 
@@ -84,6 +86,8 @@ class FrontRefinement:
         See `MeshLoop`.
     first : sequence of Meshed
         Meshes that are tried first, for all points.
+    max_iterations : int
+        See `GradientSolves`.
     """
 
     def __init__(
@@ -95,14 +99,15 @@ class FrontRefinement:
         most_work: float | None = None,
         knots: bool = True,
         first: Sequence[Meshed] = (),
+        max_iterations: int = MOST_ITERATIONS,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
-        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
+        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
         self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._first = first
+        self._first, self._most_work = first, most_work
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -207,7 +212,12 @@ class FrontRefinement:
         hints = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
         # Rough controls would need finer meshes than optimal ones.
         hints = [*self._first, *(hints if known or hints or self._first else [self.methods[i]])]
+        if self._most_work is not None:
+            # One point that resists is not to take what is meant for the others.
+            own = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
+            self.loop.most_work = min(self._most_work, self.solves.work + own)
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
+        self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)
 
     def _trajectory(self, i: int) -> Trajectory:
