@@ -33,7 +33,7 @@ MISSES = "simulated, "
 """Beginning of a note on what a point misses."""
 
 
-def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = None) -> Kind:
+def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = None, remark: bool = True) -> Kind:
     """The same points with the columns of a simulation, and with a note where it does not agree.
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
@@ -72,7 +72,7 @@ def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = 
         off = missed(simulation, points[int(i)].objectives, scales)
         agrees[i] = points.status[i] == CONVERGED and max(defect[i], violation[i], off) <= tolerance
         if not agrees[i]:
-            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), off, tolerance)
+            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), off, tolerance, remark)
             notes[i] = "; ".join([*filter(None, [notes[i]]), *reasons])
     return points.replace(
         defect=defect,
@@ -128,13 +128,13 @@ def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.n
 
 
 def _misses(
-    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], off: float, tolerance: float
+    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], off: float, tolerance: float, remark: bool
 ) -> list[str]:
     """In words, what a point misses by more than the tolerance."""
     label, violation = worst
     found = []
     if not defect <= tolerance:
-        found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance)}")
+        found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance) if remark else ''}")
     if not violation <= tolerance:
         found.append(f"it violates '{label}' by {violation:.1e}")
     if not off <= tolerance:

@@ -39,7 +39,7 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float) 
         Work of these solves, as `solves` counts it, after which no further one is made.
     """
     programs, tried = Programs(points.compiled()), np.empty((0, points.F.shape[1]))
-    while 0 < points.verified.sum() < size and solves.work < most_work and not stopping():
+    while points.verified.any() and _needed(points).sum() < size and solves.work < most_work and not stopping():
         scales = objective_scales(points)
         target = _target(points, tried, scales)
         if target is None:
@@ -58,10 +58,15 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float) 
 
 def _within(points: Points, size: int) -> np.ndarray:
     """Rows (k,) of a front with `size` points, if that is possible without a verified one and without the best of any objective."""
+    spare = np.flatnonzero(~_needed(points))
+    return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
+
+
+def _needed(points: Points) -> np.ndarray:
+    """Mask (n,) of the points that are verified or the best of an objective."""
     needed = points.verified.copy()
     needed[extremes(points.F)] = True
-    spare = np.flatnonzero(~needed)
-    return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
+    return needed
 
 
 def _target(points: Points, tried: np.ndarray, scales: np.ndarray) -> np.ndarray | None:

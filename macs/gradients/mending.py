@@ -32,7 +32,7 @@ PATIENCE = 150
 """Iterations after which a solve is given up: the time of a long one is better spent on other points."""
 EVALUATION, SOLVE = 0.15, 20.0
 """What an evaluation and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-SHARE, LEAST = 0.3, 700.0
+SHARE, LEAST = 0.3, 500.0
 """What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 

@@ -209,13 +209,17 @@ class FrontRefinement:
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        hints = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
+        near_meshes = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
+        if self._first:
+            # Where a neighbour was confirmed, this point may be, too.
+            near_meshes = [self.found[done[0]].best.method] if done else []
         # Rough controls would need finer meshes than optimal ones.
-        hints = [*self._first, *(hints if known or hints or self._first else [self.methods[i]])]
+        own = [] if known or near_meshes or self._first else [self.methods[i]]
+        hints = list(dict.fromkeys([*near_meshes, *self._first, *own]))
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
-            own = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
-            self.loop.most_work = min(self._most_work, self.solves.work + own)
+            share = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
+            self.loop.most_work = min(self._most_work, self.solves.work + share)
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)

@@ -14,6 +14,7 @@ from transcription.catalogue import parse
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
+from ..fronts.verified import verified
 from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
 from ..pareto import archive as archives
@@ -133,10 +134,9 @@ class MACS(Settings, Solver):
         if self.mesh == "adaptive" and len(front):
             refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
             return refined[best_rows(refined)]
-        marked = front.verify(verify)
         if not self.mends or verify is None:
-            return marked
-        return Front.of(mended(marked, None, progress, [] if fine is None else [fine]))
+            return front.verify(verify)
+        return Front.of(mended(verified(front, verify, remark=False), None, progress, [] if fine is None else [fine]))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

@@ -111,7 +111,7 @@ def test_a_search_that_is_cut_within_solves_goes_on_to_the_same_bits(tmp_path):
     whole, cuts = solve(), 0
     while True:
         with within(BOUND):
-            part = solve(checkpoint=tmp_path / "run.ckpt", time_limit=0.4 + 0.2 * cuts)
+            part = solve(checkpoint=tmp_path / "run.ckpt", time_limit=0.15 + 0.1 * cuts)
         if part.stats["stopped"] == "budget":
             break
         assert not part.stats["reproducible"] and part.stats["stopped"] == "time limit"

@@ -161,7 +161,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "population", "search", "standard", "study"}
+    assert {row["benchmark"] for row in table} == {"inner", "peers", "population", "search", "standard", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -196,7 +196,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, population, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "inner, peers, population, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

@@ -156,7 +156,8 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
 )
 def test_shooting_is_solved_shown_and_verified(capsys, method, exceeded):
     """A spline leaves its bounds between nodes."""
-    assert main(["solve", "glide.py:build", "--transcription", method, "--inner", "propagate", "--seed", "1", "--out", "shot.nc"]) == 0
+    call = ["solve", "glide.py:build", "--transcription", method, "--inner", "propagate", "--mesh", "fixed", "--seed", "1"]
+    assert main([*call, "--out", "shot.nc"]) == 0
     assert main(["show", "shot.nc", "--point", "0"]) == 0 and "Shooting(" in capsys.readouterr().out
     assert main(["verify", "shot.nc", "--trust", "--tolerance", "1e-6"]) == bool(exceeded)
     out = capsys.readouterr().out

@@ -125,3 +125,14 @@ def test_piecewise_polynomials_agree_with_their_elements(which, elements, seed, 
     assert pieces(edges[-1]) == pytest.approx(pieces.on_element(elements - 1, np.ones(1))[0])
     if elements > 1:
         assert pieces(edges[1]) == pytest.approx(pieces.on_element(1, -np.ones(1))[0]), "the later element has the say"
+
+
+@pytest.mark.parametrize("basis", pl.BASES)
+@pytest.mark.parametrize("degree", [0, 1, 3, 6, 12])
+def test_a_basis_as_sums_of_powers(basis, degree):
+    if basis == "closed-legendre" and degree < 2:
+        return
+    tau = np.linspace(-1.0, 1.0, 41)
+    powers = tau[:, None] ** np.arange(degree + 1)
+    error = np.abs(powers @ pl.monomials(basis, degree) - pl.basis_matrix(basis, degree, tau)).max()
+    assert error < 1e-15 * 4.0**degree + 1e-15

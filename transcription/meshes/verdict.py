@@ -220,7 +220,7 @@ def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: n
     F, units : arrays (m,)
         Its objectives on the mesh, all minimised, and what counts as one in each.
     """
-    rtol = float(np.clip(1e-3 * wanted.tolerance, 1e-13, 1e-8))
+    rtol = float(np.clip(1e-3 * wanted.tolerance, 1e-13, 1e-7))
     scales = {name: state_scales(phase) for name, phase in trajectory.items()}
     # The integrator's absolute tolerance is stated in spans.
     spans = {name: np.array([v.span for v in phase.state_variables]) for name, phase in trajectory.items()}

@@ -82,6 +82,18 @@ def basis_matrix(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     return np.where(hit.any(axis=1, keepdims=True), hit, values) if at_points else values
 
 
+@cache
+def monomials(basis: str, degree: int) -> np.ndarray:
+    """The functions of a basis as sums of monomials, (degree + 1, degree + 1): their values at tau are [1, tau, ..., tau^degree] @ this.
+
+    Of moderate degrees only: the more, the more digits are lost.
+    """
+    places = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+    found = np.linalg.solve(np.vander(places, increasing=True), basis_matrix(basis, degree, places))
+    found.setflags(write=False)
+    return found
+
+
 def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Derivatives of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
     if basis == "bernstein":

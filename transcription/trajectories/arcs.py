@@ -14,7 +14,7 @@ from problems.derived import remembered
 
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped
-from ..numerics.polynomials import basis_matrix
+from ..numerics.polynomials import basis_matrix, monomials
 from ..stopping import check_stopping
 from .limits import DENSE
 from .trajectory import PhaseTrajectory
@@ -22,6 +22,8 @@ from .trajectory import PhaseTrajectory
 EXPLICIT = ("RK23", "RK45", "DOP853")
 METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
+MODERATE = 12
+"""Highest degree of controls that are evaluated as sums of powers."""
 MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which the integration counts as broken down."""
 EVERY = 100
@@ -122,6 +124,9 @@ class Arcs:
         n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
         function, degree = _rate_function(self.phase, n), self.coefficients.shape[1] - 1
         laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
+        # As sums of powers they cost a tenth of the time; the digits that this loses are few.
+        law = monomials(self.basis, degree) @ laws if degree <= MODERATE else None
+        exponents = np.arange(degree + 1)
         half = 0.5 * self.lengths[:, None]
         x, u, time = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n)
         out = np.zeros((n, function.size1_out(0)))
@@ -142,7 +147,8 @@ class Arcs:
                 check_stopping(GRACE)
             x[:] = y.reshape(n, -1)[:, :nx]
             time[:] = self.begins + (tau + 1.0) * half[:, 0]
-            values = (basis_matrix(self.basis, degree, np.array([tau])) @ laws).reshape(n, nu) if degree else laws.reshape(n, nu)
+            values = tau**exponents @ law if law is not None else basis_matrix(self.basis, degree, np.array([tau])) @ laws
+            values = values.reshape(n, nu)
             u[:] = wrapped(values, self.phase.controls) if periodic else values
             trigger()
             return (half * out).ravel()
