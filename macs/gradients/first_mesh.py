@@ -124,7 +124,7 @@ def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
         del edges[k + 1]
     orders = [mesh.control_order for mesh in meshes]
     controls = None if None in orders else max(order for order in orders if order is not None)
-    return PhaseMesh(tuple(edges), max(mesh.order for mesh in meshes), controls)
+    return PhaseMesh(tuple(edges), 1 + max(mesh.order for mesh in meshes), controls)
 
 
 def _length_at(mesh: PhaseMesh, place: float) -> float:

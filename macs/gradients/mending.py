@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import objective_scales, verified
 from ..io.console import working
+from ..pareto.dominance import extremes
 from .filling import filled
 from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
@@ -30,54 +31,84 @@ MESHES = 6
 """Most meshes of one point."""
 PATIENCE = 150
 """Iterations after which a solve is given up: the time of a long one is better spent on other points."""
-EVALUATION, SOLVE = 0.15, 20.0
-"""What an evaluation and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-SHARE, LEAST = 0.3, 500.0
+EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
+"""What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
+SHARE, LEAST = 0.4, 500.0
 """What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 
-def mended(points: Points, time_limit: float | None, progress: bool | None, first: Sequence[Meshed] = ()) -> Points:
-    """The front of the points of which those that are not verified have been solved again, on the meshes `first`, if there are any; see
-    `Front.mended`."""
+def mended(points: Points, time_limit: float | None, progress: bool | None, fine: Meshed | None = None) -> Points:
+    """The front of the points of which those that are not verified have been solved again; see `Front.mended`. With a `fine` mesh, since
+    those of the points are known to be too coarse, all of them have been."""
     with working(time_limit, False) as (_, interrupts):
-        again = solved_again(points, None, progress, first)
+        again = solved_again(points, None, progress, fine)
+        if again is not points and (spoilt := points.verified & ~again.verified).any():
+            again = Points.concatenate([again, points[spoilt]]).replace(stats=again.stats)
         kept = again[best_rows(again)].sorted()
         lost = len(points) - int(kept.verified.sum())
         if again is points or not lost:
             return kept
-        solves = GradientSolves(float(points.stats["tolerance"]))
-        full = filled(kept, len(points), solves, LEAST * lost * _size(kept))
+        solves = GradientSolves(float(points.stats["tolerance"]), PATIENCE)
+        full = filled(kept, len(points), solves, LEAST * lost * _size(points))
         # The ranges of the objectives may be others now.
         return verified(full.sorted().replace(stats=more_costs(kept.stats, solves.counts, 0.0, interrupts.reason)), points.stats["verify"])
 
 
-def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, first: Sequence[Meshed] = ()) -> Points:
-    """The points in their order, of which those that are not verified have been solved again."""
+def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, fine: Meshed | None = None) -> Points:
+    """The points in their order, of which those that are not verified have been solved again.
+
+    With a `fine` mesh, all of them are solved on it once; then only ends of the front that are still not verified are solved on others.
+    """
     points.compiled()
-    missing = np.flatnonzero(points.was_simulated & ~points.verified & (points.status == CONVERGED)).tolist()
-    if not missing:
-        return points
-    meshed = [i for i in missing if isinstance(from_dict(points[i].transcription or {}), Meshed)]
     verify = points.stats["verify"]
     with working(time_limit, progress) as (show, interrupts):
         again = points
-        if meshed:
-            limits = PART * verify
-            wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
-            job = FrontRefinement(points, wanted, MESHES, meshed, _most_work(points, meshed), first=first, max_iterations=PATIENCE)
-            job.go(show)
-            again = job.points(0.0, interrupts.reason)
-        others = [i for i in missing if i not in meshed and points.simulated_violation[i] > verify]
+        if fine is not None:
+            again = _refined(again, _doubtful(again, np.ones(len(again), dtype=bool)), show, fine)
+        missing = _doubtful(again, ~again.verified)
+        if fine is not None and missing:
+            good = np.flatnonzero(again.status == CONVERGED)
+            missing = [i for i in missing if i in good[extremes(again.F[good])]]
+        if missing:
+            again = _refined(again, missing, show, work=_most_work(points, missing))
+        others = np.flatnonzero(again.was_simulated & (again.simulated_violation > verify) & (again.status == CONVERGED)).tolist()
+        others = [i for i in others if not _meshed(again, i)]
         if others:
             show("points that are infeasible when simulated are solved again")
-            again = _inside_limits(again, others, verify)
+            again = verified(_inside_limits(again, others, verify), verify)
+        if again is points:
+            return points
         stats = again.stats | {"wall_time": again.stats["wall_time"] + interrupts.elapsed}
-    return verified(again.replace(stats=stats, message=points.message), verify)
+    return again.replace(stats=stats, message=points.message)
+
+
+def _meshed(points: Points, i: int) -> bool:
+    """Whether a point is on a mesh that can be refined."""
+    return isinstance(from_dict(points[i].transcription or {}), Meshed)
+
+
+def _doubtful(points: Points, rows: np.ndarray) -> list[int]:
+    """Those of a mask of rows (n,) that were simulated and can be solved on other meshes."""
+    return [i for i in np.flatnonzero(rows & points.was_simulated & (points.status == CONVERGED)).tolist() if _meshed(points, i)]
+
+
+def _refined(points: Points, rows: list[int], show: Callable[[str], None], fine: Meshed | None = None, work: float | None = None) -> Points:
+    """The points with some of them on finer meshes, as far as the work allows, or once on a `fine` one; simulated."""
+    if not rows:
+        return points
+    verify = points.stats["verify"]
+    limits = PART * verify
+    wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
+    meshes, first = (MESHES, []) if fine is None else (1, [fine])
+    job = FrontRefinement(points, wanted, meshes, rows, work, first=first, max_iterations=PATIENCE if fine is None else 2 * PATIENCE)
+    job.go(show)
+    return verified(job.points(0.0, ""), verify)
 
 
 def _most_work(points: Points, rows: list[int]) -> float:
     """What may be spent on some of the points, in iterations times variables: a share of what the front cost, and a little for each."""
-    spent = EVALUATION * points.stats["evaluations"] + SOLVE * points.stats["gradient_solves"]
+    stats = points.stats
+    spent = EVALUATION * stats["evaluations"] + FALLBACK * stats["fallbacks"] + SOLVE * stats["gradient_solves"]
     return max(SHARE * spent, LEAST * len(rows)) * _size(points)
 
 

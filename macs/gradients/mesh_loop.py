@@ -223,7 +223,7 @@ class MeshLoop:
                 if better and reached is not None and not self._improves(reached, present, task, least):
                     reached = None
                 status = status or last
-                if reached is not None or self.ended or not detours:
+                if reached is not None or self.ended or not detours or len(found.meshes) >= self.limit:
                     break
                 detours -= failed
             if reached is None:

@@ -136,7 +136,7 @@ class MACS(Settings, Solver):
             return refined[best_rows(refined)]
         if not self.mends or verify is None:
             return front.verify(verify)
-        return Front.of(mended(verified(front, verify, remark=False), None, progress, [] if fine is None else [fine]))
+        return Front.of(mended(verified(front, verify, remark=False), None, progress, fine))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""
