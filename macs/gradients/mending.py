@@ -19,7 +19,6 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import objective_scales, verified
 from ..io.console import working
-from ..pareto.dominance import extremes
 from .filling import filled
 from .front_polish import KEPT_INSIDE, back_off
 from .mesh_refinement import FrontRefinement
@@ -29,8 +28,6 @@ PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
-PATIENCE = 150
-"""Iterations after which a solve is given up: the time of a long one is better spent on other points."""
 EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
 """What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
 SHARE, LEAST = 0.4, 500.0
@@ -48,7 +45,7 @@ def mended(points: Points, time_limit: float | None, progress: bool | None, fine
         lost = len(points) - int(kept.verified.sum())
         if again is points or not lost:
             return kept
-        solves = GradientSolves(float(points.stats["tolerance"]), PATIENCE)
+        solves = GradientSolves(float(points.stats["tolerance"]))
         full = filled(kept, len(points), solves, LEAST * lost * _size(points))
         # The ranges of the objectives may be others now.
         return verified(full.sorted().replace(stats=more_costs(kept.stats, solves.counts, 0.0, interrupts.reason)), points.stats["verify"])
@@ -57,7 +54,7 @@ def mended(points: Points, time_limit: float | None, progress: bool | None, fine
 def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, fine: Meshed | None = None) -> Points:
     """The points in their order, of which those that are not verified have been solved again.
 
-    With a `fine` mesh, all of them are solved on it once; then only ends of the front that are still not verified are solved on others.
+    With a `fine` mesh, all of them are solved on it once, and then those that are still not verified on others.
     """
     points.compiled()
     verify = points.stats["verify"]
@@ -66,9 +63,6 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
         if fine is not None:
             again = _refined(again, _doubtful(again, np.ones(len(again), dtype=bool)), show, fine)
         missing = _doubtful(again, ~again.verified)
-        if fine is not None and missing:
-            good = np.flatnonzero(again.status == CONVERGED)
-            missing = [i for i in missing if i in good[extremes(again.F[good])]]
         if missing:
             again = _refined(again, missing, show, work=_most_work(points, missing))
         others = np.flatnonzero(again.was_simulated & (again.simulated_violation > verify) & (again.status == CONVERGED)).tolist()
@@ -100,7 +94,7 @@ def _refined(points: Points, rows: list[int], show: Callable[[str], None], fine:
     limits = PART * verify
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
     meshes, first = (MESHES, []) if fine is None else (1, [fine])
-    job = FrontRefinement(points, wanted, meshes, rows, work, first=first, max_iterations=PATIENCE if fine is None else 2 * PATIENCE)
+    job = FrontRefinement(points, wanted, meshes, rows, work, first=first)
     job.go(show)
     return verified(job.points(0.0, ""), verify)
 
