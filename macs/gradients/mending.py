@@ -30,7 +30,7 @@ MESHES = 6
 """Most meshes of one point."""
 EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
 """What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-SHARE, LEAST = 0.4, 500.0
+SHARE, LEAST = 0.4, 250.0
 """What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
 
 
