@@ -24,6 +24,8 @@ from .tasks import Task
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
+BUILDING = 30
+"""Iterations of IPOPT that take as long as it takes to make a program."""
 LITTLE = 1e-4
 """Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
 PATIENCE = 3
@@ -39,15 +41,24 @@ DRIFT = 1e-2
 
 
 class Programs:
-    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes."""
+    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes.
+
+    Attributes
+    ----------
+    built : int
+        Variables of all that were made.
+    """
 
     def __init__(self, problem: CompiledProblem) -> None:
-        self.problem = problem
+        self.problem, self.built = problem, 0
         self._kept: dict[Meshed, NLP] = {}
 
     def __call__(self, method: Meshed) -> NLP:
         """The NLP of the problem on these meshes."""
-        nlp = self._kept.pop(method, None) or method.transcribe(self.problem)
+        nlp = self._kept.pop(method, None)
+        if nlp is None:
+            nlp = method.transcribe(self.problem)
+            self.built += len(nlp.variables)
         self._kept[method] = nlp
         while len(self._kept) > KEPT:
             del self._kept[next(iter(self._kept))]
@@ -151,7 +162,7 @@ class MeshLoop:
     limit : int
         Largest number of meshes for each point.
     most_work : float, optional
-        Work of the gradient solves, as `solves` counts it, after which no new mesh is begun.
+        Work of the gradient solves, as `solves` counts it, and of making their programs, after which no new mesh is begun.
     knots : bool
         Whether edges may move to the switches of controls, where meshes then suit one point alone.
     """
@@ -173,7 +184,12 @@ class MeshLoop:
     @property
     def ended(self) -> bool:
         """Whether no new mesh is to be begun."""
-        return stopping() or (self.most_work is not None and self.solves.work >= self.most_work)
+        return stopping() or (self.most_work is not None and self.work >= self.most_work)
+
+    @property
+    def work(self) -> float:
+        """Work so far, in iterations times variables."""
+        return self.solves.work + BUILDING * self.programs.built
 
     def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it

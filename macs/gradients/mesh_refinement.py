@@ -219,7 +219,7 @@ class FrontRefinement:
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
             share = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
-            self.loop.most_work = min(self._most_work, self.solves.work + share)
+            self.loop.most_work = min(self._most_work, self.loop.work + share)
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)

@@ -64,7 +64,7 @@ def test_every_inner_level_makes_candidates_feasible():
 def test_gradient_tools_searches_and_mesh_refinement_work_on_it():
     problem, truth = load("goddard"), reference(2001)
     assert payoff(problem, METHOD).objectives == pytest.approx(truth[[0, -1]], rel=1e-3, abs=1e-3)
-    searched = MACS().solve(problem, METHOD, evaluations=200, seed=1)
+    searched = MACS(mesh="fixed").solve(problem, METHOD, evaluations=200, seed=1)
     assert len(searched) == 10 and searched.violation.max() < 1e-6
     coarse = sweep(problem, METHOD, points=3)
     assert (coarse.status == "converged").all() and coarse[1].simulate().max_defect > 1e-2

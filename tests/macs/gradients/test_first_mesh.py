@@ -90,9 +90,9 @@ def test_a_common_mesh_is_about_as_fine_as_each_of_several(several):
         assert here <= 2.0 * finest + 0.01 or len(common) - 1 == MOST
 
 
-def test_degrees_are_the_highest():
+def test_degrees_are_higher_than_any():
     one, two = PhaseMesh((0.0, 1.0), 3, 1), PhaseMesh((0.0, 0.5, 1.0), 5, 2)
-    assert (_together([one, two]).order, _together([one, two]).control_order) == (5, 2)
+    assert (_together([one, two]).order, _together([one, two]).control_order) == (6, 2)
     assert _together([one, PhaseMesh((0.0, 1.0), 2)]).control_order is None
 
 
