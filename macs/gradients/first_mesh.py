@@ -112,7 +112,7 @@ def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:
 
 
 def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
-    """A mesh with the edges of several, without those that divide what no single mesh divides as finely. Its degree is one more than theirs:
+    """A mesh with the edges of several, without those that divide what no single mesh divides as finely. Its degree is one above theirs:
     points between the ends may be harder than these."""
     edges = sorted({edge for mesh in meshes for edge in mesh.edges})
     while len(edges) > 2:
