@@ -30,11 +30,11 @@ from .fronts.builders import certificates, nearest_violation, no_points, vectors
 from .fronts.points import Point, Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
-from .gradients.first_mesh import default_transcription, search_transcription
-from .gradients.found_mesh import COARSE, found_optimum
+from .gradients.found_optimum import COARSE, found_optimum
 from .gradients.mending import mended, solved_again
 from .gradients.mesh_loop import MeshLoop, Programs
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
+from .gradients.search_mesh import default_transcription, search_transcription
 from .gradients.targets import METHODS, check_points, targets
 from .io.console import working
 from .pareto.ranges import BETTER, distinct

@@ -32,6 +32,8 @@ PATIENCE = 3
 """Number of meshes without progress after which a point is not refined further."""
 PROGRESS = 0.5
 """The error falls at least to this fraction where there is progress."""
+TROUBLES = {"": "its mesh cannot be refined further", CONVERGED: "finer meshes do not help"}
+"""Why a point goes to no finer mesh, by the status of its last solve, if there was one."""
 DETOURS = 4
 """Number of other meshes that are tried for a point where solves fail."""
 BLUNT = 1e-3
@@ -244,7 +246,7 @@ class MeshLoop:
                 detours -= failed
             if reached is None:
                 if not stopping():
-                    found.trouble = f"on the next finer mesh its status is '{status}'" if status else "its mesh cannot be refined further"
+                    found.trouble = TROUBLES.get(status, f"on the next finer mesh its status is '{status}'")
                 break
             least = min(least, _achieved(reached, task))
             present = reached
@@ -253,7 +255,7 @@ class MeshLoop:
             if not self._rank(present, task, least)[0]:
                 break
             if len(history) > PATIENCE and min(history[-PATIENCE:]) > PROGRESS * min(history[:-PATIENCE]):
-                found.trouble = "finer meshes do not help"
+                found.trouble = TROUBLES[CONVERGED]
                 break
         beyond = task.loss(found.best.F) - least
         found.worse = beyond if beyond > self.wanted.settled else 0.0

@@ -24,7 +24,7 @@ from ..front import Front
 from ..fronts.builders import black_box_points, no_points, trajectory_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
-from ..gradients.first_mesh import search_transcription
+from ..gradients.search_mesh import search_transcription
 from ..io.interrupts import Interrupts
 from .method import SearchMethod
 from .progress import Progress
@@ -61,7 +61,7 @@ class Solver(SearchMethod):
         ----------
         problem : Problem
         transcription : Transcription, optional
-            Default: the problem's own; if it has none, DFET on a mesh that is found, see `gradients.found_mesh`.
+            Default: the problem's own; if it has none, DFET on a mesh that is found, see `gradients.search_mesh`.
         evaluations : int, optional
             Largest number of candidates that are sent to the inner level. Default: the problem's own number.
         seed : int, optional

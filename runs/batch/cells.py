@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from macs.gradients.first_mesh import default_transcription
+from macs.gradients.search_mesh import default_transcription
 from macs.io.text import call
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver

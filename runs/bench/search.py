@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from macs import MACS, Front, sweep
-from macs.gradients.first_mesh import default_transcription
+from macs.gradients.search_mesh import default_transcription
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.archive import spread
