@@ -167,7 +167,7 @@ class Front(Points):
         """The front with those points solved again that a simulation did not confirm.
 
         Each is solved where it misses: on finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This
-        takes at most three tenths of what the front cost, in iterations times variables, or sixty iterations for each point. The others
+        takes four tenths of what the front cost, in iterations times variables, or up to as much where few solves were made. The others
         stay as they are. Points that are verified are compared by their simulated objectives; what is still not verified stays only if no
         verified point is as good.
 

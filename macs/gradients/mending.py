@@ -31,7 +31,8 @@ MESHES = 6
 EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
 """What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
 SHARE, LEAST = 0.4, 250.0
-"""What is spent on the points that are solved again, as a fraction of what the front cost; in iterations for each, at least."""
+"""What is spent on points that are solved again, as a fraction of what the front cost; in iterations for each, at least, as long as that is
+no more than the front cost."""
 
 
 def mended(points: Points, time_limit: float | None, progress: bool | None, fine: Meshed | None = None) -> Points:
@@ -46,7 +47,7 @@ def mended(points: Points, time_limit: float | None, progress: bool | None, fine
         if again is points or not lost:
             return kept
         solves = GradientSolves(float(points.stats["tolerance"]))
-        full = filled(kept, len(points), solves, LEAST * lost * _size(points))
+        full = filled(kept, len(points), solves, _most_work(points, lost))
         # The ranges of the objectives may be others now.
         return verified(full.sorted().replace(stats=more_costs(kept.stats, solves.counts, 0.0, interrupts.reason)), points.stats["verify"])
 
@@ -64,7 +65,7 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
             again = _refined(again, _doubtful(again, np.ones(len(again), dtype=bool)), show, fine)
         missing = _doubtful(again, ~again.verified)
         if missing:
-            again = _refined(again, missing, show, work=_most_work(points, missing))
+            again = _refined(again, missing, show, work=_most_work(points, len(missing)))
         others = np.flatnonzero(again.was_simulated & (again.simulated_violation > verify) & (again.status == CONVERGED)).tolist()
         others = [i for i in others if not _meshed(again, i)]
         if others:
@@ -99,11 +100,13 @@ def _refined(points: Points, rows: list[int], show: Callable[[str], None], fine:
     return verified(job.points(0.0, ""), verify)
 
 
-def _most_work(points: Points, rows: list[int]) -> float:
-    """What may be spent on some of the points, in iterations times variables: a share of what the front cost, and a little for each."""
+def _most_work(points: Points, count: int) -> float:
+    """What may be spent on so many of the points, in iterations times variables."""
     stats = points.stats
     spent = EVALUATION * stats["evaluations"] + FALLBACK * stats["fallbacks"] + SOLVE * stats["gradient_solves"]
-    return max(SHARE * spent, LEAST * len(rows)) * _size(points)
+    # Where nothing was searched, the mesh is all that there is to be found.
+    least = min(LEAST * count, spent) if stats["evaluations"] else LEAST * count
+    return max(SHARE * spent, least) * _size(points)
 
 
 def _size(points: Points) -> float:
