@@ -30,6 +30,8 @@ MESHES = 6
 """Most meshes of one point."""
 EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
 """What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
+ENOUGH = 600.0
+"""Iterations that are little time on any mesh."""
 SHARE, LEAST = 0.4, 250.0
 """What is spent on points that are solved again, as a fraction of what the front cost; in iterations for each, at least, as long as that is
 no more than the front cost."""
@@ -105,7 +107,7 @@ def _most_work(points: Points, count: int) -> float:
     stats = points.stats
     spent = EVALUATION * stats["evaluations"] + FALLBACK * stats["fallbacks"] + SOLVE * stats["gradient_solves"]
     # Where nothing was searched, the mesh is all that there is to be found.
-    least = min(LEAST * count, spent) if stats["evaluations"] else LEAST * count
+    least = min(LEAST * count, max(spent, ENOUGH)) if stats["evaluations"] else LEAST * count
     return max(SHARE * spent, least) * _size(points)
 
 

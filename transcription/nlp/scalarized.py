@@ -157,7 +157,7 @@ def scalarize(
     margin: np.ndarray | None = None,
     tolerance: float = 1e-6,
     max_iterations: int = 500,
-    seconds: float = 60.0,
+    seconds: float = 600.0,
     persistent: bool = True,
 ) -> Solved:
     """Go down from a point to the front: least alpha with F - reference <= alpha weights.
