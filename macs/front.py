@@ -164,7 +164,7 @@ class Front(Points):
         return verified(self, tolerance)
 
     def mended(self, *, time_limit: float | None = None, progress: bool | None = None) -> Front:
-        """The front with those points solved again that a simulation did not confirm.
+        """The front with those points solved again that a simulation did not confirm; if it was not simulated, it is now.
 
         Each is solved where it misses: on finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This
         takes four tenths of what the front cost, in iterations times variables, or up to as much where few solves were made. The others
@@ -188,7 +188,8 @@ class Front(Points):
         ValueError
             For a black box, and a problem that cannot be found.
         """
-        return Front.of(mended(self, time_limit, progress))
+        marked = self if self.was_simulated.any() else self.verify()
+        return Front.of(mended(marked, time_limit, progress))
 
     def simulate(
         self,

@@ -85,7 +85,7 @@ def optimize(
     verify : float, optional
         How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: it is not simulated.
     max_iterations : int
-        Most iterations of IPOPT in one strategy of a solve.
+        Most iterations of IPOPT in one solve, all its strategies together.
     time_limit : float, optional
         Seconds after which the work ends with its results so far, as it does after Ctrl-C.
     progress : bool, optional

@@ -46,7 +46,10 @@ def mended(points: Points, time_limit: float | None, progress: bool | None, fine
             again = Points.concatenate([again, points[spoilt]]).replace(stats=again.stats)
         kept = again[best_rows(again)].sorted()
         lost = len(points) - int(kept.verified.sum())
-        if again is points or not lost:
+        if again is points:
+            # What no solve can mend is to be explained.
+            return kept if kept.verified.all() else verified(kept, points.stats["verify"])
+        if not lost:
             return kept
         solves = GradientSolves(float(points.stats["tolerance"]))
         full = filled(kept, len(points), solves, _most_work(points, lost))

@@ -23,7 +23,7 @@ from ..fronts.provenance import more_costs
 from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
-from .multistart import MOST_ITERATIONS, GradientSolves
+from .multistart import GradientSolves
 from .tasks import Along, End, Task
 
 OPTIMAL = 1e-6
@@ -86,8 +86,6 @@ class FrontRefinement:
         See `MeshLoop`.
     first : sequence of Meshed
         Meshes that are tried first, for all points.
-    max_iterations : int
-        See `GradientSolves`.
     """
 
     def __init__(
@@ -99,12 +97,11 @@ class FrontRefinement:
         most_work: float | None = None,
         knots: bool = True,
         first: Sequence[Meshed] = (),
-        max_iterations: int = MOST_ITERATIONS,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
-        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
+        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
         self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self._first, self._most_work = first, most_work

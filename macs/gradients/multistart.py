@@ -32,7 +32,7 @@ class GradientSolves:
     tolerance : float
         Largest scaled residual of a feasible point.
     max_iterations : int
-        Most iterations of IPOPT in one strategy of a solve.
+        Most iterations of IPOPT in one solve, all its strategies together.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Displays of long work, on stderr: live on a terminal, a plain line every ten seconds elsewhere.
 
-A function of the library shows one by itself only where somebody looks on, and only of work that takes long; see `Display`.
+By default, functions of the library show work that takes long, on a terminal or in a notebook; see `Display`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .interrupts import Interrupts
 EVERY = 10.0
 """Seconds between plain lines."""
 LONG = 2.0
-"""Seconds after which work is shown that nobody asked to show."""
+"""Seconds after which work is shown by default."""
 
 
 _INSIDE: ContextVar[bool] = ContextVar("inside a display", default=False)
@@ -43,7 +43,7 @@ class Display(AbstractContextManager, ABC):
 
     def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr
-        self._shown = looked_at(self._stream) if shown is None else shown
+        self._shown = is_live(self._stream) if shown is None else shown
         self._delay = LONG if shown is None else 0.0
         self._live: Any = None
         self._token: Token[bool] | None = None
@@ -209,8 +209,8 @@ def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[S
         yield status, interrupts
 
 
-def looked_at(stream: TextIO) -> bool:
-    """Whether somebody sees at once what is written: on a terminal, or in a notebook."""
+def is_live(stream: TextIO) -> bool:
+    """Whether a stream is a terminal, or the output of a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return stream.isatty() or hasattr(shell, "kernel")
 

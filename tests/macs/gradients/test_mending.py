@@ -115,3 +115,9 @@ def test_points_of_shooting_are_moved_inside_their_limits():
         effort, height = point.simulated.values()
         assert effort > (1 - 3e-3) * 4 / (9 * height)
         assert point.transcription["method"] == "SingleShooting"
+
+
+def test_points_that_were_not_simulated_are_simulated_first():
+    front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
+    assert not front.was_simulated.any() and front.mended().verified.all()
+    assert len(front[[]].mended()) == 0

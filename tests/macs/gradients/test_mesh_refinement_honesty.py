@@ -128,11 +128,11 @@ def keeps_what_came_in(seed: int) -> None:
             found = point.simulate(rtol=1e-11, atol=1e-12)
             assert np.abs(np.array([*found.objectives.values()]) - point.F).max() <= 1e-3 * span.max()
             assert (np.abs(np.array([*found.objectives.values()]) - point.F) <= 2e-4 * span).all()
-    # A note is no fault; that most points have none is what refinement is for.
-    assert sum(not point.note for point in fine) >= len(fine) // 2
+    assert sum(not point.note for point in fine) >= len(fine) - 1
 
 
 QUICK = (0, 1, 2, 8, 11)
+KNOWN = {4: pytest.mark.xfail(reason="two of four points end with a note: no finer mesh helps an end and its neighbour", strict=True)}
 
 
 @pytest.mark.parametrize("seed", QUICK)
@@ -141,7 +141,7 @@ def test_random_fronts_keep_what_came_in(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", sorted(set(range(40)) - set(QUICK)))
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=KNOWN.get(seed, ())) for seed in range(40) if seed not in QUICK])
 def test_many_random_fronts_keep_what_came_in(seed):
     keeps_what_came_in(seed)
 

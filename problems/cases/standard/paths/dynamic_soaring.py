@@ -1,4 +1,4 @@
-"""Dynamic soaring: the weakest gradient of wind that keeps a glider in the air without power.
+"""Dynamic soaring: the least wind gradient with which an unpowered glider can fly a periodic orbit.
 
 Zhao, "Optimal patterns of glider dynamic soaring", Optimal Control Applications and Methods 25, 2004; with the data of GPOPS-II and YAPSS.
 """
