@@ -50,7 +50,7 @@ class Front(Points):
         return f"<Front: {headline(self)}>"
 
     def refine_mesh(
-        self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool | None = None
+        self, *, tolerance: float = 1e-7, limit: int = 12, time_limit: float | None = None, progress: bool | None = None
     ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 

@@ -6,7 +6,7 @@ objectives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -21,7 +21,7 @@ from .phases.layout import Layout
 from .phases.reduced import Reduced
 from .phases.writer import Ends, PhaseWriter, Rows
 from .stopping import check_stopping
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
 
@@ -81,6 +81,7 @@ class Assembly:
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
+            costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
         )
 
     def guess(self) -> np.ndarray:
@@ -166,6 +167,12 @@ class Assembly:
         phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
+
+    def costates(self, z: np.ndarray, multipliers: Mapping[str, np.ndarray]) -> dict[str, PiecewisePolynomial]:
+        """See `NLP.costates`; `multipliers` of the rows of dynamics by phase."""
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
+        return {name: costates for name, costates in found.items() if costates is not None}
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
         """See `NLP.interpolate`."""

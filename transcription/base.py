@@ -19,7 +19,7 @@ from problems.problem import Problem
 from .numerics.batched import Batched
 from .phases.mesh import PhaseMesh, as_meshes
 from .phases.reduced import Reduced
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
 """The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
@@ -238,6 +238,9 @@ class NLP(Deriving):
     interpolate : callable
         A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
+    costates : callable
+        A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
+        multipliers say nothing between their places.
     """
 
     problem: CompiledProblem
@@ -256,6 +259,7 @@ class NLP(Deriving):
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
+    costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
 
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"

@@ -31,7 +31,8 @@ OPTIMAL = 1e-6
 LEAST_TOLERANCE = 1e-10
 """Smallest tolerance that double precision and the integrator can resolve."""
 STATIONARY = 1e-2
-"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, is an end of the front."""
+"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, or that moves by no more
+than this, in units, to the optimum of that objective alone, is an end of the front."""
 NEARBY = 0.5
 """Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""
 MOVED = 0.05
@@ -171,12 +172,15 @@ class FrontRefinement:
     def _is_end(self, i: int, mine: np.ndarray) -> bool:
         """Whether the best point in the objective that is marked (m,) is an optimum of that alone. Another local optimum may be better."""
         nlp, point = self.loop.programs(self.methods[i]), self.front[i]
-        if self._known(i):
-            return optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY
+        known = self._known(i)
+        if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY:
+            return True
         solved = self.solves(nlp, point.decision, np.where(mine, 0.0, np.inf), self.units)
+        if solved.status != CONVERGED:
+            return not known
         others = np.array([self._distance(i, j) for j in self.good.tolist() if j != i])
-        moved = float(np.linalg.norm((solved.F - point.F) / self.units))
-        return solved.status != CONVERGED or moved <= NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+        nearby = STATIONARY if known else NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+        return float(np.linalg.norm((solved.F - point.F) / self.units)) <= nearby
 
     def _known(self, i: int) -> bool:
         """Whether a point is known to be optimal on its own mesh."""

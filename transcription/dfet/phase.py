@@ -189,13 +189,20 @@ class DFETPhase(PhaseWriter):
         self.layout.write(extended, self.U, U[None])
         self.layout.write(extended, self.B[1:-1], at_edges[None])
 
-    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
-        """See `PhaseWriter.unpack`."""
-        phase, tables = self.phase, self.tables
-        s, places = extended[self.ends.statics], self.mesh.places
+    def _edges(self, extended: np.ndarray) -> np.ndarray:
+        """Times (N + 1,) of the ends of elements."""
+        (t0, tf), places = extended[self.ends.statics[:2]], self.mesh.places
         if len(self.E):
             places = places + self.n * self.mesh.shares @ (extended[self.E] - self._begin)
-        edges = s[0] + (s[1] - s[0]) * places / self.n
+        return t0 + (tf - t0) * places / self.n
+
+    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial:
+        """See `PhaseWriter.costates`: the multipliers of an element are the coefficients of its test functions."""
+        return PiecewisePolynomial(self._edges(extended), multipliers.reshape(self.n, self.tables.order + 2, -1), self.tables.state_basis)
+
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """See `PhaseWriter.unpack`."""
+        phase, tables, edges = self.phase, self.tables, self._edges(extended)
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)

@@ -91,6 +91,9 @@ class Solved:
         Of IPOPT, by all strategies together.
     message : str
         Why the solve ended where it did not converge by itself: the limit that was reached, or what IPOPT says.
+    multipliers : array (m + r,) or None
+        Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum of both
+        vanish. None where nothing was solved.
     clocked : bool
         Whether a clock ended any of the work: then the same solve need not give the same again.
     begun : bool
@@ -105,6 +108,7 @@ class Solved:
     clocked: bool = False
     begun: bool = True
     message: str = ""
+    multipliers: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
@@ -319,7 +323,15 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
-    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT, message=message), stuck
+    clocked = STATUS_OF_IPOPT.get(outcome) == TIMEOUT
+    multipliers = _multipliers(np.array(answer["lam_g"]).ravel(), rows, task.scale)
+    return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message, multipliers=multipliers), stuck
+
+
+def _multipliers(found: np.ndarray, rows: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """See `Solved.multipliers`, from those of the program's rows, by the scales of the NLP's rows (r,) and of the objectives (m,)."""
+    of_rows, moving, resting = np.split(found, np.cumsum([len(rows), len(scales)]))
+    return np.concatenate([(moving + resting) / scales, of_rows / rows])
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -46,6 +46,8 @@ class Rows:
     scale: list[np.ndarray] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
     propagated: list[bool] = field(default_factory=list)
+    dynamics: dict[str, slice] = field(default_factory=dict)
+    """Where the rows of dynamics of each phase are."""
 
     def add(
         self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
@@ -60,6 +62,11 @@ class Rows:
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return sum(expression.numel() for expression in self.expressions)
 
     @property
     def propagated_equations(self) -> ca.MX:
@@ -136,6 +143,11 @@ class PhaseWriter(ABC):
     @abstractmethod
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """The phase's trajectory from one extended vector; `trajectory` completes what the method knows."""
+
+    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
+        """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
+        None: what these say between their places is not known."""
+        return None
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -235,6 +247,7 @@ class PhaseWriter(ABC):
             f"final value of {self.phase.name}.{v.name}" if low == high else name
             for v, (low, high), name in zip(states, self.phase.final, names, strict=True)
         ]
+        rows.dynamics[self.phase.name] = slice(rows.count, rows.count + len(states) * k)
         rows.add(residual, 0, 0, np.tile([v.scale for v in states], k), names * (k - 1) + last, propagated=True)
 
     def add_paths(self, rows: Rows, values: ca.MX, equalities: ca.MX | None = None) -> None:
