@@ -86,7 +86,9 @@ def _newton(
 
 
 def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
-    """The nearest point (d,) of one box, and the multipliers (r,); None where there is none."""
+    """The nearest point (d,) of one box, and the multipliers (r,); None where there is none, or where A is no numbers."""
+    if not np.isfinite(A).all():
+        return None
     every, r = np.eye(len(center)), len(A)
     sides = np.vstack([A, -A, every, -every])
     limits = np.concatenate([lower, -upper, box[0], -box[1]])
