@@ -195,7 +195,7 @@ def sweep(
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.problem.goals))
-    return job.run(lambda: job.swept(points, method), partial(mended, time_limit=None, progress=None))
+    return job.run(lambda: job.swept(points, method), mended)
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class _Job:
         check_freedom(self.nlp)
         self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), int(self._terms.starts), self._rng, self.solves)
 
-    def run(self, work: Callable[[], Front], again: Callable[[Points], Points]) -> Front:
+    def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
         """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
 
         Within, the time limit and Ctrl-C ask the work to end, and its progress is shown. Unless the transcription was given, points that
@@ -262,8 +262,8 @@ class _Job:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             self._stopped = interrupts.reason
-            front = front.replace(stats=front.stats | self._stats()).verify(verify)
-            return front if self.fixed or verify is None else Front.of(again(front))
+            front = front.replace(stats=front.stats | self._stats())
+            return front.verify(verify) if self.fixed or verify is None else Front.of(again(front, verify))
 
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
         """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is

@@ -13,7 +13,7 @@ import numpy as np
 
 from problems.checks import check_count, settings_of, short_repr
 from problems.compiled import CompiledProblem, Variable
-from problems.derived import Deriving, remembered
+from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
@@ -96,6 +96,11 @@ class Transcription(ABC):
 @remembered
 def _transcribed(problem: CompiledProblem, transcription: Transcription) -> NLP:
     return transcription.transcribe(problem)
+
+
+def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | None:
+    """What `Transcription.nlp` has made of a problem and keeps with it; None if it was not asked for."""
+    return computed(_transcribed, problem, transcription)
 
 
 class Meshed(Transcription):

@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import NLP, Meshed
+from transcription.base import NLP, Meshed, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshes.adaptation import next_method, where_controls_gain
 from transcription.meshes.knots import switched
@@ -45,7 +45,8 @@ DRIFT = 1e-2
 
 
 class Programs:
-    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes.
+    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
+    since a search was made on them, are not made again.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Programs:
 
     def __call__(self, method: Meshed) -> NLP:
         """The NLP of the problem on these meshes."""
-        nlp = self._kept.pop(method, None)
+        nlp = self._kept.pop(method, None) or kept_nlp(self.problem, method)
         if nlp is None:
             nlp = method.transcribe(self.problem)
             self.built += len(nlp.variables)
@@ -192,7 +193,7 @@ class MeshLoop:
         knots: bool = True,
     ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
-        self._knots = knots
+        self._knots, self._built = knots, programs.built
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
@@ -204,9 +205,10 @@ class MeshLoop:
     @property
     def work(self) -> float:
         """Work so far, in iterations times variables."""
-        return self.solves.work + BUILDING * self.programs.built
+        return self.solves.counts.work + BUILDING * (self.programs.built - self._built)
 
-    def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
+    @staticmethod
+    def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
         varies by near a vector of the NLP: an objective near zero is not judged by its own size."""
         ranges = np.ptp(F, axis=0)
@@ -343,6 +345,7 @@ class MeshLoop:
         """The feasible point nearest to a vector, and that it is no optimum."""
         near = Ipopt().solve(nlp, start[None, nlp.free], start[None], tolerance=self.solves.tolerance)
         self.solves.counts.inner_iterations += int(near.iterations.sum())
+        self.solves.counts.work += int(near.iterations.sum()) * len(nlp.variables)
         self.solves.counts.clocked += near.clocked
         return Solved(near.z[0], near.F[0], float(near.violation[0]), str(near.status[0]), int(near.iterations[0])), False
 

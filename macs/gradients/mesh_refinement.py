@@ -24,6 +24,7 @@ from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
 from .multistart import GradientSolves
+from .targets import moved_along
 from .tasks import Along, End, Task
 
 OPTIMAL = 1e-6
@@ -35,8 +36,6 @@ STATIONARY = 1e-2
 than this, in units, to the optimum of that objective alone, is an end of the front."""
 NEARBY = 0.5
 """Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""
-MOVED = 0.05
-"""Where the ends of a front move by more than this part of its range on finer meshes, the points between them move along."""
 NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
 HINTED = 1e2
@@ -82,11 +81,11 @@ class FrontRefinement:
     chosen : sequence of int, optional
         The points to be refined; default: all that converged.
     most_work : float, optional
-        Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
+        Work of gradient solves, see `Counts`, after which no new mesh is begun.
     knots : bool
         See `MeshLoop`.
-    first : sequence of Meshed
-        Meshes that are tried first, for all points.
+    programs : Programs, optional
+        The NLPs on meshes that others have solved on, too.
     """
 
     def __init__(
@@ -97,15 +96,15 @@ class FrontRefinement:
         chosen: Sequence[int] | None = None,
         most_work: float | None = None,
         knots: bool = True,
-        first: Sequence[Meshed] = (),
+        programs: Programs | None = None,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._first, self._most_work = first, most_work
+        self._most_work = most_work
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -188,16 +187,11 @@ class FrontRefinement:
         return certified is not None and certified <= OPTIMAL
 
     def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at
-        the same place between these."""
-        F = self.front.F
-        if len(ends) < len(self.units) or len(self.units) == 1:
-            return {i: F[i] for i in between}, self.units
-        old, new = F[list(ends.values())], np.array([self.found[i].best.F for i in ends.values()])
-        if np.abs((new - old) / self.units).max() <= MOVED or not ((np.ptp(old, axis=0) > 0) & (np.ptp(new, axis=0) > 0)).all():
-            return {i: F[i] for i in between}, self.units
-        scale = np.ptp(new, axis=0) / np.ptp(old, axis=0)
-        return {i: new.min(axis=0) + (F[i] - old.min(axis=0)) * scale for i in between}, np.ptp(new, axis=0)
+        """Where the points between the ends are solved from, and along which weights; see `moved_along`."""
+        F, known = self.front.F, list(ends.values()) if len(ends) == len(self.units) else []
+        new = np.array([self.found[i].best.F for i in known]).reshape(-1, len(self.units))
+        references, weights = moved_along(F[between], F[known], new, self.units)
+        return dict(zip(between, references, strict=True)), weights
 
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
@@ -211,12 +205,9 @@ class FrontRefinement:
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
         near_meshes = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
-        if self._first:
-            # Where a neighbour was confirmed, this point may be, too.
-            near_meshes = [self.found[done[0]].best.method] if done else []
         # Rough controls would need finer meshes than optimal ones.
-        own = [] if known or near_meshes or self._first else [self.methods[i]]
-        hints = list(dict.fromkeys([*near_meshes, *self._first, *own]))
+        own = [] if known or near_meshes else [self.methods[i]]
+        hints = list(dict.fromkeys([*near_meshes, *own]))
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
             share = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
@@ -238,4 +229,5 @@ class FrontRefinement:
             return front[[i]].replace(notes=[note or front[i].note])
         nlp = self.loop.programs(best.method)
         certified = optimality(nlp, best.z, self.units) if best.by_gradients else None
-        return vectors_points(nlp, best.z[None], front.solver, front.stats, optimality=[certified], notes=[note])
+        about: dict[str, Any] = {"optimality": [certified], "notes": [note], "trajectories": [best.trajectory]}
+        return vectors_points(nlp, best.z[None], front.solver, front.stats, **about)

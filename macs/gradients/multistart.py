@@ -37,16 +37,14 @@ class GradientSolves:
     Attributes
     ----------
     counts : Counts
-        Gradient solves, iterations, failures by status.
-    work : int
-        Iterations times variables, of all solves: what they cost, whatever the machine.
+        Gradient solves, iterations, work, failures by status.
     before : callable
         Called before each solve.
     """
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts, self.work = Counts(), 0
+        self.counts = Counts()
         self.before: Callable[[], None] = lambda: None
 
     def __call__(
@@ -56,8 +54,7 @@ class GradientSolves:
         self.before()
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
         solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, **limits)
-        self.work += solved.iterations * len(nlp.variables)
-        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked)
+        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
 
 

@@ -14,7 +14,6 @@ from transcription.catalogue import parse
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
-from ..fronts.verified import verified
 from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
 from ..pareto import archive as archives
@@ -136,7 +135,7 @@ class MACS(Settings, Solver):
             return refined[best_rows(refined)]
         if not self.mends or verify is None:
             return front.verify(verify)
-        return Front.of(mended(verified(front, verify, remark=False), None, progress, fine))
+        return Front.of(mended(front, verify, None, progress, fine))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

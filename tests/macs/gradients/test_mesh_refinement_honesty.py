@@ -244,9 +244,9 @@ def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
 def test_work_ends_where_it_is_to_end():
     problem, wanted = layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6)
     whole, free = searched(problem, wanted)
-    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.work)
+    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.counts.work)
     assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
-    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.work < 0.8 * free.solves.work
+    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
 
 
 def test_programs_of_earlier_meshes_are_not_kept():
