@@ -53,23 +53,25 @@ class Chosen:
         A finer mesh, where one is needed for points that a simulation confirms.
     counts : Counts
         What it cost to find out.
+    ends : Points or None
+        The optima of single objectives on the coarse mesh, from which that was found out.
     """
 
     search: Transcription
     fine: Meshed | None
     counts: Counts
+    ends: Points | None = None
 
 
 def search_transcription(problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float) -> Chosen:
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
         return Chosen(parse(problem.default_transcription), None, Counts())
-    fine, counts = found_mesh(compiled, verify, tolerance)
-    return Chosen(COARSE, None if fine == COARSE else fine, counts)
+    return found_mesh(compiled, verify, tolerance)
 
 
-def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
-    """DFET on a mesh for all points of a front, and what it cost to find.
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> Chosen:
+    """DFET on a coarse mesh for a search, and on a mesh for all points of its front.
 
     Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
     simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
@@ -83,7 +85,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
         Largest scaled residual of a feasible point.
     """
     if not differentiable(problem):
-        return COARSE, Counts()
+        return Chosen(COARSE, None, Counts())
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
@@ -94,8 +96,9 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go()
     counts = solver.counts.joined(job.solves.counts)
-    fine = [found.best.method for found in job.found.values()]
-    return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
+    found = [one.best.method for one in job.found.values()]
+    fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends if len(ends) else None)
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

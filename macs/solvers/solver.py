@@ -74,7 +74,8 @@ class Solver(SearchMethod):
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
             First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
-            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
+            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws; where MACS finds the mesh, also
+            the optima of single objectives that this takes.
         verify : float, optional
             How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
             simulated.
@@ -130,6 +131,7 @@ class Solver(SearchMethod):
                     chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
                     earlier, fine = chosen.counts, chosen.fine if self.mends else None
                     transcription = chosen.search if self.mends else chosen.fine or chosen.search
+                    start = chosen.ends if start is None and self.mends else start
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
             except Stopped as reason:
                 costs_so_far = costs(
