@@ -149,7 +149,10 @@ class _Mending:
         if wanted.accuracy <= accuracy(self.verify)[0]:
             for found in job.found.values():
                 self.simulations.keep(found.best.trajectory, found.best.verdict.simulation)
-        return self.marked(job.points(0.0, ""))
+        again = self.marked(job.points(0.0, ""))
+        # What their meshes went through does not matter for points that are verified now.
+        settled = [bool(again.verified[i]) and i in job.found for i in range(len(again))]
+        return again.replace(notes=["" if done else note for done, note in zip(settled, again.notes, strict=True)])
 
     def _most_work(self, points: Points) -> float | None:
         """What may still be spent, in iterations times variables; None for as much as it takes, where nothing was searched: then the mesh
