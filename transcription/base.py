@@ -18,6 +18,7 @@ from problems.problem import Problem
 
 from .numerics.batched import Batched
 from .phases.mesh import PhaseMesh, as_meshes
+from .phases.pointwise import Parts
 from .phases.reduced import Reduced
 from .trajectories.trajectory import Trajectory
 
@@ -238,6 +239,8 @@ class NLP(Deriving):
     interpolate : callable
         A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
+    parts : Parts, optional
+        The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
 
     problem: CompiledProblem
@@ -256,6 +259,7 @@ class NLP(Deriving):
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
+    parts: Parts | None = None
 
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"

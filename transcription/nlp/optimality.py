@@ -8,7 +8,8 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
-from .scaling import gradients, nlp_scales
+from .derivatives import gradients
+from .scaling import nlp_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""

@@ -1,0 +1,183 @@
+"""Derivatives of an NLP from those of what it evaluates at points, which are small, and constants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.derived import remembered
+
+from ..base import NLP
+from ..stopping import check_stopping
+
+
+class FromPoints:
+    """Derivatives of an NLP that has parts, in a symbol of its variables.
+
+    With y = A z + b at all points, w = f(y), rows L = C w + D z and quantities q = C' w + D' z, all but f' and f'' are constants.
+    """
+
+    def __init__(self, nlp: NLP, z: ca.MX) -> None:
+        assert nlp.parts is not None
+        self._frame = frame = _frame(nlp)
+        inputs = nlp.parts.inputs.call([z])
+        self._inputs = [(y[one.vary, :], y[one.fixed, :]) for one, y in zip(frame.points, inputs, strict=True)]
+        found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(frame.points, self._inputs, strict=True)]
+        self.rows, self.q = nlp.parts.affine.call([z, *(w for w, _ in found)])
+        self._values_by_z = _product(ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found))), frame.A)
+
+    def gradients(self) -> list[ca.MX]:
+        """dF/dz, dg/dz, F and g."""
+        F, c, dF, dc = self._frame.scores(self.q)
+        rows, q = self._by_z(self._frame.rows), self._by_z(self._frame.quantities)
+        return [_product(dF, q), ca.vertcat(rows, _product(dc, q)), F, ca.vertcat(self.rows, c)]
+
+    def hessian(self, of_F: ca.MX, of_g: ca.MX) -> ca.MX:
+        """The upper triangle of the Hessian of of_F'F + of_g'g."""
+        frame, count = self._frame, self.rows.numel()
+        of_rows, of_scores = of_g[:count], ca.vertcat(of_F, of_g[count:])
+        _, _, dF, dc = frame.scores(self.q)
+        of_q = _product(ca.vertcat(dF, dc).T, of_scores)
+        of_values = ca.densify(_product(frame.rows[1].T, of_rows) + _product(frame.quantities[1].T, of_q))
+        first, halves = 0, []
+        for one, (v, rest) in zip(frame.points, self._inputs, strict=True):
+            size, k = one.curvature.size1_in(2), v.shape[1]
+            of_w = ca.reshape(of_values[first : first + size * k], size, k)
+            halves.append(one.curvature.map(k)(v, rest, of_w))
+            first += size * k
+        H = _product(frame.A.T, _product(ca.MX(frame.halves, ca.veccat(*halves)), frame.A))
+        if frame.curved:
+            q = self._by_z([part[frame.curved, :] for part in frame.quantities])
+            H += _product(q.T, _product(frame.curvature(self.q, of_scores), q))
+        return ca.triu(H + H.T)
+
+    def _by_z(self, slopes: Sequence[ca.DM]) -> ca.MX:
+        """The derivatives by z of what has these by z and by the values at the points."""
+        return slopes[0] + _product(slopes[1], self._values_by_z)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """One Function at one point, where some of its inputs vary with z and the others do not.
+
+    Attributes
+    ----------
+    vary, fixed : list of int
+        Which of its inputs do which.
+    slopes : Function
+        (varying, fixed) -> (w, nonzeros of its Jacobian).
+    curvature : Function
+        (varying, fixed, of_w) -> nonzeros of half of the Hessian of of_w'w, whose other half is the same transposed.
+    """
+
+    vary: list[int]
+    fixed: list[int]
+    slopes: ca.Function
+    curvature: ca.Function
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """What of the derivatives of an NLP is known before z is.
+
+    Attributes
+    ----------
+    points : list of _Point
+    A : DM
+        Derivatives by z of all inputs that vary, at all points.
+    slopes, halves : Sparsity
+        Of the Jacobians, and of the halves of the Hessians, at all points.
+    rows, quantities : tuple of DM
+        Derivatives of L and of q by z and by the values at all points.
+    scores : Function
+        q -> (F, c, dF/dq, dc/dq).
+    curvature : Function
+        (q, of_scores) -> half of the Hessian of of_scores'(F, c) by those quantities that are `curved`.
+    curved : list of int
+    """
+
+    points: list[_Point]
+    A: ca.DM
+    slopes: ca.Sparsity
+    halves: ca.Sparsity
+    rows: tuple[ca.DM, ca.DM]
+    quantities: tuple[ca.DM, ca.DM]
+    scores: ca.Function
+    curvature: ca.Function
+    curved: list[int]
+
+
+@remembered
+def _frame(nlp: NLP) -> _Frame:
+    parts = nlp.parts
+    assert parts is not None
+    z = ca.MX.sym("z", len(nlp.variables))
+    inputs = parts.inputs.call([z], True, False)
+    A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
+    diagonals: tuple[list[ca.DM], list[ca.DM]] = [], []
+    points, varying = [], []
+    for function, y, by_z in zip(parts.points, inputs, A, strict=True):
+        check_stopping()
+        size, k = y.shape
+        vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
+        point, *sparsities = _point(function, vary)
+        points.append(point)
+        varying.append(by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :])
+        for every, one in zip(diagonals, sparsities, strict=True):
+            every.append(ca.kron(ca.DM.eye(k), ca.DM(one, 1.0)))
+    values = [ca.MX.sym("w", *parts.affine.size_in(i + 1)) for i in range(len(points))]
+    joined = ca.MX.sym("w", sum(value.numel() for value in values))
+    split = ca.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
+    values = [ca.reshape(one, *value.shape) for one, value in zip(split, values, strict=True)]
+    L, q = parts.affine.call([z, *values], True, False)
+    rows, quantities = ((_constant(one, z, joined), _constant(one, joined, z)) for one in (L, q))
+    slopes, halves = (ca.diagcat(*every).sparsity() for every in diagonals)
+    return _Frame(points, ca.vertcat(*varying), slopes, halves, rows, quantities, *_curved(parts.scores))
+
+
+def _constant(expression: ca.MX, symbol: ca.MX, *others: ca.MX) -> ca.DM:
+    """The derivatives of an affine expression by this one of its symbols."""
+    symbols = [symbol, *others]
+    slopes = ca.Function("constant", symbols, [ca.jacobian(expression, symbol)])
+    return ca.sparsify(slopes(*(ca.DM.zeros(*one.shape) for one in symbols)))
+
+
+def _point(function: ca.Function, vary: np.ndarray) -> tuple[_Point, ca.Sparsity, ca.Sparsity]:
+    """The derivatives of a Function by some of its inputs, and the sparsities of its Jacobian and of half of its Hessian."""
+    size, kind = function.numel_in(0), kind_of(function)
+    fixed = np.setdiff1d(np.arange(size), vary)
+    v, rest, of_w = kind.sym("v", len(vary)), kind.sym("c", len(fixed)), kind.sym("of_w", function.numel_out(0))
+    w = function(ca.vertcat(v, rest)[np.argsort(np.concatenate([vary, fixed])).tolist()])
+    J: Any = ca.jacobian(w, v)
+    H: Any = ca.triu(ca.hessian(ca.dot(of_w, w), v)[0])
+    H *= ca.DM(H.sparsity(), np.where(np.equal(*H.sparsity().get_triplet()), 0.5, 1.0))
+    slopes = ca.Function("slopes", [v, rest], [w, J.nz[:]])
+    curvature = ca.Function("curvature", [v, rest, of_w], [H.nz[:]])
+    return _Point(vary.tolist(), fixed.tolist(), slopes, curvature), J.sparsity(), H.sparsity()
+
+
+def _curved(scores: ca.Function) -> tuple[ca.Function, ca.Function, list[int]]:
+    """Of a Function of quantities: q -> (F, c, dF/dq, dc/dq); (q, of_scores) -> half of the Hessian by those quantities that have any, and
+    which these are."""
+    kind = kind_of(scores)
+    q, of_scores = kind.sym("q", scores.numel_in(0)), kind.sym("of_scores", scores.numel_out(0) + scores.numel_out(1))
+    F, c = scores(q)
+    H = ca.hessian(ca.dot(of_scores, ca.vertcat(F, c)), q)[0]
+    curved = np.unique(np.array(H.sparsity().row(), dtype=int)).tolist()
+    with_slopes = ca.Function("scores", [q], [F, c, ca.jacobian(F, q), ca.jacobian(c, q)])
+    return with_slopes, ca.Function("curvature", [q, of_scores], [0.5 * H[curved, curved]]), curved
+
+
+def _product(left: ca.DM | ca.MX, right: ca.DM | ca.MX) -> ca.MX:
+    """A sparse product, which takes no time where there is nothing."""
+    return ca.mtimes(left, right) if left.nnz() and right.nnz() else ca.MX(left.shape[0], right.shape[1])
+
+
+def kind_of(function: ca.Function) -> Any:
+    """The kind of symbols that a Function is made of: derivatives of flat lists of scalar operations are best made, and fastest, as such
+    lists; a Callback allows none."""
+    return ca.SX if function.is_a("SXFunction") else ca.MX
