@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
@@ -40,7 +39,7 @@ class DFETPhase(PhaseWriter):
         self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
         self._begin = np.array(mesh.edges)[list(mesh.moving)]
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
-        at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
+        at_edges = [v.named(f"{v.name}[edge]") for v in phase.states]
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
@@ -58,9 +57,9 @@ class DFETPhase(PhaseWriter):
         def slot(v: Variable, j: int, k: int) -> int:
             arc = int(arcs[j])
             if arc not in constant.get(v.name, ()):
-                return self.layout.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=True)
+                return self.layout.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=True)
             if (v.name, arc) not in one:
-                one[v.name, arc] = self.layout.add(replace(v, name=f"{prefix}{v.name}[arc {arc}]"), free=True)
+                one[v.name, arc] = self.layout.add(v.named(f"{prefix}{v.name}[arc {arc}]"), free=True)
             return one[v.name, arc]
 
         return np.array([[[slot(v, j, k) for v in self.phase.controls] for k in range(shape[1])] for j in range(self.n)])

@@ -20,37 +20,47 @@ DENSE = 0.25
 @remembered
 def gradients(nlp: NLP) -> ca.Function:
     """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
-    names = ["z"], ["dF", "dg", "F", "g"]
-    if nlp.parts is not None:
-        z = ca.MX.sym("z", len(nlp.variables))
-        return ca.Function("gradients", [z], FromPoints(nlp, z).gradients(), *names)
-    z = kind_of(nlp.functions).sym("z", len(nlp.variables))
-    F, g = nlp.functions(z)
-    return ca.Function("gradients", [z], [ca.jacobian(F, z), _jacobian(g, z), F, g], *names)
+    whole = _from_points(nlp)
+    if whole is not None:
+        z, values = whole.z, whole.gradients()
+    else:
+        z = _symbol(nlp, "z", len(nlp.variables))
+        F, g = nlp.functions(z)
+        values = [ca.jacobian(F, z), _jacobian(g, z), F, g]
+    return ca.Function("gradients", [z], values, ["z"], ["dF", "dg", "F", "g"])
 
 
 @remembered
 def objective_gradients(nlp: NLP) -> ca.Function:
     """z -> dF/dz (m, n), sparse."""
-    if nlp.parts is not None:
-        z = ca.MX.sym("z", len(nlp.variables))
-        return ca.Function("slopes", [z], [FromPoints(nlp, z).gradients()[0]], ["z"], ["dF"])
-    z = kind_of(nlp.functions).sym("z", len(nlp.variables))
+    whole = _from_points(nlp)
+    if whole is not None:
+        return ca.Function("slopes", [whole.z], whole.gradients()[:1], ["z"], ["dF"])
+    z = _symbol(nlp, "z", len(nlp.variables))
     return ca.Function("slopes", [z], [ca.jacobian(nlp.functions(z)[0], z)], ["z"], ["dF"])
 
 
 @remembered
 def hessian(nlp: NLP) -> ca.Function:
     """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse."""
-    names, sizes = ["z", "of_F", "of_g"], [len(nlp.variables), len(nlp.problem.goals), len(nlp.g_scale)]
-    if nlp.parts is not None:
-        z, of_F, of_g = (ca.MX.sym(name, size) for name, size in zip(names, sizes, strict=True))
-        H = FromPoints(nlp, z).hessian(of_F, of_g)
+    whole, sizes = _from_points(nlp), {"of_F": len(nlp.problem.goals), "of_g": len(nlp.g_scale)}
+    if whole is not None:
+        z, (of_F, of_g) = whole.z, (ca.MX.sym(name, size) for name, size in sizes.items())
+        H = whole.hessian(of_F, of_g)
     else:
-        z, of_F, of_g = (kind_of(nlp.functions).sym(name, size) for name, size in zip(names, sizes, strict=True))
+        z, of_F, of_g = (_symbol(nlp, name, size) for name, size in {"z": len(nlp.variables), **sizes}.items())
         F, g = nlp.functions(z)
         H = weighted_hessian(g, of_g, z, ca.dot(of_F, F))
-    return ca.Function("hessian", [z, of_F, of_g], [H], names, ["H"])
+    return ca.Function("hessian", [z, of_F, of_g], [H], ["z", *sizes], ["H"])
+
+
+@remembered
+def _from_points(nlp: NLP) -> FromPoints | None:
+    return None if nlp.parts is None else FromPoints(nlp, nlp.parts)
+
+
+def _symbol(nlp: NLP, name: str, size: int) -> Any:
+    return kind_of(nlp.functions).sym(name, size)
 
 
 def _jacobian(rows: Any, z: Any) -> Any:

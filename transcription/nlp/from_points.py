@@ -9,32 +9,31 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from problems.derived import remembered
-
 from ..base import NLP
+from ..phases.pointwise import Parts
 from ..stopping import check_stopping
 
 
 class FromPoints:
-    """Derivatives of an NLP that has parts, in a symbol of its variables.
+    """Derivatives of an NLP that has parts, in a symbol `z` of its variables.
 
     With y = A z + b at all points, w = f(y), rows L = C w + D z and quantities q = C' w + D' z, all but f' and f'' are constants.
     """
 
-    def __init__(self, nlp: NLP, z: ca.MX) -> None:
-        assert nlp.parts is not None
-        self._frame = frame = _frame(nlp)
-        inputs = nlp.parts.inputs.call([z])
+    def __init__(self, nlp: NLP, parts: Parts) -> None:
+        self.z = ca.MX.sym("z", len(nlp.variables))
+        self._frame = frame = _framed(parts, self.z)
+        inputs = parts.inputs.call([self.z])
         self._inputs = [(y[one.vary, :], y[one.fixed, :]) for one, y in zip(frame.points, inputs, strict=True)]
         found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(frame.points, self._inputs, strict=True)]
-        self.rows, self.q = nlp.parts.affine.call([z, *(w for w, _ in found)])
+        self.rows, self.q = parts.affine.call([self.z, *(w for w, _ in found)])
         self._values_by_z = _product(ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found))), frame.A)
 
     def gradients(self) -> list[ca.MX]:
         """dF/dz, dg/dz, F and g."""
         F, c, dF, dc = self._frame.scores(self.q)
-        rows, q = self._by_z(self._frame.rows), self._by_z(self._frame.quantities)
-        return [_product(dF, q), ca.vertcat(rows, _product(dc, q)), F, ca.vertcat(self.rows, c)]
+        rows = self._by_z(self._frame.rows)
+        return [self._along(dF), ca.vertcat(rows, self._along(dc)), F, ca.vertcat(self.rows, c)]
 
     def hessian(self, of_F: ca.MX, of_g: ca.MX) -> ca.MX:
         """The upper triangle of the Hessian of of_F'F + of_g'g."""
@@ -54,6 +53,11 @@ class FromPoints:
             q = self._by_z([part[frame.curved, :] for part in frame.quantities])
             H += _product(q.T, _product(frame.curvature(self.q, of_scores), q))
         return ca.triu(H + H.T)
+
+    def _along(self, by_q: ca.MX) -> ca.MX:
+        """The derivatives by z of what has these by the quantities."""
+        used = np.flatnonzero(np.diff(by_q.sparsity().colind())).tolist()
+        return _product(by_q[:, used], self._by_z([part[used, :] for part in self._frame.quantities]))
 
     def _by_z(self, slopes: Sequence[ca.DM]) -> ca.MX:
         """The derivatives by z of what has these by z and by the values at the points."""
@@ -111,11 +115,7 @@ class _Frame:
     curved: list[int]
 
 
-@remembered
-def _frame(nlp: NLP) -> _Frame:
-    parts = nlp.parts
-    assert parts is not None
-    z = ca.MX.sym("z", len(nlp.variables))
+def _framed(parts: Parts, z: ca.MX) -> _Frame:
     inputs = parts.inputs.call([z], True, False)
     A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
     diagonals: tuple[list[ca.DM], list[ca.DM]] = [], []

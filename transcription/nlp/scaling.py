@@ -64,8 +64,9 @@ def nlp_scales(nlp: NLP) -> np.ndarray:
     """
     rng = np.random.default_rng(0)
     lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
-    slopes = [np.array(objective_gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower))) for _ in range(SAMPLES)]
-    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=0)
+    Z = lower + rng.random((SAMPLES, len(lower))) * (upper - lower)
+    slopes = np.array(objective_gradients(nlp)(Z.T)).reshape(-1, SAMPLES, len(lower))
+    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=1)
     return np.where(sizes > 0, sizes, 1.0)
 
 
