@@ -76,8 +76,6 @@ class Assembly:
         if not self.layout.hidden:
             largest_peaks = expanded(largest_peaks)
         self._largest = Batched(self._filled(largest_peaks))
-        left = [i for i, propagated in enumerate(rows.propagated) if not propagated]
-        rest = expanded(function("rest", rest=ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left))))
         return NLP(
             problem=self.problem,
             transcription=transcription,
@@ -91,7 +89,7 @@ class Assembly:
             guess=self.guess(),
             profiles=self.profiles(),
             guessed=self.guessed,
-            reduced=self._reduced(rest, left, rows, largest_peaks, scores),
+            reduce=lambda: self._reduced(function, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
@@ -153,8 +151,10 @@ class Assembly:
         values = function.call([extended[: z.numel() + self.layout.hidden]])
         return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
 
-    def _reduced(self, rest: ca.Function, left: list[int], rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
-        """The constraints that propagation leaves to satisfy: `rest`, which are the rows added at `left`."""
+    def _reduced(self, function: Callable[..., ca.Function], rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
+        """The constraints that propagation leaves to satisfy; `function` makes Functions of z."""
+        left = [i for i, propagated in enumerate(rows.propagated) if not propagated]
+        rest = expanded(function("rest", rest=ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left))))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
         return Reduced(
             self.layout,

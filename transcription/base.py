@@ -230,8 +230,8 @@ class NLP(Deriving):
     guessed : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value;
         peaks and absolute values are 0.
-    reduced : Reduced
-        What propagation leaves to satisfy, as functions of the free variables alone.
+    reduce : callable
+        () -> Reduced: what propagation leaves to satisfy, as functions of the free variables alone; see `reduced`.
     tighten : callable
         Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound, and what stands for absolute values to these.
     unpack : callable
@@ -255,7 +255,7 @@ class NLP(Deriving):
     guess: np.ndarray
     profiles: tuple[Profile, ...]
     guessed: Callable[[np.ndarray], np.ndarray]
-    reduced: Reduced
+    reduce: Callable[[], Reduced]
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
@@ -264,6 +264,11 @@ class NLP(Deriving):
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"
         return f"NLP('{self.problem.name}', {self.transcription!r}: {sizes})"
+
+    @cached_property
+    def reduced(self) -> Reduced:
+        """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
+        return self.reduce()
 
     @cached_property
     def lower(self) -> np.ndarray:
