@@ -42,13 +42,15 @@ class FromPoints:
         _, _, dF, dc = frame.scores(self.q)
         of_q = _product(ca.vertcat(dF, dc).T, of_scores)
         of_values = ca.densify(_product(frame.rows[1].T, of_rows) + _product(frame.quantities[1].T, of_q))
-        first, halves = 0, []
+        first, halves, sparsities = 0, [], []
         for one, (v, rest) in zip(frame.points, self._inputs, strict=True):
-            size, k = one.curvature.size1_in(2), v.shape[1]
-            of_w = ca.reshape(of_values[first : first + size * k], size, k)
-            halves.append(one.curvature.map(k)(v, rest, of_w))
+            check_stopping()
+            curvature, sparsity = one.curvature()
+            size, k = curvature.size1_in(2), v.shape[1]
+            halves.append(curvature.map(k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
+            sparsities.append((sparsity, k))
             first += size * k
-        H = _product(frame.A.T, _product(ca.MX(frame.halves, ca.veccat(*halves)), frame.A))
+        H = _product(frame.A.T, _product(ca.MX(_diagonal(sparsities), ca.veccat(*halves)), frame.A))
         if frame.curved:
             q = self._by_z([part[frame.curved, :] for part in frame.quantities])
             H += _product(q.T, _product(frame.curvature(self.q, of_scores), q))
@@ -64,24 +66,36 @@ class FromPoints:
         return slopes[0] + _product(slopes[1], self._values_by_z)
 
 
-@dataclass(frozen=True, eq=False)
 class _Point:
-    """One Function at one point, where some of its inputs vary with z and the others do not.
+    """A Function at one point, where some of its inputs vary with z and the others do not.
 
     Attributes
     ----------
     vary, fixed : list of int
         Which of its inputs do which.
     slopes : Function
-        (varying, fixed) -> (w, nonzeros of its Jacobian).
-    curvature : Function
-        (varying, fixed, of_w) -> nonzeros of half of the Hessian of of_w'w, whose other half is the same transposed.
+        (varying, fixed) -> (w, nonzeros of its Jacobian by those that vary).
+    sparsity : Sparsity
+        Of this Jacobian.
     """
 
-    vary: list[int]
-    fixed: list[int]
-    slopes: ca.Function
-    curvature: ca.Function
+    def __init__(self, function: ca.Function, vary: np.ndarray) -> None:
+        size, kind = function.numel_in(0), kind_of(function)
+        fixed = np.setdiff1d(np.arange(size), vary)
+        self.vary, self.fixed = vary.tolist(), fixed.tolist()
+        self._symbols = kind.sym("v", len(vary)), kind.sym("c", len(fixed)), kind.sym("of_w", function.numel_out(0))
+        v, rest, _ = self._symbols
+        self._values = function(ca.vertcat(v, rest)[np.argsort(np.concatenate([vary, fixed])).tolist()])
+        J = ca.jacobian(self._values, v)
+        self.slopes, self.sparsity = ca.Function("slopes", [v, rest], [self._values, J.nz[:]]), J.sparsity()
+
+    def curvature(self) -> tuple[ca.Function, ca.Sparsity]:
+        """(varying, fixed, of_w) -> nonzeros of half of the Hessian of of_w'w by those that vary, of which the other half is the same
+        transposed; and its sparsity."""
+        v, rest, of_w = self._symbols
+        H: Any = ca.triu(ca.hessian(ca.dot(of_w, self._values), v)[0])
+        H *= ca.DM(H.sparsity(), np.where(np.equal(*H.sparsity().get_triplet()), 0.5, 1.0))
+        return ca.Function("curvature", [v, rest, of_w], [H.nz[:]]), H.sparsity()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +107,8 @@ class _Frame:
     points : list of _Point
     A : DM
         Derivatives by z of all inputs that vary, at all points.
-    slopes, halves : Sparsity
-        Of the Jacobians, and of the halves of the Hessians, at all points.
+    slopes : Sparsity
+        Of the Jacobians at all points.
     rows, quantities : tuple of DM
         Derivatives of L and of q by z and by the values at all points.
     scores : Function
@@ -107,7 +121,6 @@ class _Frame:
     points: list[_Point]
     A: ca.DM
     slopes: ca.Sparsity
-    halves: ca.Sparsity
     rows: tuple[ca.DM, ca.DM]
     quantities: tuple[ca.DM, ca.DM]
     scores: ca.Function
@@ -118,25 +131,26 @@ class _Frame:
 def _framed(parts: Parts, z: ca.MX) -> _Frame:
     inputs = parts.inputs.call([z], True, False)
     A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
-    diagonals: tuple[list[ca.DM], list[ca.DM]] = [], []
-    points, varying = [], []
+    points, varying, sparsities = [], [], []
     for function, y, by_z in zip(parts.points, inputs, A, strict=True):
         check_stopping()
         size, k = y.shape
         vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
-        point, *sparsities = _point(function, vary)
-        points.append(point)
+        points.append(_Point(function, vary))
+        sparsities.append((points[-1].sparsity, k))
         varying.append(by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :])
-        for every, one in zip(diagonals, sparsities, strict=True):
-            every.append(ca.kron(ca.DM.eye(k), ca.DM(one, 1.0)))
     values = [ca.MX.sym("w", *parts.affine.size_in(i + 1)) for i in range(len(points))]
     joined = ca.MX.sym("w", sum(value.numel() for value in values))
     split = ca.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
     values = [ca.reshape(one, *value.shape) for one, value in zip(split, values, strict=True)]
     L, q = parts.affine.call([z, *values], True, False)
     rows, quantities = ((_constant(one, z, joined), _constant(one, joined, z)) for one in (L, q))
-    slopes, halves = (ca.diagcat(*every).sparsity() for every in diagonals)
-    return _Frame(points, ca.vertcat(*varying), slopes, halves, rows, quantities, *_curved(parts.scores))
+    return _Frame(points, ca.vertcat(*varying), _diagonal(sparsities), rows, quantities, *_curved(parts.scores))
+
+
+def _diagonal(blocks: Sequence[tuple[ca.Sparsity, int]]) -> ca.Sparsity:
+    """The sparsity of a matrix with so many of each of these on its diagonal."""
+    return ca.diagcat(*(ca.kron(ca.DM.eye(k), ca.DM(one, 1.0)) for one, k in blocks)).sparsity()
 
 
 def _constant(expression: ca.MX, symbol: ca.MX, *others: ca.MX) -> ca.DM:
@@ -144,20 +158,6 @@ def _constant(expression: ca.MX, symbol: ca.MX, *others: ca.MX) -> ca.DM:
     symbols = [symbol, *others]
     slopes = ca.Function("constant", symbols, [ca.jacobian(expression, symbol)])
     return ca.sparsify(slopes(*(ca.DM.zeros(*one.shape) for one in symbols)))
-
-
-def _point(function: ca.Function, vary: np.ndarray) -> tuple[_Point, ca.Sparsity, ca.Sparsity]:
-    """The derivatives of a Function by some of its inputs, and the sparsities of its Jacobian and of half of its Hessian."""
-    size, kind = function.numel_in(0), kind_of(function)
-    fixed = np.setdiff1d(np.arange(size), vary)
-    v, rest, of_w = kind.sym("v", len(vary)), kind.sym("c", len(fixed)), kind.sym("of_w", function.numel_out(0))
-    w = function(ca.vertcat(v, rest)[np.argsort(np.concatenate([vary, fixed])).tolist()])
-    J: Any = ca.jacobian(w, v)
-    H: Any = ca.triu(ca.hessian(ca.dot(of_w, w), v)[0])
-    H *= ca.DM(H.sparsity(), np.where(np.equal(*H.sparsity().get_triplet()), 0.5, 1.0))
-    slopes = ca.Function("slopes", [v, rest], [w, J.nz[:]])
-    curvature = ca.Function("curvature", [v, rest, of_w], [H.nz[:]])
-    return _Point(vary.tolist(), fixed.tolist(), slopes, curvature), J.sparsity(), H.sparsity()
 
 
 def _curved(scores: ca.Function) -> tuple[ca.Function, ca.Function, list[int]]:
