@@ -18,6 +18,7 @@ from problems.problem import Problem
 
 from .numerics.batched import Batched
 from .phases.mesh import PhaseMesh, as_meshes
+from .phases.pointwise import Parts
 from .phases.reduced import Reduced
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
@@ -234,8 +235,8 @@ class NLP(Deriving):
     guessed : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value;
         peaks and absolute values are 0.
-    reduced : Reduced
-        What propagation leaves to satisfy, as functions of the free variables alone.
+    reduce : callable
+        () -> Reduced: what propagation leaves to satisfy, as functions of the free variables alone; see `reduced`.
     tighten : callable
         Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound, and what stands for absolute values to these.
     unpack : callable
@@ -246,6 +247,8 @@ class NLP(Deriving):
     costates : callable
         A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
         multipliers say nothing between their places.
+    parts : Parts, optional
+        The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
 
     problem: CompiledProblem
@@ -260,15 +263,21 @@ class NLP(Deriving):
     guess: np.ndarray
     profiles: tuple[Profile, ...]
     guessed: Callable[[np.ndarray], np.ndarray]
-    reduced: Reduced
+    reduce: Callable[[], Reduced]
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
+    parts: Parts | None = None
 
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"
         return f"NLP('{self.problem.name}', {self.transcription!r}: {sizes})"
+
+    @cached_property
+    def reduced(self) -> Reduced:
+        """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
+        return self.reduce()
 
     @cached_property
     def lower(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from transcription.meshes.errors import decay_rates, phase_errors
 from transcription.meshes.growth import growth
 from transcription.meshes.scales import control_scales, objective_variations, own_scales, state_scales
 from transcription.meshes.verdict import Wanted, judge
-from transcription.nlp.scaling import gradients
+from transcription.nlp.derivatives import gradients
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
 from transcription.trajectories.simulate import simulate, simulate_elements
 

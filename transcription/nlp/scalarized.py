@@ -287,9 +287,9 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
     options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
+        columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
     except Stopped:
         return _not_begun(nlp, start), False

@@ -17,6 +17,7 @@ from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .guess import along, state_along
 from .layout import Layout
+from .pointwise import Pointwise
 from .state_equations import StateEquations
 
 
@@ -38,8 +39,12 @@ class Ends:
 
 @dataclass
 class Rows:
-    """Rows of constraints as they come together."""
+    """Rows of constraints as they come together.
 
+    `points`, where it is a list, gets what is evaluated `at_points`; by default that is no more than a call.
+    """
+
+    points: list[Pointwise] | None = None
     expressions: list[ca.MX] = field(default_factory=list)
     lower: list[np.ndarray] = field(default_factory=list)
     upper: list[np.ndarray] = field(default_factory=list)
@@ -62,6 +67,16 @@ class Rows:
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+    def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
+        """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
+        point = Pointwise.of(function, inputs)
+        values = point.values
+        if self.points is None:
+            values = point.evaluated
+        elif values.numel():
+            self.points.append(point)
+        return ca.vertsplit(values, np.cumsum([0, *(function.numel_out(i) for i in range(function.n_out()))]).tolist())
 
     @property
     def count(self) -> int:
@@ -114,12 +129,16 @@ class PhaseWriter(ABC):
         Whether fast propagation, and `sensitivity`, can be written in C.
     wide : bool
         Whether `propagate` takes several extended vectors side by side.
+    affine : bool
+        Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
+        variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
     """
 
     interior: np.ndarray = np.empty(0, dtype=int)
     magnitudes: np.ndarray = np.empty(0, dtype=int)
     compilable: bool = False
     wide: bool = False
+    affine: bool = False
 
     def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
         self.phase, self.layout, self.ends = phase, layout, ends
@@ -250,12 +269,10 @@ class PhaseWriter(ABC):
         rows.dynamics[self.phase.name] = slice(rows.count, rows.count + len(states) * k)
         rows.add(residual, 0, 0, np.tile([v.scale for v in states], k), names * (k - 1) + last, propagated=True)
 
-    def add_paths(self, rows: Rows, values: ca.MX, equalities: ca.MX | None = None) -> None:
-        """Add the path constraints, of which `values` (npath, k) are samples; those that are equalities at `equalities` (npath, j) instead,
-        if that is given."""
-        for k, limit in enumerate(self.phase.paths):
-            samples = values if equalities is None or limit.lower < limit.upper else equalities
-            rows.add(samples[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+    def add_paths(self, rows: Rows, values: ca.MX | list[ca.MX]) -> None:
+        """Add the path constraints, of which `values` (npath, k) are samples; or one row of samples for each, of any lengths."""
+        for limit, samples in zip(self.phase.paths, ca.vertsplit(values) if isinstance(values, ca.MX) else values, strict=True):
+            rows.add(samples, limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial
