@@ -240,7 +240,9 @@ def test_work_ends_where_it_is_to_end():
     whole, free = searched(problem, wanted)
     part, loop = searched(problem, wanted, most_work=0.3 * free.solves.counts.work)
     assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
-    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
+    assert (
+        loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
+    )
 
 
 def test_programs_of_earlier_meshes_are_not_kept():
