@@ -44,6 +44,8 @@ def mended(
     With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Points that were not
     simulated are, for `verify`.
     """
+    if not len(points):
+        return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show)
         again = job.solved_again(fine)
