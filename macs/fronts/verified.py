@@ -166,6 +166,12 @@ def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.n
     return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
 
 
+def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, scales: np.ndarray) -> float:
+    """The largest of all that a feasible point with objectives F (m,), all minimised, misses when it is simulated; see `verified`."""
+    values = {goal.name: float(value) for goal, value in zip(problem.goals, F * problem.signs, strict=True)}
+    return max(simulation.max_defect, worst_violation(problem, simulation)[1], missed(simulation, values, scales))
+
+
 def _misses(
     problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], off: float, tolerance: float, remark: bool
 ) -> list[str]:

@@ -17,12 +17,12 @@ from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import Simulations, accuracy, objective_scales, verified
+from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
 from ..io.console import working
 from .filling import filled
 from .fine_front import solved_on
 from .front_polish import KEPT_INSIDE, back_off
-from .mesh_loop import Programs
+from .mesh_loop import BUILDING, OnMesh, Programs
 from .mesh_refinement import FrontRefinement
 from .multistart import GradientSolves
 
@@ -31,9 +31,9 @@ PART = 0.8
 MESHES = 6
 """Most meshes of one point."""
 SHARE = 0.4
-"""What is spent on points that are solved again, as a fraction of what the front cost."""
-LITTLE = 600
-"""Iterations of IPOPT that are little time on any mesh: so many are spent wherever points are missed."""
+"""What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
+LEAST = 100.0
+"""Iterations for each point that is missed, which are allowed even where all that was spent already: enough for one more mesh."""
 
 
 def mended(
@@ -44,6 +44,8 @@ def mended(
     With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Points that were not
     simulated are, for `verify`.
     """
+    if not len(points):
+        return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show)
         again = job.solved_again(fine)
@@ -120,7 +122,7 @@ class _Mending:
 
     def filled(self, points: Points, size: int) -> Points:
         """The points, filled up from verified ones; see `filled`."""
-        most = self._most_work(points)
+        most = self._most_work(points, size - int(points.verified.sum()))
         return filled(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations)
 
     def _as_before(self, points: Points) -> Points:
@@ -144,23 +146,29 @@ class _Mending:
             return points
         limits = PART * self.verify
         wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
-        job = FrontRefinement(points, wanted, MESHES, rows, self._most_work(points), programs=self.programs)
+        scales = objective_scales(points)
+
+        def enough(point: OnMesh) -> bool:
+            return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
+
+        most = self._most_work(points, len(rows))
+        job = FrontRefinement(points, wanted, MESHES, rows, most, programs=self.programs, enough=enough)
         job.go(self.show)
         if wanted.accuracy <= accuracy(self.verify)[0]:
             for found in job.found.values():
                 self.simulations.keep(found.best.trajectory, found.best.verdict.simulation)
         again = self.marked(job.points(0.0, ""))
-        # What their meshes went through does not matter for points that are verified now.
-        settled = [bool(again.verified[i]) and i in job.found for i in range(len(again))]
-        return again.replace(notes=["" if done else note for done, note in zip(settled, again.notes, strict=True)])
+        # What refinement would wish for besides is no complaint about a point that is verified.
+        return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
 
-    def _most_work(self, points: Points) -> float | None:
-        """What may still be spent, in iterations times variables; None for as much as it takes, where nothing was searched: then the mesh
-        is all that there is to be found."""
+    def _most_work(self, points: Points, count: int) -> float | None:
+        """What may still be spent on so many points, in iterations times variables; None for as much as it takes, where nothing was
+        searched: then the mesh is all that there is to be found."""
         if not points.stats["evaluations"]:
             return None
-        left = SHARE * self._work - (points.stats.get("work", 0) - self._work)
-        return max(left, LITTLE * float(np.mean([len(variables) for variables in points.places])))
+        spent = points.stats.get("work", 0) - self._work + BUILDING * self.programs.built
+        size = float(np.mean([len(variables) for variables in points.places]))
+        return max(SHARE * self._work - spent, LEAST * count * size)
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,8 +26,8 @@ from .tasks import Task
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
-BUILDING = 30
-"""Iterations of IPOPT that take as long as it takes to make a program."""
+BUILDING = 100
+"""Iterations of IPOPT that take as long as it takes to make a program with its derivatives: measured 90 to 180."""
 LITTLE = 1e-4
 """Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
 PATIENCE = 3
@@ -181,6 +181,8 @@ class MeshLoop:
         Work of the gradient solves, as `solves` counts it, and of making their programs, after which no new mesh is begun.
     knots : bool
         Whether edges may move to the switches of controls, where meshes then suit one point alone.
+    enough : callable
+        Whether a point is good enough whatever else is wanted.
     """
 
     def __init__(
@@ -191,9 +193,10 @@ class MeshLoop:
         limit: int,
         most_work: float | None = None,
         knots: bool = True,
+        enough: Callable[[OnMesh], bool] = lambda point: False,
     ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
-        self._knots, self._built = knots, programs.built
+        self._knots, self._built, self._enough = knots, programs.built, enough
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
@@ -272,6 +275,9 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
+            if self._enough(present):
+                found.best = present
+                break
             found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
             history.append(self._rank(present, task, least)[1])
             if not self._rank(present, task, least)[0]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -86,6 +86,8 @@ class FrontRefinement:
         See `MeshLoop`.
     programs : Programs, optional
         The NLPs on meshes that others have solved on, too.
+    enough : callable
+        See `MeshLoop`.
     """
 
     def __init__(
@@ -97,12 +99,13 @@ class FrontRefinement:
         most_work: float | None = None,
         knots: bool = True,
         programs: Programs | None = None,
+        enough: Callable[[OnMesh], bool] = lambda point: False,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self._most_work = most_work
         self.found: dict[int, Refinement] = {}
@@ -204,7 +207,7 @@ class FrontRefinement:
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        near_meshes = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
+        near_meshes = self._meshes_near(done, begun.verdict.error, task)
         # Rough controls would need finer meshes than optimal ones.
         own = [] if known or near_meshes else [self.methods[i]]
         hints = list(dict.fromkeys([*near_meshes, *own]))
@@ -215,6 +218,16 @@ class FrontRefinement:
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)
+
+    def _meshes_near(self, done: Sequence[int], error: float, task: Task) -> list[Meshed]:
+        """Meshes that are tried first for a point with an error, in units of what it may be: those of the nearest that is `done`."""
+        if not done:
+            return []
+        nearest = self.found[done[0]]
+        if error > HINTED:
+            return nearest.meshes[-2:]
+        # Where no other mesh has to confirm it, its program is there already. An end is far from others.
+        return [] if self.wanted.confirmed or isinstance(task, End) else [nearest.best.method]
 
     def _trajectory(self, i: int) -> Trajectory:
         found = self.found.get(i)
