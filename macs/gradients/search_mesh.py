@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,15 +60,23 @@ class Chosen:
     counts: Counts
 
 
-def search_transcription(problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float) -> Chosen:
+def search_transcription(
+    problem: Problem | CompiledProblem,
+    compiled: CompiledProblem,
+    verify: float,
+    tolerance: float,
+    show: Callable[[str], None] = lambda words: None,
+) -> Chosen:
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
         return Chosen(parse(problem.default_transcription), None, Counts())
-    fine, counts = found_mesh(compiled, verify, tolerance)
+    fine, counts = found_mesh(compiled, verify, tolerance, show)
     return Chosen(COARSE, None if fine == COARSE else fine, counts)
 
 
-def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
+def found_mesh(
+    problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None] = lambda words: None
+) -> tuple[Meshed, Counts]:
     """DFET on a mesh for all points of a front, and what it cost to find.
 
     Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
@@ -81,18 +89,21 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
         How much simulated points may miss.
     tolerance : float
         Largest scaled residual of a feasible point.
+    show : callable
+        Called with words on what is being done.
     """
     if not differentiable(problem):
         return COARSE, Counts()
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
+    show("ends of the front on a coarse mesh")
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
-    job.go()
+    job.go(show)
     counts = solver.counts.joined(job.solves.counts)
     fine = [found.best.method for found in job.found.values()]
     return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
