@@ -72,6 +72,8 @@ def load(name: str, **data: Any) -> Problem:
     """
     address = CASES[name][0] if name in CASES else name
     place, _, function_name = address.rpartition(":")
+    if name.endswith(".py"):
+        raise ValueError(f"'{name}' is a file; name its function that makes the problem, too: '{name}:function'")
     if not place or not function_name:
         near = difflib.get_close_matches(name, CASES, n=1)
         hint = f", did you mean '{near[0]}'?" if near else ";"

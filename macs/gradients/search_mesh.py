@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,14 +63,20 @@ class Chosen:
     ends: Points | None = None
 
 
-def search_transcription(problem: Problem | CompiledProblem, compiled: CompiledProblem, verify: float, tolerance: float) -> Chosen:
+def search_transcription(
+    problem: Problem | CompiledProblem,
+    compiled: CompiledProblem,
+    verify: float,
+    tolerance: float,
+    show: Callable[[str], None] = lambda words: None,
+) -> Chosen:
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
         return Chosen(parse(problem.default_transcription), None, Counts())
-    return found_mesh(compiled, verify, tolerance)
+    return found_mesh(compiled, verify, tolerance, show)
 
 
-def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> Chosen:
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None] = lambda words: None) -> Chosen:
     """DFET on a coarse mesh for a search, and on a mesh for all points of its front.
 
     Each objective is optimised, and for its best value the others, from the problem's guess or a random start, on a coarse mesh and then on
@@ -83,18 +89,21 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> Cho
         How much simulated points may miss.
     tolerance : float
         Largest scaled residual of a feasible point.
+    show : callable
+        Called with words on what is being done.
     """
     if not differentiable(problem):
         return Chosen(COARSE, None, Counts())
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
+    show("ends of the front on a coarse mesh")
     solved = [solver.lexicographic(k) for k in range(m)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
-    job.go()
+    job.go(show)
     counts = solver.counts.joined(job.solves.counts)
     found = [one.best.method for one in job.found.values()]
     fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE

@@ -118,6 +118,11 @@ class MACS(Settings, Solver):
         """Whether points that a simulation does not confirm are solved again."""
         return self.mesh == "mended" and self.refines
 
+    @property
+    def remeshes(self) -> bool:
+        """Whether points are solved on finer meshes than that of the search."""
+        return self.mends or self.mesh == "adaptive"
+
     def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""

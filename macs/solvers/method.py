@@ -82,6 +82,11 @@ class SearchMethod(ABC):
         """Whether `finish` solves points again that a simulation does not confirm."""
         return False
 
+    @property
+    def remeshes(self) -> bool:
+        """Whether `finish` solves points on finer meshes, so that a search may go on a coarse one."""
+        return self.mends
+
     def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
         """The front, marked by a simulation of its points unless `verify` is None, after further work.
 

@@ -115,9 +115,11 @@ def clock(progress: Progress) -> str:
 
 
 def found(progress: Progress) -> list[str]:
-    """Size of the archive, its best value of each objective, and the number of failures by status."""
+    """Gradient solves, size of the archive, its best value of each objective, and the number of failures by status."""
     words = [f"archive {progress.archive}", *(f"{name} {value:.6g}" for name, value in progress.ideal.items())]
     if not progress.archive:
         words = ["no feasible point yet"]
+    # They go on after the last evaluation.
+    solves = [counted(progress.gradient_solves, "gradient solve")] if progress.gradient_solves else []
     failures = [f"{number:,} {status}".replace(",", " ") for status, number in progress.failures.items() if number]
-    return [*words, *failures]
+    return [*solves, *words, *failures]

@@ -25,6 +25,7 @@ from ..fronts.builders import black_box_points, no_points, trajectory_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
 from ..gradients.search_mesh import search_transcription
+from ..io.console import StatusLine
 from ..io.interrupts import Interrupts
 from .method import SearchMethod
 from .progress import Progress
@@ -128,10 +129,11 @@ class Solver(SearchMethod):
         with Interrupts(time_limit) as interrupts:
             try:
                 if transcription is None:
-                    chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance))
+                    with StatusLine(progress) as show:
+                        chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance), show)
                     earlier, fine = chosen.counts, chosen.fine if self.mends else None
-                    transcription = chosen.search if self.mends else chosen.fine or chosen.search
-                    start = chosen.ends if start is None and self.mends else start
+                    transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
+                    start = chosen.ends if start is None and self.remeshes else start
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
             except Stopped as reason:
                 costs_so_far = costs(

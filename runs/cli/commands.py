@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import traceback
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -176,8 +177,15 @@ def load_problem(address: str, **data: Any) -> Problem:
     except ValueError as error:
         raise WrongCall(str(error)) from error
     except (Exception, SystemExit) as error:
-        raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}") from error
+        raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}{_place(error, address)}") from error
     return problem
+
+
+def _place(error: BaseException, address: str) -> str:
+    """The line of the user's file in which an error arose; "" if there is none."""
+    path = Path(address.rpartition(":")[0]).resolve()
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == path]
+    return f" (line {lines[-1]} of {path.name})" if lines else ""
 
 
 def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None) -> Solver:

@@ -202,3 +202,14 @@ def test_least_distance_satisfies_the_conditions_of_a_nearest_point(seed, d, r):
         fine = ((others >= 0) & (others <= 1)).all(axis=1) & (np.abs(values - b) <= gap + 1e-12).all(axis=1)
         fine = np.vstack([others[fine], inside])
         assert np.linalg.norm(x - center) <= np.linalg.norm(fine - center, axis=1).min() + 1e-6
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
+def test_derivatives_that_are_no_numbers_stop_no_search(broken):
+    A, b, box = np.array([[[1.0, 2.0]], [[broken, 1.0]]]), np.full((2, 1), 1.2), (np.zeros((2, 2)), np.ones((2, 2)))
+    center = np.array([[0.2, 0.3], [0.4, 1.5]])
+    with np.errstate(invalid="ignore"):
+        x, met, multipliers = least_distance(center, A, b, b, box, np.zeros((2, 1)))
+    alone, _, _ = least_distance(center[:1], A[:1], b[:1], b[:1], (box[0][:1], box[1][:1]), np.zeros((1, 1)))
+    assert met.tolist() == [True, False] and np.isfinite(multipliers).all()
+    assert x == pytest.approx(np.array([alone[0], [0.4, 1.0]]), abs=1e-9)

@@ -377,3 +377,24 @@ def test_a_control_that_leaves_its_bounds_between_nodes_violates_them():
 
     check = simulate(nlp.problem, tampered(flight, name, raised))
     assert law.basis == "legendre" and check.violations[f"bounds of {name}.{bound.name}"] == pytest.approx(0.05, abs=1e-3)
+
+
+@pytest.mark.parametrize("place", [0.137, 0.51, 0.866])
+def test_what_is_narrower_than_the_gaps_between_samples_is_found(place):
+    radius, width, distance = 4e-3, 3e-3, 1e-3
+    problem = Problem("past a post")
+    way = problem.phase("way", t0=0, tf=1)
+    x = way.state("x", bounds=(0, 1), initial=0)
+    way.dynamics(x=1.0)
+    away = ca.sqrt((x - place) ** 2 + distance**2)
+    way.path("post", away, lower=radius)
+    problem.minimize("heat", way.peak(1 / (1 + ((x - place) / width) ** 2)))
+    problem.minimize("end", way.final(x))
+    nlp = DFET(1, 2).transcribe(problem)
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
+    check = simulate(nlp.problem, flight)
+    # The flight passes the post at `distance`, and the heat has its peak there, of 1.
+    assert check.violation == pytest.approx(radius - distance, rel=1e-2)
+    assert check.objectives["heat"] == pytest.approx(1.0, rel=1e-3)
+    assert excursions(nlp.problem, flight) == {"way.post": pytest.approx(radius - distance, rel=1e-2)}
+    assert simulate(nlp.problem, flight, rtol=1e-9).trajectory["way"].paths.min() > radius, "no sample shows it"

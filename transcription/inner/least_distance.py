@@ -30,6 +30,7 @@ def least_distance(
     ----------
     center : array (k, d)
     A : array (k, r, d)
+        Where entries are no finite numbers, the constraints are not met, and the point is the one nearest to the center.
     lower, upper : arrays (k, r)
         Infinite where there is no limit, equal for equations.
     box : pair of arrays (k, d)
@@ -45,7 +46,11 @@ def least_distance(
         Multipliers; zeros where none were found.
     """
     x, met, multipliers = _newton(center, A, lower, upper, box, multipliers)
-    for i in np.flatnonzero(~met):
+    finite = np.isfinite(A).all(axis=(1, 2))
+    if not finite.all():
+        # Derivatives overflow where states are about to. Without them a step leads back to the center.
+        x[~finite], met[~finite], multipliers[~finite] = np.clip(center, *box)[~finite], False, 0.0
+    for i in np.flatnonzero(~met & finite):
         exact = _exact(center[i], A[i], lower[i], upper[i], (box[0][i], box[1][i]))
         multipliers[i] = 0.0
         if exact is not None:
@@ -86,9 +91,7 @@ def _newton(
 
 
 def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
-    """The nearest point (d,) of one box, and the multipliers (r,); None where there is none, or where A is no numbers."""
-    if not np.isfinite(A).all():
-        return None
+    """The nearest point (d,) of one box, and the multipliers (r,); None where there is none."""
     every, r = np.eye(len(center)), len(A)
     sides = np.vstack([A, -A, every, -every])
     limits = np.concatenate([lower, -upper, box[0], -box[1]])

@@ -69,8 +69,6 @@ class Newton(InnerSolver):
                     otherwise[going.index] = TIMEOUT
                     break
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
-                if not len(going.index):
-                    break
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         return replace(scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance), light=int(iterations.sum()))
@@ -78,15 +76,12 @@ class Newton(InnerSolver):
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
     ) -> None:
-        """One step of those that go on, from their propagated vectors. Those whose derivatives are no numbers do not."""
+        """One step of those that go on, from their propagated vectors."""
         near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
         going.watched |= (outside > 0.1 * tolerance) & near[:, None]
         if going.settled.any():
             pull = np.where(going.settled[:, None], 0.0, pull)
         step = going.towards(propagated, pull)
-        lost = ~np.isfinite(step).all(axis=1)
-        if lost.any():
-            step[lost] = 0.0
         length = _norm(step)
         if length.max() > CAP:
             far = np.flatnonzero(length > CAP)
@@ -106,8 +101,6 @@ class Newton(InnerSolver):
             improved *= np.minimum(1.0, CAP / np.maximum(_norm(improved), 1e-300))[:, None]
             step = np.where(accelerated[:, None], improved, step)
         going.x = np.minimum(np.maximum(going.x + step, -going.walls), 1.0 + going.walls)
-        if lost.any():
-            going.keep(np.flatnonzero(~lost))
 
 
 class _Going:

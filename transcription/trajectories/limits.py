@@ -1,4 +1,4 @@
-"""Excursions of values beyond their limits, sampled densely."""
+"""Excursions of values beyond their limits, sampled densely, and closer where a limit may be exceeded between samples."""
 
 from __future__ import annotations
 
@@ -11,19 +11,27 @@ from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
 from problems.derived import remembered
 
 from ..numerics.batched import Batched, expanded
+from ..numerics.periodic import wrapped
 from ..numerics.polynomials import lobatto_nodes
-from .trajectory import PhaseTrajectory, Trajectory
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 DENSE = lobatto_nodes(33)
 """Places where an element is sampled, on [-1, 1]."""
 NEGLIGIBLE = 1e-6
 """Excursions up to this, in scales, are those of a feasible point's tolerance."""
+CLOSER, ROUNDS = 17, 3
+"""Places at which two gaps between samples are sampled closer, and how often, each time about the largest value of the last."""
 
 
 def excess(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray:
     """The largest scaled amounts by which the columns of `values` (..., k, c) leave their c limits, shape (..., c), 0 where none does."""
+    return np.maximum(_beyond(values, limits), 0.0).max(axis=-2, initial=0.0)
+
+
+def _beyond(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray:
+    """By how much the columns of `values` (..., c) are beyond their c limits, scaled: negative inside."""
     lower, upper, scale = (np.array([getattr(limit, name) for limit in limits]) for name in ("lower", "upper", "scale"))
-    return np.maximum(np.maximum(lower - values, values - upper) / scale, 0.0).max(axis=-2, initial=0.0)
+    return np.asarray(np.maximum(lower - values, values - upper) / scale)
 
 
 def paths_and_peaks(
@@ -32,6 +40,60 @@ def paths_and_peaks(
     """Path constraints (k, c) and peaks (k, p) at k places of a trajectory whose times and parameters are `s` (ns,)."""
     paths, peaks = _paths_and_peaks_function(phase)(states, controls, times, np.tile(s, (len(times), 1)))
     return paths, peaks
+
+
+def largest_on_elements(
+    phase: CompiledPhase, state: PiecewisePolynomial, trajectory: PhaseTrajectory, s: np.ndarray, paths: np.ndarray, peaks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The largest scaled excess of each path constraint (N, c), 0 where there is none, and the largest value of each peak (N, p).
+
+    What is narrower than the gaps between samples, such as a small obstacle on a long way, is found by its flanks: where the slopes of the
+    samples about the largest one let something exceed a limit, or the peak of the whole phase, the gaps beside it are sampled closer.
+
+    Parameters
+    ----------
+    phase : CompiledPhase
+    state : PiecewisePolynomial
+        The states: simulated ones, or those of the trajectory.
+    trajectory : PhaseTrajectory
+        Whose controls these are.
+    s : array (ns,)
+        Its times and the parameters.
+    paths, peaks : arrays (N, len(DENSE), c), (N, len(DENSE), p)
+        Values at `DENSE` on each element.
+    """
+    count = len(phase.paths)
+    values = np.concatenate([_beyond(paths, phase.paths), peaks], axis=2)
+    largest = values.max(axis=1)
+    # Below this nothing is looked for.
+    ranges = np.ptp(peaks, axis=(0, 1)) if peaks.size else np.zeros(0)
+    floor = np.concatenate([np.zeros(count), largest[:, count:].max(axis=0)]) + NEGLIGIBLE * np.concatenate([np.ones(count), ranges])
+    element, place, column = _promising(values, floor)
+    left, right = DENSE[np.maximum(place - 1, 0)], DENSE[np.minimum(place + 1, len(DENSE) - 1)]
+    each = np.arange(len(element))
+    for _ in range(ROUNDS if len(element) else 0):
+        tau = np.linspace(left, right, CLOSER, axis=1)
+        x, u = state.on(element, tau), wrapped(trajectory.control.on(element, tau), trajectory.control_variables)
+        times = state.edges[element, None] + 0.5 * (1.0 + tau) * np.diff(state.edges)[element, None]
+        found = paths_and_peaks(phase, x.reshape(tau.size, -1), u.reshape(tau.size, -1), times.ravel(), s)
+        closer = np.hstack([_beyond(found[0], phase.paths), found[1]]).reshape(*tau.shape, -1)[each, :, column]
+        best = closer.argmax(axis=1)
+        np.maximum.at(largest, (element, column), closer[each, best])
+        left, right = tau[each, np.maximum(best - 1, 0)], tau[each, np.minimum(best + 1, CLOSER - 1)]
+    return np.maximum(largest[:, :count], 0.0), largest[:, count:]
+
+
+def _promising(values: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Elements, places and columns of those of `values` (N, n, q) at `DENSE` that are not less than both neighbours, and beside which there
+    may be a value above `floor` (q,), as steep as the values rise within two gaps."""
+    edge = np.full_like(values[:, :1], -np.inf)
+    before, after = np.concatenate([edge, values[:, :-1]], axis=1), np.concatenate([values[:, 1:], edge], axis=1)
+    gaps = np.diff(DENSE)
+    slopes = np.pad(np.abs(np.diff(values, axis=1)) / gaps[:, None], ((0, 0), (2, 2), (0, 0)))
+    steepest = np.max([slopes[:, k : k + values.shape[1]] for k in range(4)], axis=0)
+    reach = np.maximum(np.append(gaps, 0.0), np.insert(gaps, 0, 0.0))[:, None] * steepest
+    element, place, column = np.nonzero((values >= before) & (values >= after) & (values + reach > floor))
+    return element, place, column
 
 
 @remembered
@@ -73,7 +135,7 @@ def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, paramet
     x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
     s = np.array([trajectory.t0, trajectory.tf, *parameters])
     paths = paths_and_peaks(phase, x, u, times.ravel(), s)[0].reshape(*times.shape, len(phase.paths))
-    bounded = [i for i, v in enumerate(phase.controls) if v.period is None]
-    limits: tuple[Variable | Limit, ...] = (*phase.states, *(phase.controls[i] for i in bounded), *phase.paths)
-    amounts = excess(np.concatenate([states, controls[..., bounded], paths], axis=2), limits)
-    return {limit.name: amounts[:, i] for i, limit in enumerate(limits)}
+    beyond = largest_on_elements(phase, trajectory.state, trajectory, s, paths, np.empty((*times.shape, 0)))[0]
+    amounts = np.hstack([excess(states, phase.states), excess(controls, phase.controls), beyond])
+    limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.controls, *phase.paths)
+    return {limit.name: amounts[:, i] for i, limit in enumerate(limits) if getattr(limit, "period", None) is None}

@@ -11,7 +11,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, v
 from problems.derived import remembered
 
 from .arcs import METHODS, Arcs
-from .limits import DENSE, excess, paths_and_peaks
+from .limits import DENSE, excess, largest_on_elements, paths_and_peaks
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
@@ -260,12 +260,15 @@ def _start(
 
 def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _SimulatedPhase:
     """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
-    edges, nx = planned.state.edges, len(phase.states)
+    state = PiecewisePolynomial(planned.state.edges, elements[:, :, : len(phase.states)], "lobatto")
+    nx = len(phase.states)
     s = np.concatenate([[planned.t0, planned.tf], parameters])
     times = planned.state.times(DENSE).ravel()
     states = elements[:, :, :nx].reshape(-1, nx)
     controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
     paths, peaks = paths_and_peaks(phase, states, controls, times, s)
+    on_elements = (values.reshape(*elements.shape[:2], values.shape[1]) for values in (paths, peaks))
+    beyond, highest = largest_on_elements(phase, state, planned, s, *on_elements)
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
     trajectory = replace(
@@ -274,12 +277,12 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
         states=states[kept],
         controls=controls[kept],
         paths=paths[kept],
-        state=PiecewisePolynomial(edges, elements[:, :, :nx], "lobatto"),
+        state=state,
     )
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
-    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], peaks.max(axis=0)])
-    return _SimulatedPhase(planned, trajectory, quantities, excess(paths, phase.paths), excess(controls, phase.controls))
+    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])
+    return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0), excess(controls, phase.controls))
 
 
 def _or_infinite(value: float) -> float:

@@ -58,6 +58,11 @@ class PiecewisePolynomial:
         """The same on every element, shape (N, len(tau), k)."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients
 
+    def on(self, elements: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """Values on `elements` (n,) at local coordinates `tau` (n, p) of each, shape (n, p, k)."""
+        values = basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau.ravel())
+        return values.reshape(*tau.shape, -1) @ self.coefficients[elements]
+
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Values (N, k) at the beginning and at the end of each element, also where elements have no length."""
         ends = self.on_elements(np.array([-1.0, 1.0]))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import time
+from dataclasses import replace
 
 from macs.io.console import minutes
 from macs.solvers.progress import Progress, SearchDisplay, clock, count
@@ -46,6 +47,13 @@ def test_a_terminal_sees_it_live():
         time.sleep(0.3)
     shown = stream.getvalue()
     assert "1 200 / 10 000" in shown and "flight time 109.1" in shown and "2 failed" in shown
+
+
+def test_gradient_solves_go_on_after_the_last_evaluation():
+    stream = io.StringIO()
+    with SearchDisplay(stream=stream) as display:
+        display.update(replace(standing(10_000), gradient_solves=31))
+    assert stream.getvalue().startswith("10 000 / 10 000 evaluations, 0:12, 31 gradient solves, archive 4")
 
 
 def test_times_and_counts_in_words():

@@ -8,10 +8,15 @@ import signal
 import numpy as np
 import pytest
 
-from macs import MACS, Progress
+from macs import MACS, NSGA2, Progress
+from macs.evaluation.evaluator import Counts
+from macs.gradients.search_mesh import Chosen
+from macs.solvers.solver import Solver
 from problems import Problem, load
+from problems.compiled import CompiledProblem
 from transcription import DFET
 from transcription.inner import Ipopt
+from transcription.stopping import Stopped
 
 MESH = DFET(3, 2)
 
@@ -176,3 +181,28 @@ def test_candidates_that_the_fast_inner_level_leaves_are_counted() -> None:
     front = MACS(refine=False).solve(problem, DFET(8, 3), evaluations=20, seed=1)
     assert len(front) == 1 and 0 < front.stats["fallbacks"] <= 20
     assert "went to IPOPT, because the fast inner level failed" in front.table()
+
+
+@pytest.mark.parametrize(
+    ("solver", "coarse"),
+    [
+        (MACS(), True),
+        (MACS(mesh="adaptive"), True),
+        (MACS(mesh="fixed"), False),
+        (MACS(refine=False), False),
+        (NSGA2(population=4), False),
+    ],
+)
+def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_ones(
+    monkeypatch: pytest.MonkeyPatch, solver: Solver, coarse: bool
+) -> None:
+    mesh, fine, begun = DFET(2, 2), DFET(5, 3), []
+
+    def record(self: Solver, problem: CompiledProblem, transcription: DFET, *_: object) -> None:
+        begun.append(transcription)
+        raise Stopped("seen")
+
+    monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: Chosen(mesh, fine, Counts()))
+    monkeypatch.setattr(Solver, "_search_run", record)
+    solver.solve(load("goddard"), seed=1)
+    assert begun == [mesh if coarse else fine]
