@@ -305,6 +305,7 @@ class _Job:
                 found.z[None],
                 self._about,
                 self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
+                status=[found.status],
                 notes=[found.note],
                 optimality=certificates(found.nlp, found.z[None], None),
             )

@@ -72,6 +72,11 @@ class Found:
         return self.solved.z if self.refinement is None else self.refinement.best.z
 
     @property
+    def status(self) -> str:
+        """That of the solves on its mesh: what is refined is an optimum."""
+        return self.solved.status if self.refinement is None else CONVERGED
+
+    @property
     def good(self) -> bool:
         """Whether simulations agree with it as well as is wanted."""
         return self.refinement is not None and not self.refinement.complaints() and not self.behind
@@ -79,7 +84,7 @@ class Found:
     @property
     def note(self) -> str:
         """Why it is not good, or what else is to be said of it."""
-        note = "" if self.refinement is None else self.refinement.note
+        note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
         behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
         return "; ".join(words for words in (behind, note) if words)
 

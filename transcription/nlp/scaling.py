@@ -58,18 +58,22 @@ DENSE = 0.25
 """Share of the variables that a row is dense with."""
 SAMPLES = 31
 """Number of places where the slopes of objectives are evaluated for their scales."""
+ROUNDING = 1e-12
+"""An objective that changes by less than this part of its size is constant: its slopes are rounding errors."""
 
 
 @remembered
 def nlp_scales(nlp: NLP) -> np.ndarray:
     """The scales of the objectives (m,) where the front is not known: its change, to first order, if all variables moved by
-    their scales; the median over the box, 1 where that is 0.
+    their scales; the median over the box, 1 where that is 0 or rounding.
     """
     rng = np.random.default_rng(0)
     lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
-    slopes = [np.array(gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower))[0]) for _ in range(SAMPLES)]
+    found = [gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower)) for _ in range(SAMPLES)]
+    slopes, values = np.array([np.array(one[0]) for one in found]), np.array([np.array(one[2]).ravel() for one in found])
     sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=0)
-    return np.where(sizes > 0, sizes, 1.0)
+    least = ROUNDING * np.median(np.nan_to_num(np.abs(values), posinf=0.0), axis=0)
+    return np.where(sizes > least, sizes, 1.0)
 
 
 @remembered
