@@ -40,8 +40,9 @@ from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
-PART, MESHES = 0.1, 8
-"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
+PART, MESHES, MOST_WORK = 0.1, 8, 3e6
+"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it; work, in iterations times variables,
+after which no other mesh is begun: about a minute."""
 AUTO = "auto"
 """As many starts as pay."""
 ROUNDS = 3
@@ -292,7 +293,8 @@ class _Job:
         coarse = [own, *COARSE] if isinstance(own, Meshed) else COARSE
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
-            loop = MeshLoop(Programs(self.problem), self.solves, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+            wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
+            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, MOST_WORK)
             try:
                 starts = None if terms.starts == AUTO and terms.start is None else terms.count
                 found = found_optimum(loop, reference, weights, partial(beginning, terms.start), starts, self._rng, coarse)

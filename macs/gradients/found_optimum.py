@@ -33,7 +33,7 @@ OTHERS, SHORT, SHARE, AGAIN = 4, 200, 0.5, 0.5
 shares of the work before."""
 LITTLE, MUCH = 2e5, 1e6
 """Work, see `MeshLoop`, that is a matter of a second or two, so that other starts may always take it; and that after which no other mesh is
-tried."""
+tried, if there is a result."""
 PASSABLE = 5.0
 """How many times what is wanted a point may miss where other meshes are tried only as long as that takes little."""
 CLEARLY, REFINED = 1e-3, 2
@@ -62,6 +62,7 @@ class Found:
     solved: Solved
     refinement: Refinement | None
     behind: float = 0.0
+    exhausted: bool = False
     starts: int = 0
     optima: int = 0
     times: int = 0
@@ -86,7 +87,8 @@ class Found:
         """Why it is not good, or what else is to be said of it."""
         note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
         behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
-        return "; ".join(words for words in (behind, note) if words)
+        exhausted = "it ended at the most work of a default call: name a transcription" if note and self.exhausted else ""
+        return "; ".join(words for words in (behind, note, exhausted) if words)
 
 
 def found_optimum(
@@ -131,6 +133,7 @@ def found_optimum(
             break
         solver = MultistartSolver(nlp, given(nlp), starts or 1, rng, loop.solves)
         search.begin(method, solver)
+        search.exhausted = loop.most_work is not None and loop.work >= loop.most_work
         if search.enough:
             break
     if starts is None:
@@ -161,6 +164,7 @@ class _Search:
         self._task = Along(reference, weights, np.ones(len(weights)))
         self.all: list[_Attempt] = []
         self._alphas: list[float] = []
+        self.exhausted = False
 
     def begin(self, method: Meshed, solver: MultistartSolver) -> None:
         """Solve on a coarse mesh, and refine."""
@@ -194,7 +198,8 @@ class _Search:
     def enough(self) -> bool:
         """Whether no other coarse mesh is to be tried."""
         best, work = self.best, self.loop.work
-        return best.good or self.loop.ended or work >= MUCH or (work >= LITTLE and self._passable(best))
+        refined = best.refinement is not None
+        return best.good or self.loop.ended or (refined and (work >= MUCH or (work >= LITTLE and self._passable(best))))
 
     def _passable(self, best: Found) -> bool:
         """Whether an optimum is known to be nearly as good as is wanted, in the spans of bounds: what states do may be little of these."""
@@ -218,6 +223,7 @@ class _Search:
         return replace(
             self.all[i].found,
             behind=behind[i],
+            exhausted=self.exhausted,
             starts=len(self._alphas),
             optima=len(_distinct(self._alphas, self.all[i].unit)),
             times=sum(same),
@@ -232,7 +238,8 @@ class _Search:
         for method in dict.fromkeys((first.method, *coarse)):
             with suppress(Stopped), loop.solves.at_most(SHORT):
                 others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), LITTLE))
-        usual, loop.most_work = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), LITTLE)
+        usual, most = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), LITTLE)
+        loop.most_work = most if usual is None else min(most, usual)
         for _, method, solver, solved in sorted(others, key=lambda other: other[0])[:REFINED]:
             if not loop.ended:
                 self.add(method, solver, solved)
