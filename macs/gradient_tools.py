@@ -40,8 +40,11 @@ from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
-PART, MESHES = 0.1, 8
-"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
+PART, MESHES, MOST_WORK = 0.1, 8, 3e6
+"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it; work, in iterations times variables,
+after which no other mesh is begun: about a minute."""
+AUTO = "auto"
+"""As many starts as pay."""
 ROUNDS = 3
 """Largest number of times that points or ends of a sweep are solved again from a better start that another point gave."""
 
@@ -56,7 +59,7 @@ def optimize(
     *,
     objective: str | None = None,
     start: Any = None,
-    starts: int = 1,
+    starts: int | str = "auto",
     seed: int | None = 0,
     tolerance: float = 1e-6,
     verify: float | None = VERIFY,
@@ -76,8 +79,11 @@ def optimize(
         Name of the objective. Default: the first one.
     start : Front, Points or array (k, n), optional
         Decisions to begin with, all variables or the free ones only; the best of them is used.
-    starts : int
-        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned.
+    starts : int or "auto"
+        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned. "auto": one where
+        a transcription or `start` is given; else one, and when its optimum is found, others on its coarse mesh as long as they take little
+        beside that: `stats` has the `starts` that converged there, how many different `optima` they found, and how often that which is
+        returned was `found`.
     seed : int, optional
         Seed of the random starts. None draws one, which is recorded in `stats`.
     tolerance : float
@@ -203,7 +209,7 @@ class Terms:
     """The arguments that all gradient tools have; see `optimize`."""
 
     start: Any
-    starts: int
+    starts: int | str
     seed: int | None
     tolerance: float
     verify: float | None
@@ -213,9 +219,20 @@ class Terms:
 
     def __post_init__(self) -> None:
         check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
-        check_count("starts", self.starts, 1)
+        if self.starts != AUTO:
+            check_count("starts", self.starts, 1)
         check_count("max_iterations", self.max_iterations, 1)
         check_verify(self.verify)
+
+    @property
+    def count(self) -> int:
+        """Number of starts on a mesh that is given."""
+        return 1 if self.starts == AUTO else int(self.starts)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Those that a front records."""
+        return {"starts": self.starts if self.starts == AUTO else int(self.starts)}
 
 
 class _Job:
@@ -230,7 +247,7 @@ class _Job:
         self._terms, self.fixed = terms, transcription is not None
         self._seed = secrets.randbits(63) if terms.seed is None else int(terms.seed)
         self._rng = np.random.default_rng(self._seed)
-        self._about = {"name": name, "settings": {**settings, "starts": int(terms.starts)}}
+        self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
@@ -241,7 +258,7 @@ class _Job:
         """Work on this transcription from now on."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)
-        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), int(self._terms.starts), self._rng, self.solves)
+        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), self._terms.count, self._rng, self.solves)
 
     def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
         """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
@@ -276,9 +293,11 @@ class _Job:
         coarse = [own, *COARSE] if isinstance(own, Meshed) else COARSE
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
-            loop = MeshLoop(Programs(self.problem), self.solves, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+            wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
+            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, MOST_WORK)
             try:
-                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), int(terms.starts), self._rng, coarse)
+                starts = None if terms.starts == AUTO and terms.start is None else terms.count
+                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), starts, self._rng, coarse)
             except Stopped as reason:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
@@ -287,7 +306,8 @@ class _Job:
                 found.nlp,
                 found.z[None],
                 self._about,
-                self._stats(),
+                self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
+                status=[found.status],
                 notes=[found.note],
                 optimality=certificates(found.nlp, found.z[None], None),
             )

@@ -225,7 +225,7 @@ def scalarize(
     iterations = sum(solved.iterations for solved in found)
     ended = best.status != CONVERGED and found[-1].message == AT_LIMIT
     message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
-    if best.status == FAILED and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
+    if best.status in (FAILED, INFEASIBLE) and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
         # Of several objectives, the certificate would not know which was asked for.
         residual = optimality(nlp, best.z)
         if residual <= USEFUL:

@@ -55,19 +55,22 @@ def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
 
 SAMPLES = 31
 """Number of places where the slopes of objectives are evaluated for their scales."""
+ROUNDING = 1e-12
+"""An objective that changes by less than this part of its size is constant: its slopes are rounding errors."""
 
 
 @remembered
 def nlp_scales(nlp: NLP) -> np.ndarray:
     """The scales of the objectives (m,) where the front is not known: its change, to first order, if all variables moved by
-    their scales; the median over the box, 1 where that is 0.
+    their scales; the median over the box, 1 where that is 0 or rounding.
     """
     rng = np.random.default_rng(0)
     lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
     Z = lower + rng.random((SAMPLES, len(lower))) * (upper - lower)
     slopes = np.array(objective_gradients(nlp)(Z.T)).reshape(-1, SAMPLES, len(lower))
     sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=1)
-    return np.where(sizes > 0, sizes, 1.0)
+    least = ROUNDING * np.median(np.nan_to_num(np.abs(nlp.evaluate(Z)[0]), posinf=0.0), axis=0)
+    return np.where(sizes > least, sizes, 1.0)
 
 
 @remembered
