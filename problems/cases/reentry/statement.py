@@ -166,9 +166,11 @@ def reentry(
     problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
 
     guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
-    # Commands within bounds everywhere, and fine enough that most feasible points are feasible when simulated, to 1 % of each limit. It
-    # takes seconds to make a candidate feasible: they are only propagated, and the best are left to the gradients.
-    problem.default_transcription = "dfet:50x2:bernstein:1"
+    # Commands within bounds everywhere. The angles follow a jump of theirs within some ten seconds, the tolerance of the final altitude is a
+    # hundredth of its bounds' span, and peaks, and integrals of absolute values, are of what is sampled: with fewer or simpler elements
+    # simulations confirm hardly any point. It takes seconds to make a candidate feasible: they are only propagated, and the best are left
+    # to the gradients.
+    problem.default_transcription = "dfet:64x4:bernstein:1"
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem
