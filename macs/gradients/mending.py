@@ -35,6 +35,9 @@ ENOUGH = 600.0
 SHARE, LEAST = 0.4, 250.0
 """What is spent on points that are solved again, as a fraction of what the front cost; in iterations for each, at least, as long as that is
 no more than the front cost."""
+LITTLE, LOSS = 0.1, 5e-3
+"""Excess over limits, in their scales, up to which a point is rather moved inside of them than solved on a finer mesh; what that may cost
+in each objective, in ranges of the front."""
 
 
 def mended(points: Points, time_limit: float | None, progress: bool | None, fine: Meshed | None = None) -> Points:
@@ -68,6 +71,9 @@ def solved_again(points: Points, time_limit: float | None = None, progress: bool
         again = points
         if fine is not None:
             again = _refined(again, _doubtful(again, np.ones(len(again), dtype=bool)), show, fine)
+        if slightly := _slightly_outside(again, verify):
+            show("points that are infeasible when simulated are solved again")
+            again = verified(_inside_limits(again, slightly, verify, LOSS), verify)
         missing = _doubtful(again, ~again.verified)
         if missing:
             again = _refined(again, missing, show, work=_most_work(points, len(missing)))
@@ -119,8 +125,17 @@ def _size(points: Points) -> float:
     return float(np.mean([len(variables) for variables in points.places]))
 
 
-def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:
-    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated."""
+def _slightly_outside(points: Points, verify: float) -> list[int]:
+    """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
+    they have, whose program is there already, a solve costs far less than on any other."""
+    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= LITTLE) & (points.status == CONVERGED)
+    off = np.abs(points.simulated_F - points.F) / objective_scales(points)
+    return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
+
+
+def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
+    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated, as long as no objective
+    gets worse by more than the loss, in ranges of the front."""
     moved: dict[int, Points] = {}
     for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
         own = [i for i in rows if points.transcriptions[i] is transcription]
@@ -128,9 +143,11 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points
         evaluator = Bilevel(nlp, Propagate(), float(points.stats["tolerance"]))
         if not evaluator.has_gradients:
             continue
-        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), objective_scales(points), verify)
+        scales = objective_scales(points)
+        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), scales, verify)
+        worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
-        for k in np.flatnonzero(feasible & changed).tolist():
+        for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
             moved[own[k]] = vectors_points(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
     if not moved:
         return points
