@@ -34,6 +34,9 @@ SHARE = 0.4
 """What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
 LEAST = 100.0
 """Iterations for each point that is missed, which are allowed even where all that was spent already: enough for one more mesh."""
+LITTLE, LOSS = 0.1, 5e-3
+"""Excess over limits, in their scales, up to which a point is rather moved inside of them than solved on a finer mesh; what that may cost
+in each objective, in ranges of the front."""
 
 
 def mended(
@@ -111,14 +114,18 @@ class _Mending:
             again = self.marked(solved_on(again, self._meshed(again, before), fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
+        again = self._inside(again, _slightly_outside(again, self.verify), LOSS)
         again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
         again = self._as_before(again)
         beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
-        others = sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond)))
-        if others:
-            self.show("points that are infeasible when simulated are solved again")
-            again = self.marked(_inside_limits(again, others, self.verify))
-        return again
+        return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
+
+    def _inside(self, points: Points, rows: list[int], loss: float = np.inf) -> Points:
+        """The points, of which those in `rows` were moved inside the limits that they exceed; see `_inside_limits`."""
+        if not rows:
+            return points
+        self.show("points that are infeasible when simulated are solved again")
+        return self.marked(_inside_limits(points, rows, self.verify, loss))
 
     def filled(self, points: Points, size: int) -> Points:
         """The points, filled up from verified ones; see `filled`."""
@@ -171,8 +178,17 @@ class _Mending:
         return max(SHARE * self._work - spent, LEAST * count * size)
 
 
-def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:
-    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated."""
+def _slightly_outside(points: Points, verify: float) -> list[int]:
+    """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
+    they have, whose program is there already, a solve costs far less than on any other."""
+    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= LITTLE) & (points.status == CONVERGED)
+    off = np.abs(points.simulated_F - points.F) / objective_scales(points)
+    return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
+
+
+def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
+    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated, as long as no objective
+    gets worse by more than the loss, in ranges of the front."""
     moved: dict[int, Points] = {}
     for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
         own = [i for i in rows if points.transcriptions[i] is transcription]
@@ -180,9 +196,11 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points
         evaluator = Bilevel(nlp, Propagate(), float(points.stats["tolerance"]))
         if not evaluator.has_gradients:
             continue
-        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), objective_scales(points), verify)
+        scales = objective_scales(points)
+        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), scales, verify)
+        worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
-        for k in np.flatnonzero(feasible & changed).tolist():
+        for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
             moved[own[k]] = vectors_points(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
     if not moved:
         return points

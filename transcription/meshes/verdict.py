@@ -46,7 +46,8 @@ class Wanted:
     objectives : float, optional
         Largest error of an objective, in its unit; by default `COST` tolerances.
     confirmed : bool
-        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does.
+        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
+        for controls that polynomials of their degree describe poorly.
     """
 
     tolerance: float
@@ -185,8 +186,10 @@ class Verdict:
         found = []
         for phase in self.errors:
             states = np.maximum(grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible)
-            controls = phase.weight * phase.tail**2 * count / wanted.settled
-            sums = np.zeros(len(states))
+            controls, sums = np.zeros((2, len(states)))
+            # That controls are not optimal, no simulation sees.
+            if wanted.confirmed:
+                controls = phase.weight * phase.tail**2 * count / wanted.settled
             if not self.missed_by_elements <= SAFETY * wanted.settled:
                 sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
             found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))

@@ -135,6 +135,18 @@ def test_points_of_shooting_are_moved_inside_their_limits():
         assert point.transcription["method"] == "SingleShooting"
 
 
+def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
+    """The same on elements, whose states are exact: only between nodes is the height too large."""
+    rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5)
+    again = rough.mended()
+    assert rough.verified.sum() == 1 and rough.simulated_violation.max() < 1e-3 and again.verified.all() and len(again) == 4
+    for point in again:
+        effort, height = point.simulated.values()
+        assert 1 - 1e-4 < effort / (4 / (9 * height)) < 1.01
+    moved = [point for point in again if KEPT_INSIDE in point.note]
+    assert len(moved) == 3 and {point.transcription["settings"]["mesh"] for point in again} == {None}
+
+
 def test_points_that_were_not_simulated_are_simulated_first():
     front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
     assert not front.was_simulated.any() and front.mended().verified.all()
