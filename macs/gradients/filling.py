@@ -13,6 +13,7 @@ from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
+from ..pareto.archive import spread
 from ..pareto.dominance import extremes
 from .mesh_loop import Programs
 from .multistart import GradientSolves
@@ -60,7 +61,11 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float, 
 
 
 def _within(points: Points, size: int) -> np.ndarray:
-    """Rows (k,) of a front with `size` points, if that is possible without a verified one and without the best of any objective."""
+    """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
+    well spread, of others as many as there is room for."""
+    good = np.flatnonzero(points.verified)
+    if len(good) > size:
+        return good[spread(points.simulated_F[good], size)]
     spare = np.flatnonzero(~_needed(points))
     return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
 

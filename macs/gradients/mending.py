@@ -40,23 +40,29 @@ in each objective, in ranges of the front."""
 
 
 def mended(
-    points: Points, verify: float, time_limit: float | None = None, progress: bool | None = None, fine: Meshed | None = None
+    points: Points,
+    verify: float,
+    time_limit: float | None = None,
+    progress: bool | None = None,
+    fine: Meshed | None = None,
+    ends: Points | None = None,
 ) -> Points:
     """The front of the points of which those that are not verified have been solved again; see `Front.mended`.
 
-    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Points that were not
-    simulated are, for `verify`.
+    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of single
+    objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`.
     """
     if not len(points):
         return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show)
         again = job.solved_again(fine)
-        if again is job.points and again.verified.all():
-            return again[best_rows(again)].sorted()
+        joined = again if ends is None else job.with_ends(again, ends)
+        if joined is job.points and joined.verified.all():
+            return joined[best_rows(joined)].sorted()
         # The ranges of the objectives may be others now.
-        kept = job.marked(again[best_rows(again)])
-        if again is not job.points:
+        kept = job.marked(joined[best_rows(joined)])
+        if joined is not job.points:
             kept = job.marked(job.filled(kept, len(points)))
         return job.paid(job.explained(kept.sorted()), interrupts.elapsed, interrupts.reason)
 
@@ -126,6 +132,15 @@ class _Mending:
             return points
         self.show("points that are infeasible when simulated are solved again")
         return self.marked(_inside_limits(points, rows, self.verify, loss))
+
+    def with_ends(self, points: Points, ends: Points) -> Points:
+        """The points with those verified ends that are better in an objective than all of them, by more than a point may miss."""
+        scales, ends = objective_scales(points), self.marked(ends)
+        good = points.simulated_F[points.verified]
+        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - self.verify * scales).any(axis=1)
+        if not better.any():
+            return points
+        return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
 
     def filled(self, points: Points, size: int) -> Points:
         """The points, filled up from verified ones; see `filled`."""

@@ -137,14 +137,15 @@ class MultistartSolver:
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
         return solved
 
-    def lexicographic(self, i: int) -> Solved:
-        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before."""
+    def lexicographic(self, i: int, start: np.ndarray | None = None) -> Solved:
+        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before. `start` (n,) is
+        where it begins, if that is known."""
         m = len(self.nlp.problem.goals)
         ceiling = np.full(m, np.inf)
         best = None
         for j in [i, *(k for k in range(m) if k != i)]:
             reference, weights = np.where(np.arange(m) == j, 0.0, np.inf), np.eye(m)[j]
-            solved = self.solve(reference, weights, None if best is None else ceiling, None if best is None else best.z)
+            solved = self.solve(reference, weights, None if best is None else ceiling, start if best is None else best.z)
             if best is None or solved.status == CONVERGED:
                 best = solved
             if best.status != CONVERGED:

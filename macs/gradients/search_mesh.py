@@ -27,6 +27,8 @@ COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
 PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
+STARTS = 4
+"""Number of starts for each end on the coarse mesh."""
 MESHES = 4
 """Most meshes of one end, beside the coarse one."""
 MOST = 40
@@ -55,12 +57,15 @@ class Chosen:
         What it cost to find out.
     ends : Points or None
         The optima of single objectives on the coarse mesh, from which that was found out.
+    refined : Points or None
+        The same on meshes of their own.
     """
 
     search: Transcription
     fine: Meshed | None
     counts: Counts
     ends: Points | None = None
+    refined: Points | None = None
 
 
 def search_transcription(
@@ -95,9 +100,11 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     if not differentiable(problem):
         return Chosen(COARSE, None, Counts())
     nlp, m = COARSE.nlp(problem), len(problem.goals)
-    solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
+    solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
+    first, solver = (MultistartSolver(nlp, guessed_start(nlp), starts, rng, solves) for starts in (STARTS, 1))
     show("ends of the front on a coarse mesh")
-    solved = [solver.lexicographic(k) for k in range(m)]
+    best = [first.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
+    solved = [solver.lexicographic(k, best[k].z) for k in range(m)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
@@ -107,7 +114,9 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     counts = solver.counts.joined(job.solves.counts)
     found = [one.best.method for one in job.found.values()]
     fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE
-    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends if len(ends) else None)
+    if not len(ends):
+        return Chosen(COARSE, None, counts)
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, job.points(0.0, "").replace(notes=[""] * len(ends)))
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

@@ -16,6 +16,7 @@ from ..front import Front
 from ..fronts.merging import best_rows
 from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
+from ..gradients.search_mesh import Chosen
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.archive import Archive
@@ -123,7 +124,7 @@ class MACS(Settings, Solver):
         """Whether points are solved on finer meshes than that of the search."""
         return self.mends or self.mesh == "adaptive"
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
         if self.polish_on is not None:
@@ -140,7 +141,8 @@ class MACS(Settings, Solver):
             return refined[best_rows(refined)]
         if not self.mends or verify is None:
             return front.verify(verify)
-        return Front.of(mended(front, verify, None, progress, fine))
+        fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.refined)
+        return Front.of(mended(front, verify, None, progress, fine, ends))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

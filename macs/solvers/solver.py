@@ -125,13 +125,13 @@ class Solver(SearchMethod):
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
-        earlier, fine = Counts(), None
+        earlier, chosen = Counts(), None
         with Interrupts(time_limit) as interrupts:
             try:
                 if transcription is None:
                     with StatusLine(progress) as show:
                         chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance), show)
-                    earlier, fine = chosen.counts, chosen.fine if self.mends else None
+                    earlier = chosen.counts
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
                     start = chosen.ends if start is None and self.remeshes else start
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
@@ -144,7 +144,7 @@ class Solver(SearchMethod):
             front = run.go(None, progress, callback, checkpoint)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
-                return self.finish(front, verify, progress, fine) if front.stats["stopped"] in ENDED else front.verify(verify)
+                return self.finish(front, verify, progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:
