@@ -29,7 +29,7 @@ PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
 STARTS = 4
 """Number of starts for each end on the coarse mesh."""
-MESHES = 4
+MESHES = 8
 """Most meshes of one end, beside the coarse one."""
 MOST = 40
 """Most elements of a phase: a search evaluates its mesh thousands of times."""
