@@ -17,6 +17,8 @@ PATIENCE = 100
 LIGHT = 0.25
 """What an iteration of Newton's method on propagated states, or a propagation, takes, in iterations of IPOPT on the same problem: measured
 0.1 to 0.7, more where few candidates are feasible."""
+INSIDE = 2
+"""A solve that is to keep away from limits may take so many times as many: its start is outside of them, and no other stands in for it."""
 
 
 class Bilevel(Evaluator):
@@ -87,7 +89,7 @@ class Bilevel(Evaluator):
                 weights=weight,
                 margin=margin,
                 tolerance=self.tolerance,
-                max_iterations=PATIENCE,
+                max_iterations=PATIENCE if margin is None else INSIDE * PATIENCE,
                 persistent=False,
             )
             if not solved.begun:
