@@ -70,13 +70,14 @@ class Rows:
 
     def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
         """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
+        sizes = [function.numel_out(i) for i in range(function.n_out())]
+        if not sum(sizes):
+            return [ca.MX(0, inputs[0].shape[1])] * len(sizes)
         point = Pointwise.of(function, inputs)
-        values = point.values
-        if self.points is None:
-            values = point.evaluated
-        elif values.numel():
+        if self.points is not None:
             self.points.append(point)
-        return ca.vertsplit(values, np.cumsum([0, *(function.numel_out(i) for i in range(function.n_out()))]).tolist())
+        values = point.evaluated if self.points is None else point.values
+        return ca.vertsplit(values, np.cumsum([0, *sizes]).tolist())
 
     @property
     def count(self) -> int:
