@@ -18,6 +18,7 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
+from transcription import DFET
 from transcription.base import Meshed, Transcription, check_freedom, check_problem
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
@@ -31,6 +32,7 @@ from .fronts.points import Point, Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.found_optimum import COARSE, found_optimum
+from .gradients.guessed_mesh import guessed_elements
 from .gradients.mending import mended, solved_again
 from .gradients.mesh_loop import MeshLoop, Programs
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
@@ -290,7 +292,10 @@ class _Job:
         terms, verify = self._terms, self._terms.verify
         limits = PART * (verify or VERIFY)
         own = default_transcription(self._statement)
-        coarse = [own, *COARSE] if isinstance(own, Meshed) else COARSE
+        coarse = [own, *COARSE] if isinstance(own, Meshed) else list(COARSE)
+        elements = guessed_elements(self.problem)
+        if elements > coarse[0].elements:
+            coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)

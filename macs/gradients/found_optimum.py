@@ -164,6 +164,7 @@ class _Search:
         self._task = Along(reference, weights, np.ones(len(weights)))
         self.all: list[_Attempt] = []
         self._alphas: list[float] = []
+        self._units = np.full(len(weights), np.inf)
         self.exhausted = False
 
     def begin(self, method: Meshed, solver: MultistartSolver) -> None:
@@ -177,7 +178,8 @@ class _Search:
         loop, nlp = self.loop, solver.nlp
         attempt = _Attempt(method, solver, solved, self._task.loss(solved.F), Found(nlp, solved, None))
         if solved.status == CONVERGED:
-            units = loop.units(solved.F[None], nlp, solved.z)
+            # Objectives that are large only where an attempt is poor are not to be judged by that.
+            self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
             with suppress(Stopped):
                 begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
                 refinement = loop.refine(begun, Along(self.reference, self.weights, units))

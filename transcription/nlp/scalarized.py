@@ -18,7 +18,7 @@ from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
 from .optimality import optimality
 from .program import Options, program_parameters, solver
-from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, nlp_scales, origin
+from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, gradients, nlp_scales, origin
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
@@ -31,6 +31,8 @@ AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
 USEFUL = 1e-6
 """Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended."""
+LITTLE = 1e-4
+"""Part of what an objective could change by that counts as one unit of it at least, where it is near zero."""
 AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -227,10 +229,19 @@ def scalarize(
     message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
     if best.status in (FAILED, INFEASIBLE) and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
         # Of several objectives, the certificate would not know which was asked for.
-        residual = optimality(nlp, best.z)
+        residual = optimality(nlp, best.z, _own_scales(nlp, best.z, best.F))
         if residual <= USEFUL:
             best, message = replace(best, status=CONVERGED), f"{message}; the conditions of optimality hold to {residual:.0e}"
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
+
+
+def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """What counts as one in each objective (m,) at a vector: its size there, and a little of what it could change by; no more than its
+    usual scale, which exponentials make huge somewhere in a wide box."""
+    usual = nlp_scales(nlp)
+    change = np.abs(np.nan_to_num(np.array(gradients(nlp)(z)[0]))) @ nlp.scale
+    own = np.maximum(np.abs(F), LITTLE * change)
+    return np.minimum(usual, np.where(own > 0, own, usual))
 
 
 def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
