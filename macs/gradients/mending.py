@@ -105,10 +105,10 @@ class _Mending:
 
     def solved_again(self, fine: Meshed | None = None) -> Points:
         """The points in their order; `points` itself if none was solved."""
-        before = np.ones(len(self.points), dtype=bool)
         again = self.points
         if fine is not None:
-            again = self.marked(solved_on(again, self._meshed(again, before), fine, self.programs, self.show))
+            every = self._meshed(again, np.ones(len(again), dtype=bool))
+            again = self.marked(solved_on(again, every, fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
         again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
