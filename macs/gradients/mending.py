@@ -86,7 +86,8 @@ class _Mending:
     def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
         problem = points.compiled()
         self.points, self.verify, self.show = points, verify, show
-        self.programs, self.simulations = Programs(problem), Simulations(problem, verify)
+        # Points are filled up from the first meshes, too, after others were refined.
+        self.programs, self.simulations = Programs(problem, kept=MESHES), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
         self._work = points.stats.get("work", 0)
 

@@ -16,7 +16,7 @@ from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certificates, vectors_points
+from ..fronts.builders import vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from .mesh_loop import differentiable
@@ -27,8 +27,8 @@ COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
 PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
-MESHES = 4
-"""Most meshes of one end, beside the coarse one."""
+MESHES = 5
+"""Most meshes of one end."""
 MOST = 40
 """Most elements of a phase: a search evaluates its mesh thousands of times."""
 NEAR = 0.25
@@ -71,8 +71,8 @@ def search_transcription(problem: Problem | CompiledProblem, compiled: CompiledP
 def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
     """DFET on a mesh for all points of a front, and what it cost to find.
 
-    Each objective is optimised, and for its best value the others, from the problem's guess or a random start, on a coarse mesh and then on
-    finer ones, until a simulation agrees and a finer mesh changes nothing. The mesh has the elements of all these.
+    Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
+    simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
 
     Parameters
     ----------
@@ -86,10 +86,10 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tup
         return COARSE, Counts()
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
-    solved = [solver.lexicographic(k) for k in range(m)]
+    solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
+    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go()
