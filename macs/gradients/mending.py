@@ -95,7 +95,8 @@ class _Mending:
     def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
         problem = points.compiled()
         self.points, self.verify, self.show = points, verify, show
-        self.programs, self.simulations = Programs(problem), Simulations(problem, verify)
+        # Points are filled up from the first meshes, too, after others were refined.
+        self.programs, self.simulations = Programs(problem, kept=MESHES), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
         self._work = points.stats.get("work", 0)
 
@@ -114,10 +115,10 @@ class _Mending:
 
     def solved_again(self, fine: Meshed | None = None) -> Points:
         """The points in their order; `points` itself if none was solved."""
-        before = np.ones(len(self.points), dtype=bool)
         again = self.points
         if fine is not None:
-            again = self.marked(solved_on(again, self._meshed(again, before), fine, self.programs, self.show))
+            every = self._meshed(again, np.ones(len(again), dtype=bool))
+            again = self.marked(solved_on(again, every, fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
         again = self._inside(again, _slightly_outside(again, self.verify), LOSS)

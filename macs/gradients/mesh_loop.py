@@ -48,14 +48,20 @@ class Programs:
     """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
     since a search was made on them, are not made again.
 
+    Parameters
+    ----------
+    problem : CompiledProblem
+    kept : int
+        How many are kept.
+
     Attributes
     ----------
     built : int
         Variables of all that were made.
     """
 
-    def __init__(self, problem: CompiledProblem) -> None:
-        self.problem, self.built = problem, 0
+    def __init__(self, problem: CompiledProblem, kept: int = KEPT) -> None:
+        self.problem, self.built, self._most = problem, 0, kept
         self._kept: dict[Meshed, NLP] = {}
 
     def __call__(self, method: Meshed) -> NLP:
@@ -65,7 +71,7 @@ class Programs:
             nlp = method.transcribe(self.problem)
             self.built += len(nlp.variables)
         self._kept[method] = nlp
-        while len(self._kept) > KEPT:
+        while len(self._kept) > self._most:
             del self._kept[next(iter(self._kept))]
         return nlp
 

@@ -80,6 +80,14 @@ def test_programs_that_a_search_has_are_not_made_again():
     assert programs(searched) is searched.nlp(problem) and programs.built == len(FINE.nlp(problem).variables)
 
 
+@pytest.mark.parametrize("kept", [1, 2])
+def test_only_the_latest_programs_are_kept(kept):
+    programs, other = Programs(cart().compile(), kept), DFET(2, 3)
+    first = programs(FINE)
+    programs(other)
+    assert (programs(FINE) is first) == (kept == 2)
+
+
 # Places between the ends
 
 numbers = st.floats(-100, 100)
