@@ -18,6 +18,7 @@ from transcription.phases.mesh import PhaseMesh
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import vectors_points
 from ..fronts.points import Points
+from ..fronts.provenance import costs
 from ..fronts.verified import verified
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
@@ -53,11 +54,14 @@ class Chosen:
         A finer mesh, where one is needed for points that a simulation confirms.
     counts : Counts
         What it cost to find out.
+    ends : Points or None
+        The best of each objective alone that were found on the way, each on a mesh of its own, not simulated.
     """
 
     search: Transcription
     fine: Meshed | None
     counts: Counts
+    ends: Points | None = None
 
 
 def search_transcription(
@@ -70,14 +74,19 @@ def search_transcription(
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
         return Chosen(parse(problem.default_transcription), None, Counts())
-    fine, counts = found_mesh(compiled, verify, tolerance, show)
-    return Chosen(COARSE, None if fine == COARSE else fine, counts)
+    fine, counts, ends = mesh_and_ends(compiled, verify, tolerance, show)
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends)
 
 
-def found_mesh(
-    problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None] = lambda words: None
-) -> tuple[Meshed, Counts]:
-    """DFET on a mesh for all points of a front, and what it cost to find.
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
+    """DFET on a mesh for all points of a front, and what it cost to find; see `mesh_and_ends`."""
+    return mesh_and_ends(problem, verify, tolerance, lambda words: None)[:2]
+
+
+def mesh_and_ends(
+    problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None]
+) -> tuple[Meshed, Counts, Points | None]:
+    """DFET on a mesh for all points of a front, what it cost to find, and the ends of the front that led to it.
 
     Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
     simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
@@ -93,20 +102,21 @@ def found_mesh(
         Called with words on what is being done.
     """
     if not differentiable(problem):
-        return COARSE, Counts()
+        return COARSE, Counts(), None
     nlp, m = COARSE.nlp(problem), len(problem.goals)
     solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
     show("ends of the front on a coarse mesh")
     solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False)
+    ends = vectors_points(nlp, Z, {}, costs(Counts(), wall_time=0.0, seed=None, tolerance=tolerance, reproducible=True), sort=False)
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)
     counts = solver.counts.joined(job.solves.counts)
     fine = [found.best.method for found in job.found.values()]
-    return (_common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE), counts
+    mesh = _common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE
+    return mesh, counts, job.points(0.0, "") if len(ends) else None
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

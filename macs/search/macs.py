@@ -115,6 +115,11 @@ class MACS(Settings, Solver):
             state.polishing = None
 
     @property
+    def most_points(self) -> int:
+        """Largest number of points of its fronts."""
+        return self.archive
+
+    @property
     def mends(self) -> bool:
         """Whether points that a simulation does not confirm are solved again."""
         return self.mesh == "mended" and self.refines

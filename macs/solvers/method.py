@@ -78,6 +78,11 @@ class SearchMethod(ABC):
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
     @property
+    def most_points(self) -> int | None:
+        """Largest number of points of its fronts, if there is one."""
+        return None
+
+    @property
     def mends(self) -> bool:
         """Whether `finish` solves points again that a simulation does not confirm."""
         return False

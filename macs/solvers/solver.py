@@ -15,13 +15,14 @@ from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
-from transcription.stopping import Stopped
+from transcription.stopping import Stopped, stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
 from ..evaluation.evaluator import Counts
 from ..front import Front
 from ..fronts.builders import black_box_points, no_points, trajectory_points
+from ..fronts.merging import extended
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
 from ..gradients.search_mesh import search_transcription
@@ -124,13 +125,13 @@ class Solver(SearchMethod):
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
-        earlier, fine = Counts(), None
+        earlier, fine, ends = Counts(), None, None
         with Interrupts(time_limit) as interrupts:
             try:
                 if transcription is None:
                     with StatusLine(progress) as show:
                         chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance), show)
-                    earlier, fine = chosen.counts, chosen.fine if self.mends else None
+                    earlier, fine, ends = chosen.counts, *((chosen.fine, chosen.ends) if self.mends else (None, None))
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
             except Stopped as reason:
@@ -142,7 +143,12 @@ class Solver(SearchMethod):
             front = run.go(None, progress, callback, checkpoint)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
-                return self.finish(front, verify, progress, fine) if front.stats["stopped"] in ENDED else front.verify(verify)
+                if front.stats["stopped"] not in ENDED:
+                    return front.verify(verify)
+                finished = self.finish(front, verify, progress, fine)
+                if ends is None or verify is None or stopping():
+                    return finished
+                return Front.of(extended(finished, ends, verify, self.most_points or len(finished) + len(ends)))
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:
