@@ -89,7 +89,8 @@ def _promising(values: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, np.nd
     edge = np.full_like(values[:, :1], -np.inf)
     before, after = np.concatenate([edge, values[:, :-1]], axis=1), np.concatenate([values[:, 1:], edge], axis=1)
     gaps = np.diff(DENSE)
-    slopes = np.pad(np.abs(np.diff(values, axis=1)) / gaps[:, None], ((0, 0), (2, 2), (0, 0)))
+    with np.errstate(invalid="ignore", over="ignore"):  # of what is no number nothing is looked for: it shows by itself
+        slopes = np.pad(np.abs(np.diff(values, axis=1)) / gaps[:, None], ((0, 0), (2, 2), (0, 0)))
     steepest = np.max([slopes[:, k : k + values.shape[1]] for k in range(4)], axis=0)
     reach = np.maximum(np.append(gaps, 0.0), np.insert(gaps, 0, 0.0))[:, None] * steepest
     element, place, column = np.nonzero((values >= before) & (values >= after) & (values + reach > floor))

@@ -73,6 +73,14 @@ def test_a_search_begins_with_the_optima_of_single_objectives():
     assert front.verified.all() and front.F.min() == pytest.approx(published("two_link_arm")[0].value, rel=5e-4)
 
 
+def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
+    """A few evaluations lead to few points. Least effort in a time T is 12 / T^3, least time 1."""
+    problem = smooth()
+    found = MACS(agents=4).solve(problem, evaluations=6, seed=1)
+    assert found.verified.all() and found.objectives[0] == pytest.approx([1.0, 12.0], rel=1e-4)
+    assert found.objectives[-1] == pytest.approx([2.0, 12 / 2**3], rel=1e-4)
+
+
 def test_what_peaks_forbid_is_searched_on_the_coarse_mesh():
     problem = smooth()
     problem.maximize("top speed", problem.phases["move"].peak(ca.fabs(problem.phases["move"]["v"])))
