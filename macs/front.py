@@ -17,8 +17,8 @@ from .fronts.simulated import simulated
 from .fronts.tables import front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
-from .gradients.mending import mended
-from .gradients.mesh_refinement import refine_mesh
+from .refinement.mending import mended
+from .refinement.mesh_refinement import refine_mesh
 
 if TYPE_CHECKING:
     import xarray

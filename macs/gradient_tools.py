@@ -31,15 +31,15 @@ from .fronts.builders import certificates, nearest_violation, no_points, vectors
 from .fronts.points import Point, Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
-from .gradients.found_optimum import COARSE, found_optimum
-from .gradients.guessed_mesh import guessed_elements
-from .gradients.mending import mended, solved_again
-from .gradients.mesh_loop import MeshLoop, Programs
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
-from .gradients.search_mesh import default_transcription, search_transcription
 from .gradients.targets import METHODS, check_points, targets
 from .io.console import working
 from .pareto.ranges import BETTER, distinct
+from .refinement.found_optimum import COARSE, found_optimum
+from .refinement.guessed_mesh import guessed_elements
+from .refinement.mending import mended, solved_again
+from .refinement.mesh_loop import MeshLoop, Programs
+from .refinement.search_mesh import default_transcription, search_transcription
 from .solvers.start import beginning, check_run
 
 PART, MESHES, MOST_WORK = 0.1, 8, 3e6

@@ -1,1 +1,1 @@
-"""Gradient solves: best of several starts, polish of archives and fronts, mesh refinement."""
+"""Gradient solves: single ones, the best of several starts, the polish of archives and of fronts."""

@@ -138,8 +138,10 @@ class MultistartSolver:
         return solved
 
     def lexicographic(self, i: int, start: np.ndarray | None = None) -> Solved:
-        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before. `start` (n,) is
-        where it begins, if that is known."""
+        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before.
+
+        It begins at `start` (n,), if that is given.
+        """
         m = len(self.nlp.problem.goals)
         ceiling = np.full(m, np.inf)
         best = None

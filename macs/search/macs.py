@@ -14,13 +14,13 @@ from transcription.catalogue import parse
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
-from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
-from ..gradients.search_mesh import Chosen
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
+from ..refinement.mending import mended
+from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit

@@ -15,7 +15,7 @@ from transcription.base import Transcription
 
 from ..evaluation.evaluator import Evaluator
 from ..front import Front
-from ..gradients.search_mesh import Chosen
+from ..refinement.search_mesh import Chosen
 
 
 class SearchMethod(ABC):

@@ -24,9 +24,9 @@ from ..front import Front
 from ..fronts.builders import black_box_points, no_points, trajectory_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
-from ..gradients.search_mesh import search_transcription
 from ..io.console import StatusLine
 from ..io.interrupts import Interrupts
+from ..refinement.search_mesh import search_transcription
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
@@ -62,7 +62,7 @@ class Solver(SearchMethod):
         ----------
         problem : Problem
         transcription : Transcription, optional
-            Default: the problem's own; if it has none, DFET on a mesh that is found, see `gradients.search_mesh`.
+            Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.search_mesh`.
         evaluations : int, optional
             Largest number of candidates that are sent to the inner level. Default: the problem's own number.
         seed : int, optional

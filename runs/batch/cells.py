@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from macs.gradients.search_mesh import default_transcription
 from macs.io.text import call
+from macs.refinement.search_mesh import default_transcription
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver
 from problems import Problem, load

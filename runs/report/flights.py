@@ -15,7 +15,7 @@ from macs.fronts.pictures.flight_plot import along
 from macs.fronts.pictures.style import label
 from macs.fronts.points import Point
 from macs.gradient_tools import payoff
-from macs.gradients.search_mesh import default_transcription
+from macs.refinement.search_mesh import default_transcription
 from problems import load
 from transcription import SingleShooting, from_dict, word
 

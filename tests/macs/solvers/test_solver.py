@@ -10,7 +10,7 @@ import pytest
 
 from macs import MACS, NSGA2, Progress
 from macs.evaluation.evaluator import Counts
-from macs.gradients.search_mesh import Chosen
+from macs.refinement.search_mesh import Chosen
 from macs.solvers.solver import Solver
 from problems import Problem, load
 from problems.compiled import CompiledProblem

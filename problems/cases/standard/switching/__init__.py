@@ -1,1 +1,1 @@
-"""Problems with bang-bang or singular controls."""
+"""Problems with bang-bang controls."""

@@ -21,8 +21,8 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from .multistart import GradientSolves
-from .tasks import Task
+from ..gradients.multistart import GradientSolves
+from ..gradients.tasks import Task
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""

@@ -13,11 +13,11 @@ from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
+from ..gradients.multistart import GradientSolves
+from ..gradients.tasks import Along
 from ..pareto.archive import spread
 from ..pareto.dominance import extremes
 from .mesh_loop import Programs
-from .multistart import GradientSolves
-from .tasks import Along
 
 STARTS = 2
 """Number of verified points from which a solve is tried."""

@@ -18,13 +18,13 @@ from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
+from ..gradients.front_polish import KEPT_INSIDE, back_off
+from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from .filling import filled
 from .fine_front import solved_on
-from .front_polish import KEPT_INSIDE, back_off
 from .mesh_loop import BUILDING, OnMesh, Programs
 from .mesh_refinement import FrontRefinement
-from .multistart import GradientSolves
 
 PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
@@ -49,8 +49,8 @@ def mended(
 ) -> Points:
     """The front of the points of which those that are not verified have been solved again; see `Front.mended`.
 
-    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of single
-    objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`.
+    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of
+    single objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`.
     """
     if not len(points):
         return verified(points, verify)

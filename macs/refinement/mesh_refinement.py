@@ -20,12 +20,12 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import vectors_points
 from ..fronts.points import Point, Points
 from ..fronts.provenance import more_costs
+from ..gradients.multistart import GradientSolves
+from ..gradients.targets import moved_along
+from ..gradients.tasks import Along, End, Task
 from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
-from .multistart import GradientSolves
-from .targets import moved_along
-from .tasks import Along, End, Task
 
 OPTIMAL = 1e-6
 """A point with at most this optimality is not solved again on its first mesh."""

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from macs import MACS
-from macs.gradients.search_mesh import COARSE, MOST, _together, default_transcription, found_mesh
+from macs.refinement.search_mesh import COARSE, MOST, _together, default_transcription, found_mesh
 from problems import Problem, load
 from problems.cases.standard.collection import published
 from transcription import parse

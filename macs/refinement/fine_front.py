@@ -15,11 +15,11 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import certificates, vectors_points
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
+from ..gradients.multistart import GradientSolves
+from ..gradients.targets import moved_along
+from ..gradients.tasks import Along, End, Task
 from ..pareto.dominance import extremes
 from .mesh_loop import DRIFT, MeshLoop, Programs, differentiable
-from .multistart import GradientSolves
-from .targets import moved_along
-from .tasks import Along, End, Task
 
 NEIGHBOURS = 2
 """Number of neighbours from which a point is solved, too, where it is lost or gets worse from its own trajectory."""

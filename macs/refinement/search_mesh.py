@@ -19,9 +19,9 @@ from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certificates, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
+from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
-from .multistart import GradientSolves, MultistartSolver, guessed_start
 
 COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""

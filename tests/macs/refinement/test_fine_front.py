@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from macs import Front, sweep
 from macs.evaluation.evaluator import CONVERGED
-from macs.gradients.fine_front import solved_on
-from macs.gradients.mesh_loop import Programs
 from macs.gradients.targets import MOVED, moved_along
+from macs.refinement.fine_front import solved_on
+from macs.refinement.mesh_loop import Programs
 from problems import Problem
 from transcription import DFET
 from transcription.stopping import stopped_by

@@ -12,10 +12,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from macs import optimize, sweep
-from macs.gradients.found_optimum import COARSE, found_optimum
-from macs.gradients.mesh_loop import KEPT, MeshLoop, Programs
 from macs.gradients.multistart import GradientSolves
 from macs.gradients.tasks import End
+from macs.refinement.found_optimum import COARSE, found_optimum
+from macs.refinement.mesh_loop import KEPT, MeshLoop, Programs
 from problems import Problem, load
 from problems.cases.standard.collection import published
 from transcription import DFET, parse

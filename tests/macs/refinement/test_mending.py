@@ -9,9 +9,9 @@ from test_front_polish_back_off import bryson_denham
 from macs import MACS, NSGA2, Front, payoff, sweep
 from macs.fronts import verified
 from macs.fronts.verified import unmarked
-from macs.gradients import mending
 from macs.gradients.front_polish import KEPT_INSIDE
-from macs.gradients.mesh_refinement import FrontRefinement
+from macs.refinement import mending
+from macs.refinement.mesh_refinement import FrontRefinement
 from problems import Problem, load
 from transcription import DFET, SingleShooting
 from transcription.meshes.verdict import Wanted

@@ -14,9 +14,9 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
+from ..gradients.multistart import MultistartSolver
+from ..gradients.tasks import Along
 from .mesh_loop import MeshLoop, Refinement
-from .multistart import MultistartSolver
-from .tasks import Along
 
 COARSE: tuple[Meshed, ...] = (
     DFET(8, 3),

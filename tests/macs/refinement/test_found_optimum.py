@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from macs import optimize
-from macs.gradients.found_optimum import found_optimum
-from macs.gradients.guessed_mesh import COUNTS, guessed_elements
-from macs.gradients.mesh_loop import MeshLoop, Programs
 from macs.gradients.multistart import GradientSolves
+from macs.refinement.found_optimum import found_optimum
+from macs.refinement.guessed_mesh import COUNTS, guessed_elements
+from macs.refinement.mesh_loop import MeshLoop, Programs
 from problems import Problem, load
 from problems.cases.standard import published
 from transcription import DFET

@@ -1,0 +1,1 @@
+"""Flights with smooth controls, without active constraints along the way."""
