@@ -11,7 +11,6 @@ import numpy as np
 
 from ..base import NLP
 from ..phases.pointwise import Parts
-from ..stopping import check_stopping
 
 
 class FromPoints:
@@ -44,7 +43,6 @@ class FromPoints:
         of_values = ca.densify(_product(frame.rows[1].T, of_rows) + _product(frame.quantities[1].T, of_q))
         first, halves, sparsities = 0, [], []
         for one, (v, rest) in zip(frame.points, self._inputs, strict=True):
-            check_stopping()
             curvature, sparsity = one.curvature()
             size, k = curvature.size1_in(2), v.shape[1]
             halves.append(curvature.map(k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
@@ -133,7 +131,6 @@ def _framed(parts: Parts, z: ca.MX) -> _Frame:
     A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
     points, varying, sparsities = [], [], []
     for function, y, by_z in zip(parts.points, inputs, A, strict=True):
-        check_stopping()
         size, k = y.shape
         vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
         points.append(_Point(function, vary))
