@@ -12,7 +12,8 @@ from statements import refused
 
 from problems import load
 from problems.cases.reentry import case1, case2, case3, statement, vehicle
-from transcription import DFET, Trajectory
+from transcription import DFET, Trajectory, parse
+from transcription.trajectories.simulate import simulate
 
 STATES = ["altitude", "longitude", "latitude", "speed", "flight-path angle", "heading", "angle of attack", "bank angle"]
 CASES = ["reentry_case1", "reentry_case2", "reentry_case3"]
@@ -258,6 +259,21 @@ def test_any_data_make_a_problem(data):
     nlp = DFET(3, 1).transcribe(load("reentry_case1", **data))
     Z = nlp.first_guess(nlp.guess[None])
     assert np.isfinite(nlp.evaluate(Z)[1]).all()
+
+
+def test_the_default_mesh_follows_commands_that_jump():
+    """At the end a hundredth of the altitude's span is left open, of which a thousandth counts."""
+    problem = load("reentry_case1")
+    nlp = parse(problem.default_transcription).transcribe(problem)
+    Z = nlp.first_guess(nlp.guess[None])
+    for k in nlp.free:
+        name = nlp.variables[k].name
+        if "bank angle command" in name:
+            element = int(name.split("[")[1].split(",")[0])
+            Z[0, k] += math.radians(15.0 if element % 2 else -15.0)
+    flight = nlp.unpack(nlp.propagate(np.clip(Z, nlp.lower, nlp.upper))[0])
+    found = simulate(nlp.problem, flight, rtol=1e-10, atol=1e-11)
+    assert found.max_defect < 1e-5 and np.degrees(np.abs(np.diff(flight["entry"].controls[:, 1]))).max() > 10.0
 
 
 def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():

@@ -12,6 +12,8 @@ import pytest
 from moocore import hypervolume, is_nondominated
 from test_reentry import STATES, by_hand
 
+from macs import MACS
+from problems import load
 from problems.cases.reentry import case1, case2, case3, statement
 from transcription import DFET
 from transcription.nlp.scalarized import scalarize
@@ -108,6 +110,22 @@ def test_flights_of_the_reference_pass_south_of_all_zones(flights):
     if case == "case3":
         for east, north in np.degrees(states[:, 1:3]).transpose(2, 1, 0):
             assert all(np.interp(zone.longitude, east, north) < zone.latitude for zone in case3.ZONES)
+
+
+@pytest.mark.slow
+def test_points_that_the_default_search_calls_verified_are_right():
+    """Each of those that stayed on the mesh of the search, by the equations that are written here."""
+    problem = load("reentry_case1")
+    front = MACS().solve(problem, inner=problem.default_inner, start=problem.default_start, seed=3)
+    assert len(front) == 10 and front.verified.sum() >= 8
+    kept = [point for point in front if point.verified and point.transcription["settings"]["mesh"] is None]
+    laws = np.array([point.trajectory["entry"].control.coefficients for point in kept])
+    objectives, worst, states = simulated(laws)
+    off = np.abs(objectives * SIGNS - np.array([point.F for point in kept])) / np.ptp(front.F, axis=0)
+    assert len(kept) >= 6 and off.max() < 1.1e-3
+    assert (worst <= (1 + 1.1e-3) * np.array(LIMITS["case1"])[:, None]).all()
+    for k, (target, tolerance) in END.items():
+        assert (np.abs(states[-1, k] - target) <= (1 + 1.1e-3) * tolerance).all(), STATES[k]
 
 
 @pytest.mark.slow
