@@ -50,7 +50,7 @@ class Front(Points):
         return f"<Front: {headline(self)}>"
 
     def refine_mesh(
-        self, *, tolerance: float = 1e-7, limit: int = 8, time_limit: float | None = None, progress: bool | None = None
+        self, *, tolerance: float = 1e-7, limit: int = 12, time_limit: float | None = None, progress: bool | None = None
     ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
@@ -167,7 +167,7 @@ class Front(Points):
         """The front with those points solved again that a simulation did not confirm; if it was not simulated, it is now.
 
         Each is solved where it misses: on finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This
-        takes four tenths of what the front cost, in iterations times variables, or up to as much where few solves were made. The others
+        takes at most four tenths of what the front cost, in iterations times variables, or a little where that was little. The others
         stay as they are. Points that are verified are compared by their simulated objectives; what is still not verified stays only if no
         verified point is as good.
 
@@ -189,7 +189,7 @@ class Front(Points):
             For a black box, and a problem that cannot be found.
         """
         marked = self if self.was_simulated.any() else self.verify()
-        return Front.of(mended(marked, time_limit, progress))
+        return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
 
     def simulate(
         self,

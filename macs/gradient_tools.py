@@ -18,6 +18,7 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
+from transcription import DFET
 from transcription.base import Meshed, Transcription, check_freedom, check_problem
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
@@ -31,6 +32,7 @@ from .fronts.points import Point, Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.found_optimum import COARSE, found_optimum
+from .gradients.guessed_mesh import guessed_elements
 from .gradients.mending import mended, solved_again
 from .gradients.mesh_loop import MeshLoop, Programs
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
@@ -40,8 +42,11 @@ from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .solvers.start import beginning, check_run
 
-PART, MESHES = 0.1, 8
-"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
+PART, MESHES, MOST_WORK = 0.1, 8, 3e6
+"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it; work, in iterations times variables,
+after which no other mesh is begun: about a minute."""
+AUTO = "auto"
+"""As many starts as pay."""
 ROUNDS = 3
 """Largest number of times that points or ends of a sweep are solved again from a better start that another point gave."""
 
@@ -56,7 +61,7 @@ def optimize(
     *,
     objective: str | None = None,
     start: Any = None,
-    starts: int = 1,
+    starts: int | str = "auto",
     seed: int | None = 0,
     tolerance: float = 1e-6,
     verify: float | None = VERIFY,
@@ -76,8 +81,11 @@ def optimize(
         Name of the objective. Default: the first one.
     start : Front, Points or array (k, n), optional
         Decisions to begin with, all variables or the free ones only; the best of them is used.
-    starts : int
-        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned.
+    starts : int or "auto"
+        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned. "auto": one where
+        a transcription or `start` is given; else one, and when its optimum is found, others on its coarse mesh as long as they take little
+        beside that: `stats` has the `starts` that converged there, how many different `optima` they found, and how often that which is
+        returned was `found`.
     seed : int, optional
         Seed of the random starts. None draws one, which is recorded in `stats`.
     tolerance : float
@@ -195,7 +203,7 @@ def sweep(
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.problem.goals))
-    return job.run(lambda: job.swept(points, method), partial(mended, time_limit=None, progress=None))
+    return job.run(lambda: job.swept(points, method), mended)
 
 
 @dataclass(frozen=True)
@@ -203,7 +211,7 @@ class Terms:
     """The arguments that all gradient tools have; see `optimize`."""
 
     start: Any
-    starts: int
+    starts: int | str
     seed: int | None
     tolerance: float
     verify: float | None
@@ -213,9 +221,20 @@ class Terms:
 
     def __post_init__(self) -> None:
         check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
-        check_count("starts", self.starts, 1)
+        if self.starts != AUTO:
+            check_count("starts", self.starts, 1)
         check_count("max_iterations", self.max_iterations, 1)
         check_verify(self.verify)
+
+    @property
+    def count(self) -> int:
+        """Number of starts on a mesh that is given."""
+        return 1 if self.starts == AUTO else int(self.starts)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Those that a front records."""
+        return {"starts": self.starts if self.starts == AUTO else int(self.starts)}
 
 
 class _Job:
@@ -230,7 +249,7 @@ class _Job:
         self._terms, self.fixed = terms, transcription is not None
         self._seed = secrets.randbits(63) if terms.seed is None else int(terms.seed)
         self._rng = np.random.default_rng(self._seed)
-        self._about = {"name": name, "settings": {**settings, "starts": int(terms.starts)}}
+        self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
@@ -241,9 +260,9 @@ class _Job:
         """Work on this transcription from now on."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)
-        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), int(self._terms.starts), self._rng, self.solves)
+        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), self._terms.count, self._rng, self.solves)
 
-    def run(self, work: Callable[[], Front], again: Callable[[Points], Points]) -> Front:
+    def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
         """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
 
         Within, the time limit and Ctrl-C ask the work to end, and its progress is shown. Unless the transcription was given, points that
@@ -262,8 +281,8 @@ class _Job:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             self._stopped = interrupts.reason
-            front = front.replace(stats=front.stats | self._stats()).verify(verify)
-            return front if self.fixed or verify is None else Front.of(again(front))
+            front = front.replace(stats=front.stats | self._stats())
+            return front.verify(verify) if self.fixed or verify is None else Front.of(again(front, verify))
 
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
         """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is
@@ -273,12 +292,17 @@ class _Job:
         terms, verify = self._terms, self._terms.verify
         limits = PART * (verify or VERIFY)
         own = default_transcription(self._statement)
-        coarse = [own, *COARSE] if isinstance(own, Meshed) else COARSE
+        coarse = [own, *COARSE] if isinstance(own, Meshed) else list(COARSE)
+        elements = guessed_elements(self.problem)
+        if elements > coarse[0].elements:
+            coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
-            loop = MeshLoop(Programs(self.problem), self.solves, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES)
+            wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
+            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, MOST_WORK)
             try:
-                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), int(terms.starts), self._rng, coarse)
+                starts = None if terms.starts == AUTO and terms.start is None else terms.count
+                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), starts, self._rng, coarse)
             except Stopped as reason:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
@@ -287,7 +311,8 @@ class _Job:
                 found.nlp,
                 found.z[None],
                 self._about,
-                self._stats(),
+                self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
+                status=[found.status],
                 notes=[found.note],
                 optimality=certificates(found.nlp, found.z[None], None),
             )

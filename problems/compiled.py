@@ -34,9 +34,16 @@ class Variable:
     scale: float = 1.0
     period: float | None = None
 
+    def __hash__(self) -> int:
+        return hash(self.name)
+
     @property
     def span(self) -> float:
         return self.upper - self.lower
+
+    def named(self, name: str) -> Variable:
+        """The same under another name."""
+        return Variable(name, self.lower, self.upper, self.unit, self.scale, self.period)
 
 
 @dataclass(frozen=True)

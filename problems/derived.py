@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from functools import cached_property, wraps
+from inspect import unwrap
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 Owner = TypeVar("Owner", bound="Deriving")
@@ -35,3 +36,11 @@ def remembered(function: Callable[Concatenate[Owner, Further], Result]) -> Calla
         return result
 
     return once
+
+
+def computed(
+    function: Callable[Concatenate[Owner, Further], Result], owner: Owner, *further: Further.args, **none: Further.kwargs
+) -> Result | None:
+    """What a `remembered` function has computed already; None if it has not been asked."""
+    result: Result | None = owner.derived.get((unwrap(function), *further))
+    return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,7 @@ from .compiled import CompiledPhase, CompiledProblem, Variable
 from .derived import remembered
 
 SAMPLES, FEW = 2048, 64
+"""Most samples; as many as do where each expression is a number at one of them."""
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -23,10 +25,7 @@ def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
     labels : sequence of mappings
         For each phase, by name of its Functions, what to call each of their rows.
     """
-    found = _sampled(problem, labels)
-    place = f"of problem '{problem.name}'"
-    _finite(problem.objectives, found, [f"objective '{goal.name}' {place}" for goal in problem.goals])
-    _finite(problem.constraints, found, [f"constraint '{limit.name}' {place}" for limit in problem.limits])
+    _sampled(problem, labels)
 
 
 def samples(problem: CompiledProblem) -> list[np.ndarray]:
@@ -46,14 +45,26 @@ def objective_spreads(problem: CompiledProblem) -> np.ndarray:
 
 
 def _sampled(problem: CompiledProblem, labels: Sequence[Labels]) -> list[np.ndarray]:
-    """The same, (size, SAMPLES) each."""
+    """The same, (size, FEW) each, or (size, SAMPLES) where few are not enough to find numbers. Raises as `check_numbers` does."""
+    with suppress(ValueError):
+        return _checked(problem, labels, FEW)
+    return _checked(problem, labels, SAMPLES)
+
+
+def _checked(problem: CompiledProblem, labels: Sequence[Labels], count: int) -> list[np.ndarray]:
+    """The first `count` samples. Raises ValueError if an expression is a number at none of them."""
     rng = np.random.default_rng(0)
     p = _between(rng, problem.parameters)
-    return [*(_quantities(phase, words, p, rng) for phase, words in zip(problem.phases, labels, strict=True)), p]
+    found = [_quantities(phase, words, p, rng, count) for phase, words in zip(problem.phases, labels, strict=True)]
+    found.append(p[:, :count])
+    place = f"of problem '{problem.name}'"
+    _finite(problem.objectives, found, [f"objective '{goal.name}' {place}" for goal in problem.goals])
+    _finite(problem.constraints, found, [f"constraint '{limit.name}' {place}" for limit in problem.limits])
+    return found
 
 
-def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Samples of a phase's quantities, shape (n_quantities, SAMPLES)."""
+def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:
+    """Samples of a phase's quantities, shape (n_quantities, count)."""
     t0, tf = _between(rng, [phase.t0]), _between(rng, [phase.tf])
     tf = np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
     share, s = rng.random(SAMPLES), np.vstack([t0, tf, p])
@@ -61,14 +72,16 @@ def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.ran
     # Half of the samples anywhere in the box, half of them near the ways from the initial to the final states.
     inside = np.where(np.arange(SAMPLES) % 2, _between(rng, phase.states), first + share * (last - first))
     u = _between(rng, phase.controls)
+
+    def values(function: ca.Function, *inputs: np.ndarray) -> np.ndarray:
+        return _finite(function, [one[:, :count] for one in inputs], labels[function.name()])
+
     along = inside, u, t0 + share * (tf - t0), s
-    _finite(phase.dynamics, along, labels["dynamics"])
-    _finite(phase.path, along, labels["path"])
-    initials = _finite(phase.initials, (first, u, t0, s), labels["initials"])
-    finals = _finite(phase.finals, (last, u, tf, s), labels["finals"])
-    integrals = _finite(phase.integrands, along, labels["integrands"]) * (tf - t0)
-    peaks = _finite(phase.peaks, along, labels["peaks"])
-    return np.vstack([t0, tf, initials, finals, integrals, peaks])
+    values(phase.dynamics, *along)
+    values(phase.path, *along)
+    initials, finals = values(phase.initials, first, u, t0, s), values(phase.finals, last, u, tf, s)
+    integrals = values(phase.integrands, *along) * (tf - t0)[:, :count]
+    return np.vstack([t0[:, :count], tf[:, :count], initials, finals, integrals, values(phase.peaks, *along)])
 
 
 def _between(rng: np.random.Generator, variables: Sequence[Variable]) -> np.ndarray:
@@ -81,9 +94,9 @@ def _within(rng: np.random.Generator, ranges: Sequence[tuple[float, float]]) -> 
 
 
 def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequence[str]) -> np.ndarray:
-    """Values of a Function (rows, SAMPLES); those that are no numbers replaced by others of the same row."""
+    """Values of a Function (rows, count); those that are no numbers replaced by others of the same row."""
     if not labels:
-        return np.empty((0, SAMPLES))
+        return np.empty((0, inputs[0].shape[1]))
     values = np.array(function(*inputs))
     for label, row in zip(labels, values, strict=True):
         good = np.isfinite(row)

@@ -6,7 +6,7 @@ objectives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -18,10 +18,11 @@ from .base import NLP, Profile, Transcription
 from .numerics.batched import Batched, expanded
 from .phases.guess import along
 from .phases.layout import Layout
+from .phases.pointwise import Parts, Pointwise
 from .phases.reduced import Reduced
 from .phases.writer import Ends, PhaseWriter, Rows
 from .stopping import check_stopping
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
 
@@ -52,15 +53,26 @@ class Assembly:
         """The whole NLP."""
         z = ca.MX.sym("z", len(self.layout.variables) + self.layout.hidden)
         extended = self.layout.extended_symbol(z)
-        rows = Rows()
+        affine, rows = all(writer.affine for writer in self._declared), Rows()
+        points = rows.points = [] if affine else None
         written = [self._write_phase(*one, extended, rows) for one in zip(self._declared, self._peaks, strict=True)]
         quantities, largest, magnitudes = zip(*written, strict=True)
-        self._write_problem(extended, quantities, rows)
-        p = self.layout.pick(extended, self.parameters)
-        F = ca.densify(self.problem.objectives(*quantities, p))
-        g = ca.densify(ca.vertcat(*rows.expressions))
-        scores = ca.Function("nlp", [z], [F, g], ["z"], ["F", "g"])
-        largest_peaks = ca.Function("largest", [z], [ca.densify(ca.vertcat(*largest, *magnitudes))], ["z"], ["peaks"])
+        self._write_ties(extended, rows)
+        linear = len(rows.expressions)
+        q, of_quantities = ca.vertcat(*quantities, self.layout.pick(extended, self.parameters)), self._scores(quantities)
+        F, values = of_quantities(q)
+        for k, limit in enumerate(self.problem.limits):
+            rows.add(values[k], limit.lower, limit.upper, limit.scale, f"constraint '{limit.name}'")
+
+        def function(name: str, **outputs: ca.MX) -> ca.Function:
+            """A Function of z, which has no symbols for the values at points."""
+            columns = [ca.densify(column) for column in outputs.values()]
+            if points:
+                columns = ca.Function(name, [z, *(one.values for one in points)], columns).call([z, *(one.evaluated for one in points)])
+            return ca.Function(name, [z], columns, ["z"], list(outputs))
+
+        scores = function("nlp", F=F, g=ca.vertcat(*rows.expressions))
+        largest_peaks = function("largest", peaks=ca.vertcat(*largest, *magnitudes))
         if not self.layout.hidden:
             largest_peaks = expanded(largest_peaks)
         self._largest = Batched(self._filled(largest_peaks))
@@ -77,10 +89,12 @@ class Assembly:
             guess=self.guess(),
             profiles=self.profiles(),
             guessed=self.guessed,
-            reduced=self._reduced(z, rows, largest_peaks, scores),
+            reduce=lambda: self._reduced(function, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
+            costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
+            parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
     def guess(self) -> np.ndarray:
@@ -138,16 +152,16 @@ class Assembly:
         values = function.call([extended[: z.numel() + self.layout.hidden]])
         return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
 
-    def _reduced(self, z: ca.MX, rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
-        """The constraints that propagation leaves to satisfy."""
+    def _reduced(self, function: Callable[..., ca.Function], rows: Rows, peaks: ca.Function, scores: ca.Function) -> Reduced:
+        """The constraints that propagation leaves to satisfy; `function` makes Functions of z."""
         left = [i for i, propagated in enumerate(rows.propagated) if not propagated]
-        function = expanded(ca.Function("rest", [z], [ca.densify(ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left)))]))
+        rest = expanded(function("rest", rest=ca.vertcat(ca.MX(0, 1), *(rows.expressions[i] for i in left))))
         lower, upper, scale = (np.concatenate([np.empty(0), *(values[i] for i in left)]) for values in (rows.lower, rows.upper, rows.scale))
         return Reduced(
             self.layout,
             list(self._writers.values()),
             (self._least, peaks),
-            (function, lower, upper, scale),
+            (rest, lower, upper, scale),
             # What depends on hidden quantities is evaluated where these are propagated; elsewhere on demand.
             (scores, rows.left) if self.layout.hidden else None,
         )
@@ -166,6 +180,12 @@ class Assembly:
         phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
+
+    def costates(self, z: np.ndarray, multipliers: Mapping[str, np.ndarray]) -> dict[str, PiecewisePolynomial]:
+        """See `NLP.costates`; `multipliers` of the rows of dynamics by phase."""
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
+        return {name: costates for name, costates in found.items() if costates is not None}
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
         """See `NLP.interpolate`."""
@@ -235,14 +255,22 @@ class Assembly:
             samples = written.peak_samples[k, :]
             scale = self.layout.variables[peaks[k]].scale
             rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
-        initials = phase.initials(first, written.first_control, s[0], s)
-        finals = phase.finals(last, written.last_control, s[1], s)
+        (initials,) = rows.at_points(phase.initials, first, written.first_control, s[0], s)
+        (finals,) = rows.at_points(phase.finals, last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
         q = ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak)
         return q, ca.vertcat(*largest) if largest else ca.MX(0, 1), written.magnitudes
 
-    def _write_problem(self, extended: ca.MX, quantities: Sequence[ca.MX], rows: Rows) -> None:
-        """Rows of durations, of links that could not be shared, and of the user's constraints."""
+    def _scores(self, quantities: Sequence[ca.MX]) -> ca.Function:
+        """The quantities of all phases, and the parameters, in one column -> (objectives, constraints)."""
+        sizes = [*(q.numel() for q in quantities), len(self.parameters)]
+        column = ca.MX.sym("q", sum(sizes))
+        split = ca.vertsplit(column, np.cumsum([0, *sizes]).tolist())
+        values = [ca.densify(function(*split)) for function in (self.problem.objectives, self.problem.constraints)]
+        return expanded(ca.Function("scores", [column], values, ["q"], ["F", "c"]))
+
+    def _write_ties(self, extended: ca.MX, rows: Rows) -> None:
+        """Rows of durations, and of links that could not be shared."""
         for writer in self._declared:
             phase, (shortest, longest) = writer.phase, writer.phase.duration
             times = self.layout.pick(extended, writer.ends.statics[:2])
@@ -252,6 +280,13 @@ class Assembly:
         for first, second, scale, label in self._joined:
             ends = self.layout.pick(extended, np.array([first, second]))
             rows.add(ends[0] - ends[1], 0, 0, scale, label)
-        values = self.problem.constraints(*quantities, self.layout.pick(extended, self.parameters))
-        for k, limit in enumerate(self.problem.limits):
-            rows.add(values[k], limit.lower, limit.upper, limit.scale, f"constraint '{limit.name}'")
+
+
+def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:
+    values = [point.values for point in points]
+    return Parts(
+        tuple(point.function for point in points),
+        ca.Function("inputs", [z], [point.inputs for point in points]),
+        ca.Function("affine", [z, *values], [ca.densify(rows), ca.densify(quantities)]),
+        scores,
+    )

@@ -13,13 +13,14 @@ import numpy as np
 
 from problems.checks import check_count, settings_of, short_repr
 from problems.compiled import CompiledProblem, Variable
-from problems.derived import Deriving, remembered
+from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
 from .phases.mesh import PhaseMesh, as_meshes
+from .phases.pointwise import Parts
 from .phases.reduced import Reduced
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
 """The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
@@ -96,6 +97,11 @@ class Transcription(ABC):
 @remembered
 def _transcribed(problem: CompiledProblem, transcription: Transcription) -> NLP:
     return transcription.transcribe(problem)
+
+
+def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | None:
+    """What `Transcription.nlp` has made of a problem and keeps with it; None if it was not asked for."""
+    return computed(_transcribed, problem, transcription)
 
 
 class Meshed(Transcription):
@@ -229,8 +235,8 @@ class NLP(Deriving):
     guessed : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value;
         peaks and absolute values are 0.
-    reduced : Reduced
-        What propagation leaves to satisfy, as functions of the free variables alone.
+    reduce : callable
+        () -> Reduced: what propagation leaves to satisfy, as functions of the free variables alone; see `reduced`.
     tighten : callable
         Vectors (k, n) -> vectors (k, n): peaks set to the largest value that they bound, and what stands for absolute values to these.
     unpack : callable
@@ -238,6 +244,11 @@ class NLP(Deriving):
     interpolate : callable
         A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
+    costates : callable
+        A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
+        multipliers say nothing between their places.
+    parts : Parts, optional
+        The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
 
     problem: CompiledProblem
@@ -252,14 +263,21 @@ class NLP(Deriving):
     guess: np.ndarray
     profiles: tuple[Profile, ...]
     guessed: Callable[[np.ndarray], np.ndarray]
-    reduced: Reduced
+    reduce: Callable[[], Reduced]
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
+    costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
+    parts: Parts | None = None
 
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"
         return f"NLP('{self.problem.name}', {self.transcription!r}: {sizes})"
+
+    @cached_property
+    def reduced(self) -> Reduced:
+        """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
+        return self.reduce()
 
     @cached_property
     def lower(self) -> np.ndarray:

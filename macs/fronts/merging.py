@@ -1,4 +1,4 @@
-"""Merge of several fronts of one problem: the union of their points, without dominated ones; and fronts with better ends."""
+"""Merge of several fronts of one problem: the union of their points, without dominated ones."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED
-from ..pareto.archive import spread
 from ..pareto.dominance import nondominated
 from .builders import nearest_violation
 from .points import Point, Points
 from .provenance import merged_stats
-from .verified import objective_scales, verified
 
 
 def merge(fronts: Sequence[Points]) -> Points:
@@ -33,26 +31,6 @@ def merge(fronts: Sequence[Points]) -> Points:
         message="" if len(kept) else next(reasons, _nearest(closest)),
         closest=None if len(kept) else closest,
     )
-
-
-def extended(points: Points, ends: Points, verify: float, limit: int) -> Points:
-    """A front with those of further points that lead beyond its ends: they are verified, and better in an objective than all that are
-    verified, by more than `verify`, in `objective_scales`. Of more than `limit` points, those that lie closest together are left out."""
-    both = Points.concatenate([points, ends])
-    scales = objective_scales(both)
-    # What their notes say is of other ranges.
-    ends = ends.replace(stats=points.stats, notes=[""] * len(ends))
-    marked = verified(ends, verify, scales, remark=False)
-    best = points.simulated_F[points.verified].min(axis=0, initial=np.inf)
-    beyond = marked.verified & (best - marked.simulated_F > verify * scales).any(axis=1)
-    if not beyond.any():
-        return points
-    joined = Points.concatenate([points, marked[beyond]]).replace(stats=points.stats, solver=points.solver)
-    kept = joined[best_rows(joined)]
-    if len(kept) > limit:
-        kept = kept[spread(kept.F, limit)]
-    # The ranges of the objectives are others now.
-    return verified(kept.sorted().replace(message=points.message if len(points) else ""), verify)
 
 
 def best_rows(points: Points) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -33,7 +33,41 @@ MISSES = "simulated, "
 """Beginning of a note on what a point misses."""
 
 
-def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = None, remark: bool = True) -> Kind:
+class Simulations:
+    """Simulations of trajectories of one problem, as exact as `verified` needs them, each made once.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    tolerance : float
+        How much a point may miss.
+    """
+
+    def __init__(self, problem: CompiledProblem, tolerance: float) -> None:
+        self.problem, self.tolerance = problem, tolerance
+        self._kept: dict[int, tuple[Trajectory, Simulation]] = {}
+
+    def __call__(self, trajectories: Sequence[Trajectory]) -> list[Simulation]:
+        """The simulation of each; those that are missing are made side by side. See `simulate_all` for what it raises."""
+        rtol, atol = accuracy(self.tolerance)
+        missing = [one for one in trajectories if id(one) not in self._kept]
+        for trajectory, simulation in zip(missing, simulate_all(self.problem, missing, rtol=rtol, atol=atol), strict=True):
+            self.keep(trajectory, simulation)
+        return [self._kept[id(one)][1] for one in trajectories]
+
+    def keep(self, trajectory: Trajectory, simulation: Simulation) -> None:
+        """Keep one that is as exact, by whomever it was made."""
+        # With the trajectory: as long as it lives, no other has its identity.
+        self._kept[id(trajectory)] = trajectory, simulation
+
+
+def verified(
+    points: Kind,
+    tolerance: float | None,
+    scales: np.ndarray | None = None,
+    remark: bool = True,
+    simulations: Simulations | None = None,
+) -> Kind:
     """The same points with the columns of a simulation, and with a note where it does not agree.
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
@@ -46,6 +80,12 @@ def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = 
     tolerance : float or None
         None: the points are returned as they are. So are those of a black box, and those whose simulation is not over soon after the work
         was asked to end early (`transcription.stopping`).
+    scales : array (m,), optional
+        What counts as one in each objective; by default `objective_scales`.
+    remark : bool
+        Whether notes say, too, where dynamics are so unstable that no simulation can follow them, which takes further simulations.
+    simulations : Simulations, optional
+        Those that were made before, of this problem and for this tolerance.
 
     Raises
     ------
@@ -57,16 +97,15 @@ def verified(points: Kind, tolerance: float | None, scales: np.ndarray | None = 
         return points
     rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
     problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
-    rtol, atol = accuracy(tolerance)
     try:
-        simulations = simulate_all(problem, planned, rtol=rtol, atol=atol)
+        made = (simulations or Simulations(problem, tolerance))(planned)
     except Stopped:
         return points
     scales = objective_scales(points) if scales is None else scales
     n, m = points.F.shape
     defect, violation, F, agrees = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan), np.zeros(n, dtype=bool)
     notes = [_without_misses(note) for note in points.notes]
-    for i, trajectory, simulation in zip(rows, planned, simulations, strict=True):
+    for i, trajectory, simulation in zip(rows, planned, made, strict=True):
         worst, violation[i] = worst_violation(problem, simulation)
         defect[i], F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
         off = missed(simulation, points[int(i)].objectives, scales)
@@ -125,6 +164,12 @@ def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.n
     """The largest difference between a point's objectives, by name, and those of its simulation, divided by `scales` (m,)."""
     difference = np.abs([simulation.objectives[name] - value for name, value in objectives.items()])
     return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
+
+
+def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, scales: np.ndarray) -> float:
+    """The largest of all that a feasible point with objectives F (m,), all minimised, misses when it is simulated; see `verified`."""
+    values = {goal.name: float(value) for goal, value in zip(problem.goals, F * problem.signs, strict=True)}
+    return max(simulation.max_defect, worst_violation(problem, simulation)[1], missed(simulation, values, scales))
 
 
 def _misses(

@@ -12,7 +12,8 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
-from ..fronts.verified import objective_scales, verified
+from ..fronts.verified import Simulations, objective_scales, verified
+from ..pareto.archive import spread
 from ..pareto.dominance import extremes
 from .mesh_loop import Programs
 from .multistart import GradientSolves
@@ -22,7 +23,7 @@ STARTS = 2
 """Number of verified points from which a solve is tried."""
 
 
-def filled(points: Points, size: int, solves: GradientSolves, most_work: float) -> Points:
+def filled(points: Points, size: int, solves: GradientSolves, most_work: float, programs: Programs, simulations: Simulations) -> Points:
     """The points with further verified ones, until `size` of them are verified or the work is done.
 
     Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
@@ -37,9 +38,12 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float) 
         Makes and counts the solves.
     most_work : float
         Work of these solves, as `solves` counts it, after which no further one is made.
+    programs : Programs
+    simulations : Simulations
+        Of the points, too: what was simulated is not simulated again.
     """
-    programs, tried = Programs(points.compiled()), np.empty((0, points.F.shape[1]))
-    while points.verified.any() and _needed(points).sum() < size and solves.work < most_work and not stopping():
+    tried = np.empty((0, points.F.shape[1]))
+    while points.verified.any() and _needed(points).sum() < size and solves.counts.work < most_work and not stopping():
         scales = objective_scales(points)
         target = _target(points, tried, scales)
         if target is None:
@@ -48,7 +52,7 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float) 
         rows = np.flatnonzero(points.verified)
         near = rows[np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")][:STARTS]
         for row in near:
-            found = _solved(points, int(row), Along(target, scales, scales), solves, programs)
+            found = _solved(points, int(row), Along(target, scales, scales), solves, programs, simulations)
             if found is not None:
                 joined = Points.concatenate([points, found]).replace(stats=points.stats, solver=points.solver)
                 points = joined[best_rows(joined)]
@@ -57,7 +61,11 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float) 
 
 
 def _within(points: Points, size: int) -> np.ndarray:
-    """Rows (k,) of a front with `size` points, if that is possible without a verified one and without the best of any objective."""
+    """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
+    well spread, of others as many as there is room for."""
+    good = np.flatnonzero(points.verified)
+    if len(good) > size:
+        return good[spread(points.simulated_F[good], size)]
     spare = np.flatnonzero(~_needed(points))
     return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
 
@@ -84,7 +92,7 @@ def _target(points: Points, tried: np.ndarray, scales: np.ndarray) -> np.ndarray
     return middles[new[0]] if new else None
 
 
-def _solved(points: Points, row: int, task: Along, solves: GradientSolves, programs: Programs) -> Points | None:
+def _solved(points: Points, row: int, task: Along, solves: GradientSolves, programs: Programs, simulations: Simulations) -> Points | None:
     """A verified point of the task from a point, on its mesh; None if there is none."""
     point = points[row]
     method = from_dict(point.transcription or {})
@@ -94,5 +102,6 @@ def _solved(points: Points, row: int, task: Along, solves: GradientSolves, progr
     solved = task.solve(solves, nlp, point.decision)
     if solved.status != CONVERGED:
         return None
-    found = verified(vectors_points(nlp, solved.z[None], points.solver, points.stats), points.stats["verify"], task.units)
+    found = vectors_points(nlp, solved.z[None], points.solver, points.stats)
+    found = verified(found, simulations.tolerance, task.units, remark=False, simulations=simulations)
     return found if found.verified[0] else None

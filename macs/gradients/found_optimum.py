@@ -1,10 +1,10 @@
-"""One optimum on a mesh that is found: from a coarse mesh on, refined by what simulation shows."""
+"""One optimum on a mesh that is found: from a coarse mesh on, refined by what simulation shows, and from several starts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,18 @@ COARSE: tuple[Meshed, ...] = (
     DFET(20, 3, basis="bernstein", control_order=1),
 )
 """Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
+SECOND: Meshed = DFET(16, 3)
+"""A mesh for other starts, beside that from which the optimum came: what one basis hides another may show."""
+OTHERS, SHORT, SHARE, AGAIN = 4, 200, 0.5, 0.5
+"""Other starts on each of the two; most iterations of each; what they may take together, and what refining what they find may take, as
+shares of the work before."""
+LITTLE, MUCH = 2e5, 1e6
+"""Work, see `MeshLoop`, that is a matter of a second or two, so that other starts may always take it; and that after which no other mesh is
+tried, if there is a result."""
+PASSABLE = 5.0
+"""How many times what is wanted a point may miss where other meshes are tried only as long as that takes little."""
+CLEARLY, REFINED = 1e-3, 2
+"""Part of its unit by which an objective on a coarse mesh differs that is another optimum; most other optima that are refined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +52,20 @@ class Found:
         On the coarse mesh that it came from; where no solve converged, the least infeasible result.
     refinement : Refinement or None
         What became of it; None where no solve on a coarse mesh converged.
+    behind : float
+        By how much it is worse, in units, than what another one achieved when simulated; 0 if it is not.
+    starts, optima, times : int
+        Solves on coarse meshes that converged, how many different optima these found, and how often that which it came from.
     """
 
     nlp: NLP
     solved: Solved
     refinement: Refinement | None
+    behind: float = 0.0
+    exhausted: bool = False
+    starts: int = 0
+    optima: int = 0
+    times: int = 0
 
     @property
     def z(self) -> np.ndarray:
@@ -52,14 +73,22 @@ class Found:
         return self.solved.z if self.refinement is None else self.refinement.best.z
 
     @property
+    def status(self) -> str:
+        """That of the solves on its mesh: what is refined is an optimum."""
+        return self.solved.status if self.refinement is None else CONVERGED
+
+    @property
     def good(self) -> bool:
         """Whether simulations agree with it as well as is wanted."""
-        return self.refinement is not None and not self.refinement.complaints()
+        return self.refinement is not None and not self.refinement.complaints() and not self.behind
 
     @property
     def note(self) -> str:
         """Why it is not good, or what else is to be said of it."""
-        return "" if self.refinement is None else self.refinement.note
+        note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
+        behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
+        exhausted = "it ended at the most work of a default call: name a transcription" if note and self.exhausted else ""
+        return "; ".join(words for words in (behind, note, exhausted) if words)
 
 
 def found_optimum(
@@ -67,7 +96,7 @@ def found_optimum(
     reference: np.ndarray,
     weights: np.ndarray,
     given: Callable[[NLP], np.ndarray | None],
-    starts: int,
+    starts: int | None,
     rng: np.random.Generator,
     coarse: Sequence[Meshed] = COARSE,
 ) -> Found:
@@ -81,8 +110,9 @@ def found_optimum(
         See `scalarize`.
     given : callable
         Vectors (k, n) of an NLP that are known at the beginning; None if there are none.
-    starts : int
-        Number of starts on a coarse mesh: the best known vector, the others random.
+    starts : int or None
+        Number of starts on a coarse mesh: the best known vector, the others random. None: one, and when its optimum is found, others as
+        long as they take little beside that; better optima are refined, too.
     rng : numpy.random.Generator
         Of the random starts.
     coarse : sequence of Meshed
@@ -93,29 +123,170 @@ def found_optimum(
     Stopped
         If the work is to end before there is any result.
     """
-    found: list[Found] = []
+    search = _Search(loop, reference, weights)
     for method in coarse:
         try:
             nlp = loop.programs(method)
         except Stopped:
-            if not found:
+            if not search.all:
                 raise
             break
-        solver = MultistartSolver(nlp, given(nlp), starts, rng, loop.solves)
-        solved = solver.solve(reference, weights)
-        found.append(Found(nlp, solved, None))
+        solver = MultistartSolver(nlp, given(nlp), starts or 1, rng, loop.solves)
+        search.begin(method, solver)
+        search.exhausted = loop.most_work is not None and loop.work >= loop.most_work
+        if search.enough:
+            break
+    if starts is None:
+        search.elsewhere((SECOND,))
+    return search.best
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """What came of one solve on a coarse mesh: `alpha` is its objective, `loss` that of its best mesh, and `achieved` the least that its
+    simulations have for certain, in the scale of the solve, of which `unit` counts as one."""
+
+    method: Meshed
+    solver: MultistartSolver
+    solved: Solved
+    alpha: float
+    found: Found
+    unit: float = 1.0
+    loss: float = np.inf
+    achieved: float = np.inf
+
+
+class _Search:
+    """Attempts from coarse meshes, and which of them is best."""
+
+    def __init__(self, loop: MeshLoop, reference: np.ndarray, weights: np.ndarray) -> None:
+        self.loop, self.reference, self.weights = loop, reference, weights
+        self._task = Along(reference, weights, np.ones(len(weights)))
+        self.all: list[_Attempt] = []
+        self._alphas: list[float] = []
+        self._units = np.full(len(weights), np.inf)
+        self.exhausted = False
+
+    def begin(self, method: Meshed, solver: MultistartSolver) -> None:
+        """Solve on a coarse mesh, and refine."""
+        solved = solver.solve(self.reference, self.weights)
+        self._alphas = [] if solved.status != CONVERGED else [self._task.loss(solved.F)]
+        self.add(method, solver, solved)
+
+    def add(self, method: Meshed, solver: MultistartSolver, solved: Solved) -> None:
+        """Refine the result of a solve on a coarse mesh, if it converged."""
+        loop, nlp = self.loop, solver.nlp
+        attempt = _Attempt(method, solver, solved, self._task.loss(solved.F), Found(nlp, solved, None))
         if solved.status == CONVERGED:
-            units = loop.units(solved.F[None], nlp, solved.z)
+            # Objectives that are large only where an attempt is poor are not to be judged by that.
+            self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
             with suppress(Stopped):
                 begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
-                refinement = loop.refine(begun, Along(reference, weights, units))
-                found[-1] = Found(loop.programs(refinement.best.method), solved, refinement)
-        if found[-1].good or loop.ended:
-            break
-    return min(found, key=_rank)
+                refinement = loop.refine(begun, Along(self.reference, self.weights, units))
+                attempt = self._refined(attempt, refinement, units)
+        self.all.append(attempt)
+
+    def _refined(self, attempt: _Attempt, refinement: Refinement, units: np.ndarray) -> _Attempt:
+        best, task = refinement.best, self._task
+        moving = task.used & (self.weights > 0)
+        unit = 1.0 / float(np.max((self.weights / units)[moving])) * float(np.max(self.weights[moving]))
+        loss = task.loss(best.F)
+        known = [] if best.achieved is None else [task.loss(best.achieved) + best.verdict.doubt * unit]
+        known += [loss - refinement.worse * unit] if refinement.worse else []
+        found = Found(self.loop.programs(best.method), attempt.solved, refinement)
+        return replace(attempt, found=found, unit=unit, loss=loss, achieved=min(known, default=np.inf))
+
+    @property
+    def enough(self) -> bool:
+        """Whether no other coarse mesh is to be tried."""
+        best, work = self.best, self.loop.work
+        refined = best.refinement is not None
+        return best.good or self.loop.ended or (refined and (work >= MUCH or (work >= LITTLE and self._passable(best))))
+
+    def _passable(self, best: Found) -> bool:
+        """Whether an optimum is known to be nearly as good as is wanted, in the spans of bounds: what states do may be little of these."""
+        if best.refinement is None:
+            return False
+        point, wanted = best.refinement.best, self.loop.wanted
+        simulation, settled = point.verdict.simulation, max(point.verdict.off, point.change, best.behind) / wanted.settled
+        missed = max(
+            simulation.max_defect / wanted.tolerance, simulation.violation / wanted.feasible, point.verdict.excess / wanted.feasible
+        )
+        return max(missed, settled) <= PASSABLE and point.verdict.leaving <= wanted.leaving
+
+    @property
+    def best(self) -> Found:
+        """The best of all attempts by their errors, of which one is to be worse than what another one achieved."""
+        least = min(attempt.achieved for attempt in self.all)
+        behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
+        behind = [amount if amount > self.loop.wanted.settled else 0.0 for amount in behind]
+        i = min(range(len(self.all)), key=lambda k: _rank(self.all[k].found, behind[k] / self.loop.wanted.settled))
+        same = [abs(alpha - self.all[i].alpha) <= CLEARLY * self.all[i].unit for alpha in self._alphas]
+        return replace(
+            self.all[i].found,
+            behind=behind[i],
+            exhausted=self.exhausted,
+            starts=len(self._alphas),
+            optima=len(_distinct(self._alphas, self.all[i].unit)),
+            times=sum(same),
+        )
+
+    def elsewhere(self, coarse: Sequence[Meshed]) -> None:
+        """Begin anew from random starts on coarse meshes, as long as that takes little; refine what is better there than the best attempt,
+        or, where that is not good, what is different."""
+        loop, best = self.loop, self.best
+        first = next(attempt for attempt in self.all if attempt.solved is best.solved)
+        before, others = loop.work, []
+        for method in dict.fromkeys((first.method, *coarse)):
+            with suppress(Stopped), loop.solves.at_most(SHORT):
+                others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), LITTLE))
+        usual, most = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), LITTLE)
+        loop.most_work = most if usual is None else min(most, usual)
+        for _, method, solver, solved in sorted(others, key=lambda other: other[0])[:REFINED]:
+            if not loop.ended:
+                self.add(method, solver, solved)
+        loop.most_work = usual
+
+    def _others(self, method: Meshed, first: _Attempt, best: Found, most: float) -> list[tuple[float, Meshed, MultistartSolver, Solved]]:
+        """Other optima on a coarse mesh that are worth refining: by how much they are better there than the best attempt, in its units, the
+        mesh, its solver, and the results."""
+        loop, unit = self.loop, first.unit
+        if loop.ended or loop.work >= most or best.refinement is None:
+            return []
+        if method == first.method:
+            solver, alpha = first.solver, first.alpha
+        else:
+            nlp = loop.programs(method)
+            solver = MultistartSolver(nlp, None, 1, first.solver.rng, loop.solves)
+            same = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), self.reference, self.weights)
+            alpha = self._task.loss(same.F) if same.status == CONVERGED else np.inf
+        seen, found = [alpha], []
+        for k in range(OTHERS):
+            if loop.ended or loop.work >= most:
+                break
+            solved = solver.from_random(self.reference, self.weights, smooth=k % 2 == 0)
+            if solved.status != CONVERGED:
+                continue
+            loss = self._task.loss(solved.F)
+            if method == first.method:
+                self._alphas.append(loss)
+            if all(abs(loss - other) > CLEARLY * unit for other in seen):
+                seen.append(loss)
+                if loss < alpha or not best.good:
+                    found.append(((loss - alpha) / unit, method, solver, solved))
+        return found
 
 
-def _rank(one: Found) -> tuple[bool, float]:
-    """Those that were refined first, by their errors; then the others by their violation."""
-    refined = one.refinement is not None
-    return not refined, one.refinement.best.error if one.refinement is not None else one.solved.violation
+def _distinct(values: Sequence[float], unit: float) -> list[float]:
+    """Values of which no two are nearer to each other than optima that are the same."""
+    kept: list[float] = []
+    for value in sorted(values):
+        if not kept or value - kept[-1] > CLEARLY * unit:
+            kept.append(value)
+    return kept
+
+
+def _rank(one: Found, behind: float) -> tuple[bool, float]:
+    """Those that were refined first, by their errors, of which one is being behind; then the others by their violation."""
+    refined = one.refinement
+    return (True, one.solved.violation) if refined is None else (False, max(refined.best.error, behind))

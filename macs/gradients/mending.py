@@ -17,10 +17,12 @@ from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import objective_scales, verified
+from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
 from ..io.console import working
 from .filling import filled
+from .fine_front import solved_on
 from .front_polish import KEPT_INSIDE, back_off
+from .mesh_loop import BUILDING, OnMesh, Programs
 from .mesh_refinement import FrontRefinement
 from .multistart import GradientSolves
 
@@ -28,99 +30,181 @@ PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
-EVALUATION, FALLBACK, SOLVE = 0.15, 30.0, 20.0
-"""What an evaluation, one that went to IPOPT, and a gradient solve cost on average, in iterations of IPOPT on the same mesh."""
-ENOUGH = 600.0
-"""Iterations that are little time on any mesh."""
-SHARE, LEAST = 0.4, 250.0
-"""What is spent on points that are solved again, as a fraction of what the front cost; in iterations for each, at least, as long as that is
-no more than the front cost."""
+SHARE = 0.4
+"""What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
+LEAST = 100.0
+"""Iterations for each point that is missed, which are allowed even where all that was spent already: enough for one more mesh."""
+LITTLE, LOSS = 0.1, 5e-3
+"""Excess over limits, in their scales, up to which a point is rather moved inside of them than solved on a finer mesh; what that may cost
+in each objective, in ranges of the front."""
 
 
-def mended(points: Points, time_limit: float | None, progress: bool | None, fine: Meshed | None = None) -> Points:
-    """The front of the points of which those that are not verified have been solved again; see `Front.mended`. With a `fine` mesh, since
-    those of the points are known to be too coarse, all of them have been."""
-    with working(time_limit, False) as (_, interrupts):
-        again = solved_again(points, None, progress, fine)
-        if again is not points and (spoilt := points.verified & ~again.verified).any():
-            again = Points.concatenate([again, points[spoilt]]).replace(stats=again.stats)
-        kept = again[best_rows(again)].sorted()
-        lost = len(points) - int(kept.verified.sum())
-        if again is points:
-            # What no solve can mend is to be explained.
-            return kept if kept.verified.all() else verified(kept, points.stats["verify"])
-        if not lost:
-            return kept
-        solves = GradientSolves(float(points.stats["tolerance"]))
-        full = filled(kept, len(points), solves, _most_work(points, lost))
-        # The ranges of the objectives may be others now.
-        return verified(full.sorted().replace(stats=more_costs(kept.stats, solves.counts, 0.0, interrupts.reason)), points.stats["verify"])
+def mended(
+    points: Points,
+    verify: float,
+    time_limit: float | None = None,
+    progress: bool | None = None,
+    fine: Meshed | None = None,
+    ends: Points | None = None,
+) -> Points:
+    """The front of the points of which those that are not verified have been solved again; see `Front.mended`.
 
-
-def solved_again(points: Points, time_limit: float | None = None, progress: bool | None = None, fine: Meshed | None = None) -> Points:
-    """The points in their order, of which those that are not verified have been solved again.
-
-    With a `fine` mesh, all of them are solved on it once, and then those that are still not verified on others.
+    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of single
+    objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`.
     """
-    points.compiled()
-    verify = points.stats["verify"]
+    if not len(points):
+        return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
-        again = points
+        job = _Mending(points, verify, show)
+        again = job.solved_again(fine)
+        joined = again if ends is None else job.with_ends(again, ends)
+        if joined is job.points and joined.verified.all():
+            return joined[best_rows(joined)].sorted()
+        # The ranges of the objectives may be others now.
+        kept = job.marked(joined[best_rows(joined)])
+        if joined is not job.points:
+            kept = job.marked(job.filled(kept, len(points)))
+        return job.paid(job.explained(kept.sorted()), interrupts.elapsed, interrupts.reason)
+
+
+def solved_again(points: Points, verify: float) -> Points:
+    """The points in their order, of which those that are not verified have been solved again. Points that were not simulated are."""
+    with working(None, None) as (show, interrupts):
+        job = _Mending(points, verify, show)
+        return job.paid(job.explained(job.solved_again()), interrupts.elapsed, interrupts.reason)
+
+
+class _Mending:
+    """One mending, whose steps share programs on meshes and simulations, each made once.
+
+    Parameters
+    ----------
+    points : Points
+        Of an optimal control problem.
+    verify : float
+        How much a point may miss.
+    show : callable
+        Is told what is done.
+
+    Attributes
+    ----------
+    points : Points
+        As they came, simulated unless they are to be solved on another mesh anyway.
+    """
+
+    def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
+        problem = points.compiled()
+        self.points, self.verify, self.show = points, verify, show
+        # Points are filled up from the first meshes, too, after others were refined.
+        self.programs, self.simulations = Programs(problem, kept=MESHES), Simulations(problem, verify)
+        self._solves = GradientSolves(float(points.stats["tolerance"]))
+        self._work = points.stats.get("work", 0)
+
+    def marked(self, points: Points) -> Points:
+        """The points marked by their simulations; notes have no remarks on dynamics."""
+        return verified(points, self.verify, remark=False, simulations=self.simulations)
+
+    def explained(self, points: Points) -> Points:
+        """The same with remarks where something is missed: what no solve can mend is to be explained."""
+        return points if points.verified.all() else verified(points, self.verify, simulations=self.simulations)
+
+    def paid(self, points: Points, elapsed: float, stopped: str) -> Points:
+        """The points with all that the mending cost."""
+        message = self.points.message
+        return points.replace(stats=more_costs(points.stats, self._solves.counts, elapsed, stopped), message=message)
+
+    def solved_again(self, fine: Meshed | None = None) -> Points:
+        """The points in their order; `points` itself if none was solved."""
+        again = self.points
         if fine is not None:
-            again = _refined(again, _doubtful(again, np.ones(len(again), dtype=bool)), show, fine)
-        missing = _doubtful(again, ~again.verified)
-        if missing:
-            again = _refined(again, missing, show, work=_most_work(points, len(missing)))
-        others = np.flatnonzero(again.was_simulated & (again.simulated_violation > verify) & (again.status == CONVERGED)).tolist()
-        others = [i for i in others if not _meshed(again, i)]
-        if others:
-            show("points that are infeasible when simulated are solved again")
-            again = verified(_inside_limits(again, others, verify), verify)
-        if again is points:
+            every = self._meshed(again, np.ones(len(again), dtype=bool))
+            again = self.marked(solved_on(again, every, fine, self.programs, self.show))
+        elif not again.was_simulated.any():
+            again = self.points = self.marked(again)
+        again = self._inside(again, _slightly_outside(again, self.verify), LOSS)
+        again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
+        again = self._as_before(again)
+        beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
+        return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
+
+    def _inside(self, points: Points, rows: list[int], loss: float = np.inf) -> Points:
+        """The points, of which those in `rows` were moved inside the limits that they exceed; see `_inside_limits`."""
+        if not rows:
             return points
-        stats = again.stats | {"wall_time": again.stats["wall_time"] + interrupts.elapsed}
-    return again.replace(stats=stats, message=points.message)
+        self.show("points that are infeasible when simulated are solved again")
+        return self.marked(_inside_limits(points, rows, self.verify, loss))
+
+    def with_ends(self, points: Points, ends: Points) -> Points:
+        """The points with those verified ends that are better in an objective than all of them, by more than a point may miss."""
+        scales, ends = objective_scales(points), self.marked(ends)
+        good = points.simulated_F[points.verified]
+        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - self.verify * scales).any(axis=1)
+        if not better.any():
+            return points
+        return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
+
+    def filled(self, points: Points, size: int) -> Points:
+        """The points, filled up from verified ones; see `filled`."""
+        most = self._most_work(points, size - int(points.verified.sum()))
+        return filled(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations)
+
+    def _as_before(self, points: Points) -> Points:
+        """The points, of which those that are verified as they came, and not any more, are as they came."""
+        unseen = np.flatnonzero(~points.verified & ~self.points.was_simulated).tolist()
+        lost = [i for i in unseen if points.trajectories[i] is not self.points.trajectories[i]]
+        if not lost:
+            return points
+        old = verified(self.points[lost], self.verify, objective_scales(points), remark=False, simulations=self.simulations)
+        rows = {i: old[[k]] for k, i in enumerate(lost) if old.verified[k]}
+        return Points.concatenate([rows.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats)
+
+    def _meshed(self, points: Points, rows: np.ndarray) -> list[int]:
+        """Those of a mask of rows (n,) that can be solved on other meshes."""
+        rows = rows & (points.status == CONVERGED)
+        return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
+
+    def _refined(self, points: Points, rows: list[int]) -> Points:
+        """The points with some of them on finer meshes of their own, as far as the work allows; simulated."""
+        if not rows:
+            return points
+        limits = PART * self.verify
+        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
+        scales = objective_scales(points)
+
+        def enough(point: OnMesh) -> bool:
+            return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
+
+        most = self._most_work(points, len(rows))
+        job = FrontRefinement(points, wanted, MESHES, rows, most, programs=self.programs, enough=enough)
+        job.go(self.show)
+        if wanted.accuracy <= accuracy(self.verify)[0]:
+            for found in job.found.values():
+                self.simulations.keep(found.best.trajectory, found.best.verdict.simulation)
+        again = self.marked(job.points(0.0, ""))
+        # What refinement would wish for besides is no complaint about a point that is verified.
+        return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
+
+    def _most_work(self, points: Points, count: int) -> float | None:
+        """What may still be spent on so many points, in iterations times variables; None for as much as it takes, where nothing was
+        searched: then the mesh is all that there is to be found."""
+        if not points.stats["evaluations"]:
+            return None
+        spent = points.stats.get("work", 0) - self._work + BUILDING * self.programs.built
+        size = float(np.mean([len(variables) for variables in points.places]))
+        return max(SHARE * self._work - spent, LEAST * count * size)
 
 
-def _meshed(points: Points, i: int) -> bool:
-    """Whether a point is on a mesh that can be refined."""
-    return isinstance(from_dict(points[i].transcription or {}), Meshed)
+def _slightly_outside(points: Points, verify: float) -> list[int]:
+    """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
+    they have, whose program is there already, a solve costs far less than on any other."""
+    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= LITTLE) & (points.status == CONVERGED)
+    off = np.abs(points.simulated_F - points.F) / objective_scales(points)
+    return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
 
 
-def _doubtful(points: Points, rows: np.ndarray) -> list[int]:
-    """Those of a mask of rows (n,) that were simulated and can be solved on other meshes."""
-    return [i for i in np.flatnonzero(rows & points.was_simulated & (points.status == CONVERGED)).tolist() if _meshed(points, i)]
-
-
-def _refined(points: Points, rows: list[int], show: Callable[[str], None], fine: Meshed | None = None, work: float | None = None) -> Points:
-    """The points with some of them on finer meshes, as far as the work allows, or once on a `fine` one; simulated."""
-    if not rows:
-        return points
-    verify = points.stats["verify"]
-    limits = PART * verify
-    wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
-    meshes, first = (MESHES, []) if fine is None else (1, [fine])
-    job = FrontRefinement(points, wanted, meshes, rows, work, first=first)
-    job.go(show)
-    return verified(job.points(0.0, ""), verify)
-
-
-def _most_work(points: Points, count: int) -> float:
-    """What may be spent on so many of the points, in iterations times variables."""
-    stats = points.stats
-    spent = EVALUATION * stats["evaluations"] + FALLBACK * stats["fallbacks"] + SOLVE * stats["gradient_solves"]
-    # Where nothing was searched, the mesh is all that there is to be found.
-    least = min(LEAST * count, max(spent, ENOUGH)) if stats["evaluations"] else LEAST * count
-    return max(SHARE * spent, least) * _size(points)
-
-
-def _size(points: Points) -> float:
-    """The mean number of variables of a point."""
-    return float(np.mean([len(variables) for variables in points.places]))
-
-
-def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:
-    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated."""
+def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
+    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated, as long as no objective
+    gets worse by more than the loss, in ranges of the front."""
     moved: dict[int, Points] = {}
     for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
         own = [i for i in rows if points.transcriptions[i] is transcription]
@@ -128,9 +212,11 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points
         evaluator = Bilevel(nlp, Propagate(), float(points.stats["tolerance"]))
         if not evaluator.has_gradients:
             continue
-        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), objective_scales(points), verify)
+        scales = objective_scales(points)
+        Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), scales, verify)
+        worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
-        for k in np.flatnonzero(feasible & changed).tolist():
+        for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
             moved[own[k]] = vectors_points(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
     if not moved:
         return points

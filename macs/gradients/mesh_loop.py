@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import NLP, Meshed
+from transcription.base import NLP, Meshed, kept_nlp
 from transcription.inner import Ipopt
-from transcription.meshes.adaptation import next_method
+from transcription.meshes.adaptation import next_method, where_controls_gain
 from transcription.meshes.knots import switched
+from transcription.meshes.minimum import Optimum
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
+from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
@@ -24,8 +26,8 @@ from .tasks import Task
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
-BUILDING = 30
-"""Iterations of IPOPT that take as long as it takes to make a program."""
+BUILDING = 100
+"""Iterations of IPOPT that take as long as it takes to make a program with its derivatives: measured 90 to 180."""
 LITTLE = 1e-4
 """Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
 PATIENCE = 3
@@ -43,7 +45,14 @@ DRIFT = 1e-2
 
 
 class Programs:
-    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes.
+    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
+    since a search was made on them, are not made again.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    kept : int
+        How many are kept.
 
     Attributes
     ----------
@@ -51,18 +60,18 @@ class Programs:
         Variables of all that were made.
     """
 
-    def __init__(self, problem: CompiledProblem) -> None:
-        self.problem, self.built = problem, 0
+    def __init__(self, problem: CompiledProblem, kept: int = KEPT) -> None:
+        self.problem, self.built, self._most = problem, 0, kept
         self._kept: dict[Meshed, NLP] = {}
 
     def __call__(self, method: Meshed) -> NLP:
         """The NLP of the problem on these meshes."""
-        nlp = self._kept.pop(method, None)
+        nlp = self._kept.pop(method, None) or kept_nlp(self.problem, method)
         if nlp is None:
             nlp = method.transcribe(self.problem)
             self.built += len(nlp.variables)
         self._kept[method] = nlp
-        while len(self._kept) > KEPT:
+        while len(self._kept) > self._most:
             del self._kept[next(iter(self._kept))]
         return nlp
 
@@ -85,6 +94,8 @@ class OnMesh:
         The objectives of its simulation, all minimised, where that is feasible.
     change : float
         Largest change of an objective that matters from the mesh before, in units; infinite where there was none.
+    tried : bool
+        Whether elements were cut where other controls would gain, which changed nothing.
     """
 
     method: Meshed
@@ -95,18 +106,27 @@ class OnMesh:
     by_gradients: bool
     achieved: np.ndarray | None
     change: float = np.inf
+    tried: bool = False
+
+    @property
+    def gaining(self) -> bool:
+        """Whether other controls would gain more than an objective may be off, as far as is known."""
+        return not self.tried and self.verdict.gain > self.verdict.wanted.settled
 
     @property
     def error(self) -> float:
         """The largest error, or change from the mesh before, in units of what it may be."""
         wanted = self.verdict.wanted
-        return max(self.verdict.error, self.change / wanted.settled if wanted.confirmed else 0.0)
+        unsettled = max(self.change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
+        return max(self.verdict.error, unsettled if wanted.confirmed else 0.0)
 
     def complaints(self) -> list[str]:
         """Reasons why the point is not good enough; empty if it is."""
         found = self.verdict.complaints()
         if not self.verdict.wanted.confirmed:
             return found
+        if self.gaining:
+            found.append(f"other controls would gain {self.verdict.gain:.1e} of the front's range, to first order")
         if np.isinf(self.change):
             found.append("it was not solved on a finer mesh")
         elif not self.change <= self.verdict.wanted.settled:
@@ -167,6 +187,8 @@ class MeshLoop:
         Work of the gradient solves, as `solves` counts it, and of making their programs, after which no new mesh is begun.
     knots : bool
         Whether edges may move to the switches of controls, where meshes then suit one point alone.
+    enough : callable
+        Whether a point is good enough whatever else is wanted.
     """
 
     def __init__(
@@ -177,9 +199,10 @@ class MeshLoop:
         limit: int,
         most_work: float | None = None,
         knots: bool = True,
+        enough: Callable[[OnMesh], bool] = lambda point: False,
     ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
-        self._knots = knots
+        self._knots, self._built, self._enough = knots, programs.built, enough
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
@@ -191,9 +214,10 @@ class MeshLoop:
     @property
     def work(self) -> float:
         """Work so far, in iterations times variables."""
-        return self.solves.work + BUILDING * self.programs.built
+        return self.solves.counts.work + BUILDING * (self.programs.built - self._built)
 
-    def units(self, F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
+    @staticmethod
+    def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
         varies by near a vector of the NLP: an objective near zero is not judged by its own size."""
         ranges = np.ptp(F, axis=0)
@@ -201,10 +225,17 @@ class MeshLoop:
         return np.where(found > 0, found, 1.0)
 
     def on_mesh(
-        self, method: Meshed, z: np.ndarray, F: np.ndarray, trajectory: Trajectory, units: np.ndarray, by_gradients: bool
+        self,
+        method: Meshed,
+        z: np.ndarray,
+        F: np.ndarray,
+        trajectory: Trajectory,
+        units: np.ndarray,
+        by_gradients: bool,
+        optimum: Optimum | None = None,
     ) -> OnMesh:
         """The assessment of a vector that was found on a mesh."""
-        verdict = judge(self.problem, trajectory, self.wanted, F, units)
+        verdict = judge(self.problem, trajectory, self.wanted, F, units, optimum if self.wanted.confirmed else None)
         achieved = simulated_objectives(self.problem, verdict.simulation)
         feasible = verdict.simulation.violation <= self.wanted.feasible and verdict.leaving <= max(
             self.wanted.feasible, self.wanted.leaving
@@ -250,6 +281,9 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
+            if self._enough(present):
+                found.best = present
+                break
             found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
             history.append(self._rank(present, task, least)[1])
             if not self._rank(present, task, least)[0]:
@@ -279,6 +313,8 @@ class MeshLoop:
         while waiting:
             hint = waiting.pop(0)
             yield hint, hint != present.method
+        if present.gaining and not present.verdict.complaints():
+            yield where_controls_gain(present.method, present.verdict, present.trajectory), False
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield knots, True
@@ -290,19 +326,20 @@ class MeshLoop:
     def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
         nlp = self.programs(method)
-        z, F, status, by_gradients = self._from_starts(nlp, present, task, others, least)
-        if status != CONVERGED:
-            return None, status
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        solved, by_gradients = self._from_starts(nlp, present, task, others, least)
+        if solved.status != CONVERGED:
+            return None, solved.status
+        z, F = solved.z, solved.F
+        optimum = None if solved.multipliers is None else Optimum.of(nlp, z, solved.multipliers)
+        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients, optimum)
         # On the same mesh nothing can be seen of what that has wrong.
-        same = method == present.method
-        return replace(reached, change=np.inf if same else _change(present, F, task, self.wanted.settled)), status
+        change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
+        tried = present.gaining and change <= self.wanted.settled
+        return replace(reached, change=change, tried=tried), solved.status
 
-    def _from_starts(
-        self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
-    ) -> tuple[np.ndarray, np.ndarray, str, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, from others: z, F, status, and whether
-        it is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
+    def _from_starts(self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
+        """The best result of solves from the present trajectory and, if that fails or gets worse, from others, and whether it is an
+        optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
@@ -314,14 +351,15 @@ class MeshLoop:
             if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + DRIFT):
                 break
         assert best is not None
-        return best.z, best.F, best.status, True
+        return best, True
 
-    def _projected(self, nlp: NLP, start: np.ndarray) -> tuple[np.ndarray, np.ndarray, str, bool]:
-        """The feasible point nearest to a vector: z, F, status, and that it is no optimum."""
+    def _projected(self, nlp: NLP, start: np.ndarray) -> tuple[Solved, bool]:
+        """The feasible point nearest to a vector, and that it is no optimum."""
         near = Ipopt().solve(nlp, start[None, nlp.free], start[None], tolerance=self.solves.tolerance)
         self.solves.counts.inner_iterations += int(near.iterations.sum())
+        self.solves.counts.work += int(near.iterations.sum()) * len(nlp.variables)
         self.solves.counts.clocked += near.clocked
-        return near.z[0], near.F[0], str(near.status[0]), False
+        return Solved(near.z[0], near.F[0], float(near.violation[0]), str(near.status[0]), int(near.iterations[0])), False
 
 
 def differentiable(problem: CompiledProblem) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -24,6 +24,7 @@ from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
 from .multistart import GradientSolves
+from .targets import moved_along
 from .tasks import Along, End, Task
 
 OPTIMAL = 1e-6
@@ -31,11 +32,10 @@ OPTIMAL = 1e-6
 LEAST_TOLERANCE = 1e-10
 """Smallest tolerance that double precision and the integrator can resolve."""
 STATIONARY = 1e-2
-"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, is an end of the front."""
+"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, or that moves by no more
+than this, in units, to the optimum of that objective alone, is an end of the front."""
 NEARBY = 0.5
 """Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""
-MOVED = 0.05
-"""Where the ends of a front move by more than this part of its range on finer meshes, the points between them move along."""
 NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
 HINTED = 1e2
@@ -81,11 +81,13 @@ class FrontRefinement:
     chosen : sequence of int, optional
         The points to be refined; default: all that converged.
     most_work : float, optional
-        Work of gradient solves, see `GradientSolves`, after which no new mesh is begun.
+        Work of gradient solves, see `Counts`, after which no new mesh is begun.
     knots : bool
         See `MeshLoop`.
-    first : sequence of Meshed
-        Meshes that are tried first, for all points.
+    programs : Programs, optional
+        The NLPs on meshes that others have solved on, too.
+    enough : callable
+        See `MeshLoop`.
     """
 
     def __init__(
@@ -96,15 +98,16 @@ class FrontRefinement:
         chosen: Sequence[int] | None = None,
         most_work: float | None = None,
         knots: bool = True,
-        first: Sequence[Meshed] = (),
+        programs: Programs | None = None,
+        enough: Callable[[OnMesh], bool] = lambda point: False,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
-        self.loop = MeshLoop(Programs(front.compiled()), self.solves, wanted, limit, most_work, knots)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._first, self._most_work = first, most_work
+        self._most_work = most_work
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -171,12 +174,15 @@ class FrontRefinement:
     def _is_end(self, i: int, mine: np.ndarray) -> bool:
         """Whether the best point in the objective that is marked (m,) is an optimum of that alone. Another local optimum may be better."""
         nlp, point = self.loop.programs(self.methods[i]), self.front[i]
-        if self._known(i):
-            return optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY
+        known = self._known(i)
+        if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY:
+            return True
         solved = self.solves(nlp, point.decision, np.where(mine, 0.0, np.inf), self.units)
+        if solved.status != CONVERGED:
+            return not known
         others = np.array([self._distance(i, j) for j in self.good.tolist() if j != i])
-        moved = float(np.linalg.norm((solved.F - point.F) / self.units))
-        return solved.status != CONVERGED or moved <= NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+        nearby = STATIONARY if known else NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+        return float(np.linalg.norm((solved.F - point.F) / self.units)) <= nearby
 
     def _known(self, i: int) -> bool:
         """Whether a point is known to be optimal on its own mesh."""
@@ -184,16 +190,11 @@ class FrontRefinement:
         return certified is not None and certified <= OPTIMAL
 
     def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Where the points between the ends are solved from, and along which weights: where they are, unless the ends have moved; then at
-        the same place between these."""
-        F = self.front.F
-        if len(ends) < len(self.units) or len(self.units) == 1:
-            return {i: F[i] for i in between}, self.units
-        old, new = F[list(ends.values())], np.array([self.found[i].best.F for i in ends.values()])
-        if np.abs((new - old) / self.units).max() <= MOVED or not ((np.ptp(old, axis=0) > 0) & (np.ptp(new, axis=0) > 0)).all():
-            return {i: F[i] for i in between}, self.units
-        scale = np.ptp(new, axis=0) / np.ptp(old, axis=0)
-        return {i: new.min(axis=0) + (F[i] - old.min(axis=0)) * scale for i in between}, np.ptp(new, axis=0)
+        """Where the points between the ends are solved from, and along which weights; see `moved_along`."""
+        F, known = self.front.F, list(ends.values()) if len(ends) == len(self.units) else []
+        new = np.array([self.found[i].best.F for i in known]).reshape(-1, len(self.units))
+        references, weights = moved_along(F[between], F[known], new, self.units)
+        return dict(zip(between, references, strict=True)), weights
 
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
@@ -206,13 +207,10 @@ class FrontRefinement:
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        near_meshes = self.found[done[0]].meshes[-2:] if done and begun.verdict.error > HINTED else []
-        if self._first:
-            # Where a neighbour was confirmed, this point may be, too.
-            near_meshes = [self.found[done[0]].best.method] if done else []
+        near_meshes = self._meshes_near(done, begun.verdict.error, task)
         # Rough controls would need finer meshes than optimal ones.
-        own = [] if known or near_meshes or self._first else [self.methods[i]]
-        hints = list(dict.fromkeys([*near_meshes, *self._first, *own]))
+        own = [] if known or near_meshes else [self.methods[i]]
+        hints = list(dict.fromkeys([*near_meshes, *own]))
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
             share = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
@@ -220,6 +218,16 @@ class FrontRefinement:
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)
+
+    def _meshes_near(self, done: Sequence[int], error: float, task: Task) -> list[Meshed]:
+        """Meshes that are tried first for a point with an error, in units of what it may be: those of the nearest that is `done`."""
+        if not done:
+            return []
+        nearest = self.found[done[0]]
+        if error > HINTED:
+            return nearest.meshes[-2:]
+        # Where no other mesh has to confirm it, its program is there already. An end is far from others.
+        return [] if self.wanted.confirmed or isinstance(task, End) else [nearest.best.method]
 
     def _trajectory(self, i: int) -> Trajectory:
         found = self.found.get(i)
@@ -234,4 +242,5 @@ class FrontRefinement:
             return front[[i]].replace(notes=[note or front[i].note])
         nlp = self.loop.programs(best.method)
         certified = optimality(nlp, best.z, self.units) if best.by_gradients else None
-        return vectors_points(nlp, best.z[None], front.solver, front.stats, optimality=[certified], notes=[note])
+        about: dict[str, Any] = {"optimality": [certified], "notes": [note], "trajectories": [best.trajectory]}
+        return vectors_points(nlp, best.z[None], front.solver, front.stats, **about)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from transcription.base import NLP
 from transcription.nlp.scalarized import Solved, scalarize
+from transcription.smooth import Smooth
 
 from ..evaluation.evaluator import CONVERGED, Counts
 
@@ -18,6 +20,10 @@ HOPELESS = 100.0
 
 LIMIT, BETTER = 1e-8, 1e-7
 """Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
+
+
+WIDE = 0.3
+"""Spread of smooth random controls, in spans of their bounds: they are to lead to other optima."""
 
 
 MOST_ITERATIONS = 500
@@ -37,16 +43,14 @@ class GradientSolves:
     Attributes
     ----------
     counts : Counts
-        Gradient solves, iterations, failures by status.
-    work : int
-        Iterations times variables, of all solves: what they cost, whatever the machine.
+        Gradient solves, iterations, work, failures by status.
     before : callable
         Called before each solve.
     """
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts, self.work = Counts(), 0
+        self.counts = Counts()
         self.before: Callable[[], None] = lambda: None
 
     def __call__(
@@ -56,9 +60,17 @@ class GradientSolves:
         self.before()
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
         solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, **limits)
-        self.work += solved.iterations * len(nlp.variables)
-        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked)
+        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
+
+    @contextmanager
+    def at_most(self, iterations: int) -> Iterator[None]:
+        """Solves within take no more iterations than these."""
+        usual, self.max_iterations = self.max_iterations, min(self.max_iterations, iterations)
+        try:
+            yield
+        finally:
+            self.max_iterations = usual
 
 
 class MultistartSolver:
@@ -92,7 +104,7 @@ class MultistartSolver:
     ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
         self._solves = solves
-        self._rng = rng
+        self.rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
         self._violation: np.ndarray = np.empty(0)
@@ -114,7 +126,7 @@ class MultistartSolver:
         first = start if start is not None else self._nearest(reference, weights)
         found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
         for _ in range(self.starts - len(found)):
-            found.append(self._from_anywhere(reference, weights, ceiling))
+            found.append(self.from_random(reference, weights, ceiling))
         return self.better(found, reference, weights)
 
     def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
@@ -125,14 +137,15 @@ class MultistartSolver:
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
         return solved
 
-    def lexicographic(self, i: int) -> Solved:
-        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before."""
+    def lexicographic(self, i: int, start: np.ndarray | None = None) -> Solved:
+        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before. `start` (n,) is
+        where it begins, if that is known."""
         m = len(self.nlp.problem.goals)
         ceiling = np.full(m, np.inf)
         best = None
         for j in [i, *(k for k in range(m) if k != i)]:
             reference, weights = np.where(np.arange(m) == j, 0.0, np.inf), np.eye(m)[j]
-            solved = self.solve(reference, weights, None if best is None else ceiling, None if best is None else best.z)
+            solved = self.solve(reference, weights, None if best is None else ceiling, start if best is None else best.z)
             if best is None or solved.status == CONVERGED:
                 best = solved
             if best.status != CONVERGED:
@@ -177,11 +190,15 @@ class MultistartSolver:
         """The known vector (n,) with the best merit; None if none is known."""
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
 
-    def _from_anywhere(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None) -> Solved:
-        """The result of a solve from a random candidate: from its propagated states, and if that fails from guessed states."""
+    def from_random(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, smooth: bool = False) -> Solved:
+        """The result of a solve from a random candidate: from its propagated states, and if that fails from guessed states.
+
+        Its values are drawn evenly from their bounds, each by itself; with `smooth` they are profiles about the problem's guess.
+        """
         nlp = self.nlp
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
-        guessed = nlp.first_guess((lower + self._rng.random(len(lower)) * span)[None])
+        drawn = (lower + self.rng.random(len(lower)) * span)[None]
+        guessed = nlp.first_guess(Smooth(spread=WIDE).shaped(nlp, drawn) if smooth else drawn)
         propagated = nlp.propagate(guessed)
         usable = np.isfinite(propagated).all() and nlp.evaluate(propagated)[1][0] <= HOPELESS
         attempts = [propagated[0], guessed[0]] if usable else [guessed[0]]

@@ -16,9 +16,8 @@ from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import vectors_points
+from ..fronts.builders import certificates, vectors_points
 from ..fronts.points import Points
-from ..fronts.provenance import costs
 from ..fronts.verified import verified
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
@@ -28,8 +27,10 @@ COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
 PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
-MESHES = 5
-"""Most meshes of one end."""
+STARTS = 4
+"""Number of starts for each end on the coarse mesh."""
+MESHES = 8
+"""Most meshes of one end, beside the coarse one."""
 MOST = 40
 """Most elements of a phase: a search evaluates its mesh thousands of times."""
 NEAR = 0.25
@@ -55,13 +56,16 @@ class Chosen:
     counts : Counts
         What it cost to find out.
     ends : Points or None
-        The best of each objective alone that were found on the way, each on a mesh of its own, not simulated.
+        The optima of single objectives on the coarse mesh, from which that was found out.
+    refined : Points or None
+        The same on meshes of their own.
     """
 
     search: Transcription
     fine: Meshed | None
     counts: Counts
     ends: Points | None = None
+    refined: Points | None = None
 
 
 def search_transcription(
@@ -74,22 +78,14 @@ def search_transcription(
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
         return Chosen(parse(problem.default_transcription), None, Counts())
-    fine, counts, ends = mesh_and_ends(compiled, verify, tolerance, show)
-    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends)
+    return found_mesh(compiled, verify, tolerance, show)
 
 
-def found_mesh(problem: CompiledProblem, verify: float, tolerance: float) -> tuple[Meshed, Counts]:
-    """DFET on a mesh for all points of a front, and what it cost to find; see `mesh_and_ends`."""
-    return mesh_and_ends(problem, verify, tolerance, lambda words: None)[:2]
+def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None] = lambda words: None) -> Chosen:
+    """DFET on a coarse mesh for a search, and on a mesh for all points of its front.
 
-
-def mesh_and_ends(
-    problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None]
-) -> tuple[Meshed, Counts, Points | None]:
-    """DFET on a mesh for all points of a front, what it cost to find, and the ends of the front that led to it.
-
-    Each objective is optimised alone, from the problem's guess or a random start, on a coarse mesh and then on finer ones, until a
-    simulation agrees with it and a finer mesh changes nothing. The mesh has the elements of all these.
+    Each objective is optimised, and for its best value the others, from the problem's guess or a random start, on a coarse mesh and then on
+    finer ones, until a simulation agrees and a finer mesh changes nothing. The mesh has the elements of all these.
 
     Parameters
     ----------
@@ -102,21 +98,25 @@ def mesh_and_ends(
         Called with words on what is being done.
     """
     if not differentiable(problem):
-        return COARSE, Counts(), None
+        return Chosen(COARSE, None, Counts())
     nlp, m = COARSE.nlp(problem), len(problem.goals)
-    solver = MultistartSolver(nlp, guessed_start(nlp), 1, np.random.default_rng(0), GradientSolves(tolerance))
+    solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
+    first, solver = (MultistartSolver(nlp, guessed_start(nlp), starts, rng, solves) for starts in (STARTS, 1))
     show("ends of the front on a coarse mesh")
-    solved = [solver.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
+    best = [first.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
+    solved = [solver.lexicographic(k, best[k].z) for k in range(m)]
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, costs(Counts(), wall_time=0.0, seed=None, tolerance=tolerance, reproducible=True), sort=False)
+    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)
     counts = solver.counts.joined(job.solves.counts)
-    fine = [found.best.method for found in job.found.values()]
-    mesh = _common(fine, problem) if fine and not _enough(ends, own, job, limits) else COARSE
-    return mesh, counts, job.points(0.0, "") if len(ends) else None
+    found = [one.best.method for one in job.found.values()]
+    fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE
+    if not len(ends):
+        return Chosen(COARSE, None, counts)
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, job.points(0.0, "").replace(notes=[""] * len(ends)))
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

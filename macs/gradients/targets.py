@@ -8,6 +8,8 @@ import numpy as np
 
 from ..pareto.directions import divisions_below, simplex_lattice
 
+MOVED = 0.05
+"""Where the ends of a front move by more than this part of its range, the points between them move along."""
 METHODS = ("pascoletti-serafini", "epsilon")
 
 
@@ -69,3 +71,29 @@ def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
         reference[others] -= (1.0 - np.array(combination)) * ranges[others]
         tasks.append((reference, np.where(np.arange(m) == first, ranges, 0.0)))
     return tasks
+
+
+def moved_along(F: np.ndarray, old: np.ndarray, new: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where points of a front are solved from when it is solved again, and along which weights.
+
+    That is where they are, unless the ends of the front have moved; then it is the same place between these.
+
+    Parameters
+    ----------
+    F : array (k, m)
+        Objectives of the points, all minimised.
+    old, new : arrays (m, m)
+        Those of the ends before and now; without rows (0, m), or with one objective, nothing is known to have moved.
+    units : array (m,)
+        What counts as one in each objective.
+
+    Returns
+    -------
+    references (k, m), weights (m,)
+    """
+    if not len(old) or len(units) == 1 or np.abs((new - old) / units).max() <= MOVED:
+        return F, units
+    before, after = np.ptp(old, axis=0), np.ptp(new, axis=0)
+    if not ((before > 0) & (after > 0)).all():
+        return F, units
+    return new.min(axis=0) + (F - old.min(axis=0)) * (after / before), after

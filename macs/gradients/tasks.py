@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,7 +86,8 @@ class End(Task):
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         ceiling = np.where(mine, first.F, np.inf)
         second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
-        return second if second.status == CONVERGED else first
+        # What tells whether the one objective is at its least are the multipliers for that alone.
+        return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 
     def loss(self, F: np.ndarray) -> float:
         """See `Task.loss`."""

@@ -14,9 +14,9 @@ from transcription.catalogue import parse
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
-from ..fronts.verified import verified
 from ..gradients.mending import mended
 from ..gradients.polish import CountedSolves, PolishLog, polish
+from ..gradients.search_mesh import Chosen
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.archive import Archive
@@ -115,11 +115,6 @@ class MACS(Settings, Solver):
             state.polishing = None
 
     @property
-    def most_points(self) -> int:
-        """Largest number of points of its fronts."""
-        return self.archive
-
-    @property
     def mends(self) -> bool:
         """Whether points that a simulation does not confirm are solved again."""
         return self.mesh == "mended" and self.refines
@@ -129,7 +124,7 @@ class MACS(Settings, Solver):
         """Whether points are solved on finer meshes than that of the search."""
         return self.mends or self.mesh == "adaptive"
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
         if self.polish_on is not None:
@@ -146,7 +141,8 @@ class MACS(Settings, Solver):
             return refined[best_rows(refined)]
         if not self.mends or verify is None:
             return front.verify(verify)
-        return Front.of(mended(verified(front, verify, remark=False), None, progress, fine))
+        fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.refined)
+        return Front.of(mended(front, verify, None, progress, fine, ends))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

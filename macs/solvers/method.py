@@ -11,10 +11,11 @@ import numpy as np
 
 from problems.checks import short_repr
 from problems.compiled import CompiledProblem
-from transcription.base import Meshed, Transcription
+from transcription.base import Transcription
 
 from ..evaluation.evaluator import Evaluator
 from ..front import Front
+from ..gradients.search_mesh import Chosen
 
 
 class SearchMethod(ABC):
@@ -78,11 +79,6 @@ class SearchMethod(ABC):
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
 
     @property
-    def most_points(self) -> int | None:
-        """Largest number of points of its fronts, if there is one."""
-        return None
-
-    @property
     def mends(self) -> bool:
         """Whether `finish` solves points again that a simulation does not confirm."""
         return False
@@ -92,11 +88,11 @@ class SearchMethod(ABC):
         """Whether `finish` solves points on finer meshes, so that a search may go on a coarse one."""
         return self.mends
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None, fine: Meshed | None = None) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
         """The front, marked by a simulation of its points unless `verify` is None, after further work.
 
-        Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too. `fine` is a
-        finer mesh on which points are solved again first, if there is one.
+        Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too. `chosen` is
+        what was found out about the mesh, where none was given.
         """
         return front.verify(verify)
 

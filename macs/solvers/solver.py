@@ -15,14 +15,13 @@ from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
-from transcription.stopping import Stopped, stopping
+from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
 from ..evaluation.evaluator import Counts
 from ..front import Front
 from ..fronts.builders import black_box_points, no_points, trajectory_points
-from ..fronts.merging import extended
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify
 from ..gradients.search_mesh import search_transcription
@@ -76,7 +75,8 @@ class Solver(SearchMethod):
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
             First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
-            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws.
+            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws; where MACS finds the mesh, also
+            the optima of single objectives that this takes.
         verify : float, optional
             How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
             simulated.
@@ -125,14 +125,15 @@ class Solver(SearchMethod):
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
-        earlier, fine, ends = Counts(), None, None
+        earlier, chosen = Counts(), None
         with Interrupts(time_limit) as interrupts:
             try:
                 if transcription is None:
                     with StatusLine(progress) as show:
                         chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance), show)
-                    earlier, fine, ends = chosen.counts, *((chosen.fine, chosen.ends) if self.mends else (None, None))
+                    earlier = chosen.counts
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
+                    start = chosen.ends if start is None and self.remeshes else start
                 run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
             except Stopped as reason:
                 costs_so_far = costs(
@@ -143,12 +144,7 @@ class Solver(SearchMethod):
             front = run.go(None, progress, callback, checkpoint)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
-                if front.stats["stopped"] not in ENDED:
-                    return front.verify(verify)
-                finished = self.finish(front, verify, progress, fine)
-                if ends is None or verify is None or stopping():
-                    return finished
-                return Front.of(extended(finished, ends, verify, self.most_points or len(finished) + len(ends)))
+                return self.finish(front, verify, progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:

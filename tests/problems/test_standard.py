@@ -64,8 +64,11 @@ QUICK = {
     "car": "dfet:40x3:bernstein:1",
     "catalyst_mixing": "dfet:40x3:bernstein:1",
     "crane": "dfet:20x3",
+    "fast_oscillator": "dfet:40x3:bernstein:1",
     "hang_glider": "dfet:20x3:bernstein",
+    "hanging_chain": "dfet:10x6",
     "isoperimetric": "dfet:3x8",
+    "jacobson": "dfet:40x3:bernstein:1",
     "jacobson_lele": "dfet:20x3",
     "linear_tangent": "dfet:8x3:bernstein",
     "lotka_fishing": "dfet:40x3:bernstein:1",
@@ -77,13 +80,15 @@ QUICK = {
     "robot_arm": "dfet:40x3:bernstein:1",
     "schwartz": "dfet:8x3:bernstein",
     "sounding_rocket": "dfet:3x5:bernstein:3",
+    "stirred_tank": "dfet:20x3",
+    "tuberculosis": "dfet:20x3:bernstein",
     "tumour": "dfet:40x3:bernstein:1",
     "two_link_arm": "dfet:40x3:bernstein:1",
     "van_der_pol": "dfet:20x3",
     "zermelo": "dfet:8x3:bernstein",
 }
-# Not here, since no uniform mesh of a sensible size finds them: alp_rider, f8 (from its own guess), free_flying_robot, low_thrust, obstacle
-# and rocket; test_standard_truths.py has independent references of most.
+# Not here, since no uniform mesh of a sensible size finds them from one start: alp_rider, dubins, f8 (from its own guess),
+# free_flying_robot, low_thrust, obstacle and rocket; test_standard_truths.py has independent references of most.
 SLOW = {
     "aly_chan": "dfet:8x3:bernstein",
     "climb": "dfet:30x4",
@@ -91,6 +96,7 @@ SLOW = {
     "dynamic_soaring": "dfet:20x3",
     "hypersensitive": "dfet:60x5",
     "missile": "dfet:20x3",
+    "plane_change": "dfet:30x4:bernstein",
 }
 LIMIT = 5e-3
 """Largest violation when simulated: the usual basis may leave limits a little between its nodes."""

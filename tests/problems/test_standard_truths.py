@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad, solve_bvp, solve_ivp
 from scipy.optimize import brentq, fsolve
 
 from macs import optimize
 from problems import Problem, load
 from problems.cases.standard import published
-from problems.cases.standard.switching import rocket
+from problems.cases.standard.switching import dubins, fast_oscillator, rocket
 from transcription import parse
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
@@ -98,7 +98,108 @@ def test_the_landing_with_one_switch():
     assert value("moon_landing") == pytest.approx(1.227 * shot(missed, [0.3, 1.2])[1], rel=1e-11)
 
 
+def test_the_catenary():
+    def ends(shape):  # x = c cosh((s - a) / c) + b
+        c, a, b = shape
+        length = c * (np.sinh((1 - a) / c) + np.sinh(a / c))
+        return [c * np.cosh(a / c) + b - 1, c * np.cosh((1 - a) / c) + b - 3, length - 4]
+
+    c, a, b = shot(lambda shape: np.array(ends(shape)), [0.2, 0.4, 0.0])
+    energy, _ = quad(lambda s: (c * np.cosh((s - a) / c) + b) * np.cosh((s - a) / c), 0, 1, epsabs=1e-13)
+    assert value("hanging_chain") == pytest.approx(energy, rel=1e-10)
+
+
+def test_the_double_integrator_that_becomes_singular():
+    def x(t):
+        return t - t**2 / 2
+
+    switch = brentq(lambda t: 1 - t + x(t) * np.tanh(5 - t), 1, 2, xtol=1e-15)
+    first, _ = quad(lambda t: x(t) ** 2 + (1 - t) ** 2, 0, switch, epsabs=1e-14)
+    A = x(switch) / np.cosh(5 - switch)
+    assert switch == pytest.approx(1.413764, abs=1e-6)
+    assert value("jacobson") == pytest.approx(first + A**2 * np.sinh(2 * (5 - switch)) / 2, rel=1e-10)
+
+
+def dubins_words(x: float, y: float, end: float) -> dict[str, float]:
+    """Lengths of the words from (0, 0) in the direction 0 to (x, y) in the direction `end`; L and R are circles, S a straight line.
+
+    Between the centres of the first and the last circle lies the straight line itself, turned by an angle where the sides differ, or the
+    middle circle that touches both.
+    """
+    found = {}
+    for one in (1, -1):
+        for other in (1, -1):
+            first, last = np.array([0.0, one]), np.array([x - other * np.sin(end), y + other * np.cos(end)])
+            way = last - first
+            distance, direction = np.linalg.norm(way), np.arctan2(way[1], way[0])
+            if one == other:
+                course, straight = direction, distance
+            elif distance >= 2.0:
+                course, straight = direction + one * np.arcsin(2.0 / distance), np.sqrt(distance**2 - 4)
+            else:
+                continue
+            arcs = np.mod(one * course, 2 * np.pi) + np.mod(other * (end - course), 2 * np.pi)
+            found["LR"[one < 0] + "S" + "LR"[other < 0]] = arcs + straight
+        last = np.array([x - one * np.sin(end), y + one * np.cos(end)])
+        way = last - np.array([0.0, one])
+        distance, direction = np.linalg.norm(way), np.arctan2(way[1], way[0])
+        for side in (1, -1):
+            if distance <= 4.0:
+                bend = side * np.arccos(distance / 4.0)
+                middle = 2.0 * np.array([np.cos(direction + bend), np.sin(direction + bend)]) + np.array([0.0, one])
+                out, back = np.arctan2(*(middle - np.array([0.0, one]))[::-1]), np.arctan2(*(last - middle)[::-1])
+                # Headings where the circles touch: a quarter ahead of the direction between the centres, on either side.
+                a, b = out + one * np.pi / 2, back - one * np.pi / 2
+                length = np.mod(one * a, 2 * np.pi) + np.mod(-one * (b - a), 2 * np.pi) + np.mod(one * (end - b), 2 * np.pi)
+                word = "LRL" if one > 0 else "RLR"
+                found[word] = min(found.get(word, np.inf), length)
+    return found
+
+
+def test_the_shortest_word():
+    lengths = dubins_words(*dubins.PLACE, 0.0)
+    assert set(lengths) == {"LSL", "LSR", "RSL", "RSR", "LRL", "RLR"}
+    assert value("dubins") == pytest.approx(min(lengths.values()), rel=1e-12)
+    # Straight ahead, and half a circle.
+    assert min(dubins_words(5.0, 0.0, 0.0).values()) == pytest.approx(5.0)
+    assert min(dubins_words(0.0, 2.0, np.pi).values()) == pytest.approx(np.pi)
+
+
 # The maximum principle
+
+
+def test_the_fast_oscillator_with_one_switch():
+    def moved(u, start, duration):
+        return solve_ivp(lambda t, x: [x[1], -x[0] + x[1] * (1 - x[0] ** 2) + u], (0, duration), start, **TIGHT).y[:, -1]
+
+    first, second = shot(lambda d: moved(-1, moved(1, fast_oscillator.BEGINNING, d[0]), d[1]) - fast_oscillator.END, [0.3, 1.0])
+    assert first == pytest.approx(0.158320, abs=1e-6)
+    assert value("fast_oscillator") == pytest.approx(first + second, rel=1e-10)
+
+
+def test_the_cooling_of_the_stirred_tank():
+    def cooling(x, a):
+        return a * (x + 0.25) / 0.2
+
+    def rates(t, state):
+        x, y, a, b = state
+        slope = np.exp(25 * x / (x + 2))
+        reaction, steep = (y + 0.5) * slope, (y + 0.5) * slope * 50 / (x + 2) ** 2
+        u = cooling(x, a)
+        forward = -(2 + u) * (x + 0.25) + reaction, 0.5 - y - reaction
+        return np.array([*forward, -(2 * x - a * (2 + u) + (a - b) * steep), -(2 * y + (a - b) * slope - b)])
+
+    def ends(first, last):
+        return np.array([first[0] - 0.09, first[1] - 0.09, last[2], last[3]])
+
+    found = solve_bvp(rates, ends, np.linspace(0, 0.78, 100), np.full((4, 100), 0.05), tol=1e-9, max_nodes=20000)
+    assert found.status == 0
+
+    def cost(t):
+        x, y, a, _ = found.sol(t)
+        return x**2 + y**2 + 0.1 * cooling(x, a) ** 2
+
+    assert value("stirred_tank") == pytest.approx(quad(cost, 0, 0.78, epsabs=1e-12, limit=200)[0], rel=1e-8)
 
 
 def test_zermelos_heading():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from transcription.meshes.errors import decay_rates, phase_errors
 from transcription.meshes.growth import growth
 from transcription.meshes.scales import control_scales, objective_variations, own_scales, state_scales
 from transcription.meshes.verdict import Wanted, judge
-from transcription.nlp.scaling import gradients
+from transcription.nlp.derivatives import gradients
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
 from transcription.trajectories.simulate import simulate, simulate_elements
 
@@ -270,8 +272,12 @@ def test_controls_of_a_low_order_get_a_higher_one_where_that_is_what_is_wrong():
             j, k = nlp.variables[i].name.split("[")[1].rstrip("]").split(",")
             z[i] = np.cos(int(j) + (-0.5, 0.5)[int(k)])
     z = nlp.propagate(z[None])[0]
-    finer = next_method(method, assessed(nlp, z), nlp.unpack(z))
+    verdict = assessed(nlp, z)
+    finer = next_method(method, verdict, nlp.unpack(z))
     assert finer.degree_of_controls(5, finer.mesh_of("swing").control_order) >= 3
+    simulated = replace(verdict, wanted=replace(verdict.wanted, confirmed=False))
+    assert verdict.scores()[0].controls.min() > 1.0 and simulated.scores()[0].controls.max() == 0.0, "what no simulation sees"
+    assert next_method(method, simulated, nlp.unpack(z)).mesh_of("swing").control_order is None
 
 
 def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be():

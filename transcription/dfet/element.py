@@ -1,4 +1,4 @@
-"""One finite element in time: its equations."""
+"""Finite elements in time: what is evaluated at their points, and their basis functions there."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics import polynomials
-from ..numerics.periodic import unwrapped_law, wrapped_controls
 
 
-def element_function(tables: Tables, phase: CompiledPhase) -> ca.Function:
-    """(X, U, left, right, start, h, s) -> (weak form without its right end, integrals, paths, the same at the nodes of equalities, peaks,
-    controls at both ends, sizes)."""
-    nx, nu = len(phase.states), len(phase.controls)
-    X, U = ca.MX.sym("X", nx, tables.order + 1), ca.MX.sym("U", nu, tables.control_order + 1)
-    left, right = ca.MX.sym("left", nx), ca.MX.sym("right", nx)
-    start, h, s = ca.MX.sym("start"), ca.MX.sym("h"), ca.MX.sym("s", phase.dynamics.size1_in(3))
-    law = unwrapped_law(U, phase)
+def rates_and_integrands(phase: CompiledPhase) -> ca.Function:
+    """(x, u, place, share, s) -> (rates and integrands, times half of the length of the element; sizes), at one point.
 
-    def over(function: ca.Function, tau: np.ndarray, states: ca.MX) -> ca.MX:
-        times = start + 0.5 * h * ca.DM(1.0 + tau).T
-        controls = wrapped_controls(law @ ca.DM(tables.control(tau)).T, phase)
-        return function.map(len(tau))(states, controls, times, ca.repmat(s, 1, len(tau)))
+    The place is that of the point and the share that of its element, relative to the phase.
+    """
+    x, u, place, share, s = _symbols(phase)
+    half, along = 0.5 * share * (s[1] - s[0]), (x, u, s[0] + place * (s[1] - s[0]), s)
+    values = [half * phase.dynamics(*along), half * phase.integrands(*along), phase.sizes(*along)]
+    return ca.Function("inside", [x, u, place, share, s], values)
 
-    inside = X @ ca.DM(tables.state(tables.tau)).T
-    closed = ca.horzcat(left, X @ ca.DM(tables.state(tables.stages)).T, right)
-    rates = over(phase.dynamics, tables.tau, inside)
-    first = ca.kron(left, ca.DM(np.eye(1, tables.order + 2)))
-    weak = X @ ca.DM(tables.mass) + 0.5 * h * (rates @ ca.DM(tables.test)) + first
-    integrals = 0.5 * h * over(phase.integrands, tables.tau, inside) @ ca.DM(tables.weights)
-    paths, equalities = (over(phase.path, tau, closed @ ca.DM(tables.collocation(tau)).T) for tau in (tables.points, tables.exact))
-    peaks = over(phase.peaks, tables.dense, closed @ ca.DM(tables.collocation(tables.dense)).T)
-    sizes = over(phase.sizes, tables.tau, inside)
-    ends = ca.vec(wrapped_controls(law @ ca.DM(tables.control(np.array([-1.0, 1.0]))).T, phase))
-    names = ["X", "U", "left", "right", "start", "h", "s"], ["weak", "integrals", "paths", "equalities", "peaks", "ends", "sizes"]
-    return ca.Function("element", [X, U, left, right, start, h, s], [weak, integrals, paths, equalities, peaks, ends, sizes], *names)
+
+def at_place(function: ca.Function, chosen: list[int], phase: CompiledPhase) -> ca.Function:
+    """(x, u, place, s) -> some rows of what a Function of a phase returns at this place, relative to the phase."""
+    x, u, place, _, s = _symbols(phase)
+    return ca.Function(function.name(), [x, u, place, s], [function(x, u, s[0] + place * (s[1] - s[0]), s)[chosen]])
+
+
+def times_half_length(phase: CompiledPhase, size: int) -> ca.Function:
+    """(values, share, s) -> values times half of the length of an element with this share of the phase."""
+    values, (_, _, _, share, s) = ca.MX.sym("values", size), _symbols(phase)
+    return ca.Function("weighted", [values, share, s], [0.5 * share * (s[1] - s[0]) * values])
+
+
+def _symbols(phase: CompiledPhase) -> list[ca.MX]:
+    """Symbols of x, u, place, share and s at one point."""
+    sizes = {"x": len(phase.states), "u": len(phase.controls), "place": 1, "share": 1, "s": phase.dynamics.size1_in(3)}
+    return [ca.MX.sym(name, size) for name, size in sizes.items()]
 
 
 class Tables:

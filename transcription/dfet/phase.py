@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
@@ -10,14 +9,13 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, Variable
 
-from ..numerics.batched import expanded
-from ..numerics.periodic import unwrapped, wrapped
+from ..numerics.periodic import unwrapped, unwrapped_law, wrapped, wrapped_controls
 from ..numerics.polynomials import gauss_legendre
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .element import Tables, element_function
+from .element import Tables, at_place, rates_and_integrands, times_half_length
 from .propagation import Propagation
 
 
@@ -27,6 +25,8 @@ class DFETPhase(PhaseWriter):
     Slots: `X` (N, l + 1, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
     elements, which are unknowns of their own, `E` (m,) places of the edges that move, relative to the phase.
     """
+
+    affine = True
 
     def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
         super().__init__(phase, layout, ends)
@@ -39,14 +39,13 @@ class DFETPhase(PhaseWriter):
         self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
         self._begin = np.array(mesh.edges)[list(mesh.moving)]
         self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
-        at_edges = [replace(v, name=f"{v.name}[edge]") for v in phase.states]
+        at_edges = [v.named(f"{v.name}[edge]") for v in phase.states]
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
         self._sizes = [Variable(f"size[{k}]", -np.inf, np.inf, "", scale) for k, scale in enumerate(phase.size_scales)]
         self.S = layout.add_table(prefix, self._sizes, elements, len(tables.tau))
         self.magnitudes = self.S.ravel()
-        self._element = expanded(element_function(tables, phase))
 
     def _controls(self, prefix: str) -> np.ndarray:
         """Slots (N, q + 1, nu) of the controls; where one is constant, all of an arc are the same."""
@@ -58,9 +57,9 @@ class DFETPhase(PhaseWriter):
         def slot(v: Variable, j: int, k: int) -> int:
             arc = int(arcs[j])
             if arc not in constant.get(v.name, ()):
-                return self.layout.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=True)
+                return self.layout.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=True)
             if (v.name, arc) not in one:
-                one[v.name, arc] = self.layout.add(replace(v, name=f"{prefix}{v.name}[arc {arc}]"), free=True)
+                one[v.name, arc] = self.layout.add(v.named(f"{prefix}{v.name}[arc {arc}]"), free=True)
             return one[v.name, arc]
 
         return np.array([[[slot(v, j, k) for v in self.phase.controls] for k in range(shape[1])] for j in range(self.n)])
@@ -77,27 +76,76 @@ class DFETPhase(PhaseWriter):
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
-        n, tables, phase, pick = self.n, self.tables, self.phase, self.layout.pick
-        left, right, (U, *times) = pick(extended, self.B[:-1]), pick(extended, self.B[1:]), self._inputs(extended)
-        weak, integrals, paths, equalities, peaks, ends, sizes = self._element.map(n)(pick(extended, self.X), U, left, right, *times)
+        phase, tables, pick = self.phase, self.tables, self.layout.pick
+        X, B = pick(extended, self.X), pick(extended, self.B)
+        left, right = B[:, :-1], B[:, 1:]
+        place, share, s = self._inside(extended, tables.tau)
+        inside = self._spread(X, tables.state(tables.tau).T)
+        rates, integrands, sizes = rows.at_points(
+            rates_and_integrands(phase), inside, self._controls_at(extended, tables.tau), place, share, s
+        )
         tests = tables.order + 2
-        residual = weak - ca.kron(right, ca.DM(np.eye(1, tests, tests - 1)))
-        self.add_dynamics(rows, residual)
-        self.add_paths(rows, paths, equalities)
-        nu, totals = len(phase.controls), ca.sum2(integrals)
-        if self._sizes:
-            totals = self._with_sizes(totals, pick(extended, self.S), sizes, times[1], rows)
-        return Written(ends[:nu, 0], ends[nu:, -1], totals, peaks, ca.vec(ca.fabs(sizes)))
+        first, last = np.eye(1, tests), np.eye(1, tests, tests - 1)
+        self.add_dynamics(
+            rows,
+            self._spread(X, tables.mass) + self._spread(rates, tables.test) + self._spread(left, first) - self._spread(right, last),
+        )
 
-    def _with_sizes(self, totals: ca.MX, S: ca.MX, sizes: ca.MX, lengths: ca.MX, rows: Rows) -> ca.MX:
+        def samples(function: ca.Function, chosen: list[int], tau: np.ndarray) -> ca.MX:
+            """Values of some rows of a Function of the phase at places of each element, of the collocation polynomial."""
+            if not chosen:
+                return ca.MX(0, self.n * len(tau))
+            basis = tables.collocation(tau).T
+            states = (
+                self._spread(left, basis[:1])
+                + self._spread(X, tables.state(tables.stages).T @ basis[1:-1])
+                + self._spread(right, basis[-1:])
+            )
+            place, _, s = self._inside(extended, tau)
+            (values,) = rows.at_points(at_place(function, chosen, phase), states, self._controls_at(extended, tau), place, s)
+            return values
+
+        paths: dict[int, ca.MX] = {}
+        for equality, tau in ((False, tables.points), (True, tables.exact)):
+            chosen = [k for k, limit in enumerate(phase.paths) if (limit.lower == limit.upper) is equality]
+            paths |= zip(chosen, ca.vertsplit(samples(phase.path, chosen, tau)), strict=True)
+        self.add_paths(rows, [paths[k] for k in range(len(phase.paths))])
+        peaks = samples(phase.peaks, list(range(phase.peaks.size1_out(0))), tables.dense)
+        ends = self._controls_at(extended, np.array([-1.0, 1.0]))
+        totals = integrands @ ca.DM(np.tile(tables.weights, self.n))
+        if self._sizes:
+            totals = self._with_sizes(totals, pick(extended, self.S), sizes, (share, s), rows)
+        return Written(ends[:, 0], ends[:, -1], totals, peaks, ca.vec(ca.fabs(sizes)))
+
+    def _spread(self, values: ca.DM | ca.MX, matrix: np.ndarray) -> ca.MX:
+        """Columns that stand side by side for each element, times the same matrix for each element."""
+        return ca.MX(values) @ ca.kron(ca.DM.eye(self.n), ca.sparsify(ca.DM(matrix)))
+
+    def _inside(self, extended: ca.MX, tau: np.ndarray) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """Where points at `tau` of each element lie, and the length of their elements, both relative to the phase; and s."""
+        places, s = self._places(extended) / self.n, self.layout.pick(extended, self.ends.statics)
+        starts, shares = places[:, :-1], places[:, 1:] - places[:, :-1]
+        place = self._spread(starts, np.ones((1, len(tau)))) + self._spread(shares, 0.5 * (1.0 + tau)[None])
+        return place, self._spread(shares, np.ones((1, len(tau)))), ca.repmat(s, 1, self.n * len(tau))
+
+    def _controls_at(self, extended: ca.MX, tau: np.ndarray) -> ca.MX:
+        """Controls (nu, N k) at k places of each element."""
+        basis, U = self.tables.control(tau).T, self.layout.pick(extended, self.U)
+        if not any(v.period for v in self.phase.controls):
+            return self._spread(U, basis)
+        law = ca.MX.sym("U", len(self.phase.controls), self.tables.control_order + 1)
+        values = wrapped_controls(unwrapped_law(law, self.phase) @ ca.DM(basis), self.phase)
+        return ca.Function("controls", [law], [values]).map(self.n)(U)
+
+    def _with_sizes(self, totals: ca.MX, S: ca.MX, sizes: ca.MX, lengths: tuple[ca.MX, ca.MX], rows: Rows) -> ca.MX:
         """The integrals, those of absolute values as sums of the variables S (sizes, n k), which are not to be less than these."""
         scales = np.tile([v.scale for v in self._sizes], sizes.shape[1])
         for sign in (1.0, -1.0):
             rows.add(sign * sizes - S, -np.inf, 0.0, scales, f"absolute values in '{self.phase.name}'", propagated=True)
         entries = ca.vertsplit(totals)
-        for row, one in zip(self.phase.sized, ca.vertsplit(S), strict=True):
-            on_elements = ca.DM(self.tables.weights).T @ ca.reshape(one, -1, self.n)
-            entries[row] = ca.sum2(0.5 * lengths * on_elements)
+        (weighted,) = rows.at_points(times_half_length(self.phase, len(self._sizes)), S, *lengths)
+        for row, one in zip(self.phase.sized, ca.vertsplit(weighted), strict=True):
+            entries[row] = one @ ca.DM(np.tile(self.tables.weights, self.n))
         return ca.vertcat(*entries)
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -189,13 +237,20 @@ class DFETPhase(PhaseWriter):
         self.layout.write(extended, self.U, U[None])
         self.layout.write(extended, self.B[1:-1], at_edges[None])
 
-    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
-        """See `PhaseWriter.unpack`."""
-        phase, tables = self.phase, self.tables
-        s, places = extended[self.ends.statics], self.mesh.places
+    def _edges(self, extended: np.ndarray) -> np.ndarray:
+        """Times (N + 1,) of the ends of elements."""
+        (t0, tf), places = extended[self.ends.statics[:2]], self.mesh.places
         if len(self.E):
             places = places + self.n * self.mesh.shares @ (extended[self.E] - self._begin)
-        edges = s[0] + (s[1] - s[0]) * places / self.n
+        return t0 + (tf - t0) * places / self.n
+
+    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial:
+        """See `PhaseWriter.costates`: the multipliers of an element are the coefficients of its test functions."""
+        return PiecewisePolynomial(self._edges(extended), multipliers.reshape(self.n, self.tables.order + 2, -1), self.tables.state_basis)
+
+    def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
+        """See `PhaseWriter.unpack`."""
+        phase, tables, edges = self.phase, self.tables, self._edges(extended)
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)

@@ -36,6 +36,8 @@ class InnerResult:
         How many candidates a faster method left to a slower one.
     residuals : array (k, n + r), optional
         What `NLP.residuals` returns there, from which the violation of each constraint follows; None: to be computed from z.
+    light : int
+        How many of all iterations were not IPOPT's: they take less time.
     """
 
     z: np.ndarray
@@ -47,6 +49,7 @@ class InnerResult:
     clocked: bool = False
     fallbacks: int = 0
     residuals: np.ndarray | None = None
+    light: int = 0
 
     def __repr__(self) -> str:
         found, counts = np.unique(self.status, return_counts=True)

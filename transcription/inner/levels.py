@@ -39,7 +39,8 @@ class Propagate(InnerSolver):
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
         k = len(start)
-        return scored(nlp, nlp.propagate_and_score(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        found = scored(nlp, nlp.propagate_and_score(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        return replace(found, light=k)
 
 
 NAMED: dict[str, InnerSolver] = {

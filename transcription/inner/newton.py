@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class Newton(InnerSolver):
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
+        return replace(scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance), light=int(iterations.sum()))
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float

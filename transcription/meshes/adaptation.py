@@ -27,6 +27,21 @@ def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Met
     return method.remeshed(finer, bounded=verdict.leaving > verdict.wanted.leaving)
 
 
+def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
+    """The method on meshes of which the elements are cut on which other controls would gain: where these jump, else in the middle. All
+    edges stay in their places, and controls are constant nowhere."""
+    finer = {}
+    most = max((float(gain.amounts.max()) for gain in verdict.gains.values()), default=0.0)
+    for name, gain in verdict.gains.items():
+        old = method.mesh_of(name).found_in(trajectory[name].state.edges)
+        worst_first = [int(j) for j in np.argsort(-gain.amounts, kind="stable") if gain.amounts[j] >= WORST_SHARE * most > 0]
+        if worst_first:
+            limit = max(method.most_elements, 2 * method.elements)
+            edges = split(np.array(old.edges), {j: gain.places[j].tolist() or [0.0] for j in worst_first}, limit)
+            finer[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
+    return method.remeshed(finer)
+
+
 def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: PhaseErrors, scores: ElementScores) -> PhaseMesh:
     """The next mesh of one phase."""
     most = max(method.most_elements, 2 * method.elements)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..trajectories.simulate import Simulation, simulate, simulate_elements
 from ..trajectories.trajectory import Trajectory
 from .errors import PhaseErrors, phase_errors
 from .growth import growth
+from .minimum import Gain, Optimum, gains
 from .scales import state_scales
 
 SAFETY = 0.5
@@ -44,7 +46,8 @@ class Wanted:
     objectives : float, optional
         Largest error of an objective, in its unit; by default `COST` tolerances.
     confirmed : bool
-        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does.
+        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
+        for controls that polynomials of their degree describe poorly.
     """
 
     tolerance: float
@@ -57,6 +60,11 @@ class Wanted:
     def settled(self) -> float:
         """Largest error of an objective."""
         return COST * self.tolerance if self.objectives is None else self.objectives
+
+    @property
+    def accuracy(self) -> float:
+        """Relative tolerance of an integrator that is far more exact; in spans of the states' bounds, it is ten times as exact, or more."""
+        return float(np.clip(1e-3 * self.tolerance, 1e-13, 1e-7))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +90,8 @@ class Verdict:
         How much errors grow along the trajectory, where that was worth finding out; else 1.
     narrow : float
         The least that any state does, in spans of its bounds.
+    gains : mapping
+        What controls could still gain in each phase, see `minimum`, in units of the objectives; empty where that is not known.
     """
 
     simulation: Simulation
@@ -93,6 +103,12 @@ class Verdict:
     missed_by_elements: float
     growth: float
     narrow: float
+    gains: Mapping[str, Gain] = field(default_factory=dict)
+
+    @property
+    def gain(self) -> float:
+        """What all controls together could still gain."""
+        return sum(float(gain.amounts.sum()) for gain in self.gains.values())
 
     @property
     def doubt(self) -> float:
@@ -170,8 +186,10 @@ class Verdict:
         found = []
         for phase in self.errors:
             states = np.maximum(grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible)
-            controls = phase.weight * phase.tail**2 * count / wanted.settled
-            sums = np.zeros(len(states))
+            controls, sums = np.zeros((2, len(states)))
+            # That controls are not optimal, no simulation sees.
+            if wanted.confirmed:
+                controls = phase.weight * phase.tail**2 * count / wanted.settled
             if not self.missed_by_elements <= SAFETY * wanted.settled:
                 sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
             found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))
@@ -209,7 +227,9 @@ class ElementScores:
         return np.maximum(self.others, self.controls)
 
 
-def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray) -> Verdict:
+def judge(
+    problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray, optimum: Optimum | None = None
+) -> Verdict:
     """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`.
 
     Parameters
@@ -219,8 +239,10 @@ def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: n
     wanted : Wanted
     F, units : arrays (m,)
         Its objectives on the mesh, all minimised, and what counts as one in each.
+    optimum : Optimum, optional
+        Its costates and multipliers, if it is an optimum on its mesh.
     """
-    rtol = float(np.clip(1e-3 * wanted.tolerance, 1e-13, 1e-7))
+    rtol = wanted.accuracy
     scales = {name: state_scales(phase) for name, phase in trajectory.items()}
     # The integrator's absolute tolerance is stated in spans.
     spans = {name: np.array([v.span for v in phase.state_variables]) for name, phase in trajectory.items()}
@@ -245,6 +267,7 @@ def judge(problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: n
         missed_by_elements=_missed(problem, parts, F, units),
         growth=growth(problem, trajectory) if grows else 1.0,
         narrow=narrow,
+        gains={} if optimum is None else gains(problem, trajectory, optimum, whole.quantities, units),
     )
 
 

@@ -8,7 +8,8 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
-from .scaling import gradients, nlp_scales
+from .derivatives import gradients
+from .scaling import nlp_scales
 
 NEAR = 1e-2
 """Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
@@ -75,7 +76,7 @@ def _units(nlp: NLP) -> np.ndarray:
 
 def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
     """Scaled gradients (k, n) and slacks (k,) of the inequalities c >= 0 that may have a multiplier, bounds first."""
-    bounded, one_way, every = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper, np.eye(len(z))
+    bounded, one_way = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper
     slacks = (
         (z - nlp.lower) / _units(nlp),
         (nlp.upper - z) / _units(nlp),
@@ -83,7 +84,8 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
         (nlp.g_upper - g) / nlp.g_scale,
     )
     near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
-    rows = [every[near[0]], -every[near[1]], dg[near[2]].toarray(), -dg[near[3]].toarray()]
+    bounds = [side * (np.arange(len(z)) == np.flatnonzero(one)[:, None]) for side, one in zip((1.0, -1.0), near[:2], strict=True)]
+    rows = [*bounds, dg[near[2]].toarray(), -dg[near[3]].toarray()]
     return np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
 
 
@@ -120,7 +122,11 @@ def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarr
 
 def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
     """The solution for each column by itself: for all at once, BLAS starts threads for every small block, which wait for each other."""
-    return np.stack([factors.solve(column) for column in right.T], axis=1) if right.shape[1] else right
+    solution = np.zeros_like(right)
+    # Many are zero: the derivatives of bounds of controls by the states.
+    for k in np.flatnonzero(right.any(axis=0)):
+        solution[:, k] = factors.solve(right[:, k])
+    return solution
 
 
 def _least(A: np.ndarray, slack: np.ndarray) -> float:

@@ -10,8 +10,8 @@ from problems.peaks import refuse_peaks
 
 from ..base import NLP
 from ..stopping import check_stopping
-from .pieces import weighted_hessian
-from .scaling import gradients, ipopt_options, origin, symbol
+from .derivatives import gradients, hessian
+from .scaling import ipopt_options, origin
 from .watched import Watched
 
 Options = tuple[tuple[str, object], ...]
@@ -56,16 +56,6 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
     unasked = {"calc_lam_p": False, "no_nlp_grad": True}
     settings = ipopt_options(seconds, max_iterations) | {f"ipopt.{name}": value for name, value in options}
     return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives | unasked)
-
-
-@remembered
-def hessian(nlp: NLP) -> ca.Function:
-    """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse."""
-    z = symbol(nlp, "z", len(nlp.variables))
-    F, g = nlp.functions(z)
-    of_F, of_g = symbol(nlp, "of_F", F.numel()), symbol(nlp, "of_g", g.numel())
-    H = weighted_hessian(g, of_g, z, ca.dot(of_F, F))
-    return ca.Function("hessian", [z, of_F, of_g], [H], ["z", "of_F", "of_g"], ["H"])
 
 
 def _scaled(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:

@@ -18,7 +18,7 @@ from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
 from .optimality import optimality
 from .program import Options, program_parameters, solver
-from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, nlp_scales, origin
+from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, gradients, nlp_scales, origin
 
 ACCURACY = 1e-9
 """IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
@@ -31,6 +31,8 @@ AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
 USEFUL = 1e-6
 """Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended."""
+LITTLE = 1e-4
+"""Part of what an objective could change by that counts as one unit of it at least, where it is near zero."""
 AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -91,6 +93,9 @@ class Solved:
         Of IPOPT, by all strategies together.
     message : str
         Why the solve ended where it did not converge by itself: the limit that was reached, or what IPOPT says.
+    multipliers : array (m + r,) or None
+        Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum of both
+        vanish. None where nothing was solved.
     clocked : bool
         Whether a clock ended any of the work: then the same solve need not give the same again.
     begun : bool
@@ -105,6 +110,7 @@ class Solved:
     clocked: bool = False
     begun: bool = True
     message: str = ""
+    multipliers: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
@@ -221,12 +227,21 @@ def scalarize(
     iterations = sum(solved.iterations for solved in found)
     ended = best.status != CONVERGED and found[-1].message == AT_LIMIT
     message = f"the limit of {max_iterations} iterations was reached" if ended else best.message
-    if best.status == FAILED and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
+    if best.status in (FAILED, INFEASIBLE) and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
         # Of several objectives, the certificate would not know which was asked for.
-        residual = optimality(nlp, best.z)
+        residual = optimality(nlp, best.z, _own_scales(nlp, best.z, best.F))
         if residual <= USEFUL:
             best, message = replace(best, status=CONVERGED), f"{message}; the conditions of optimality hold to {residual:.0e}"
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
+
+
+def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """What counts as one in each objective (m,) at a vector: its size there, and a little of what it could change by; no more than its
+    usual scale, which exponentials make huge somewhere in a wide box."""
+    usual = nlp_scales(nlp)
+    change = np.abs(np.nan_to_num(np.array(gradients(nlp)(z)[0]))) @ nlp.scale
+    own = np.maximum(np.abs(F), LITTLE * change)
+    return np.minimum(usual, np.where(own > 0, own, usual))
 
 
 def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
@@ -283,9 +298,9 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
     options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
+        columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
     except Stopped:
         return _not_begun(nlp, start), False
@@ -319,7 +334,15 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
-    return Solved(z, F[0], float(violation[0]), status, iterations, STATUS_OF_IPOPT.get(outcome) == TIMEOUT, message=message), stuck
+    clocked = STATUS_OF_IPOPT.get(outcome) == TIMEOUT
+    multipliers = _multipliers(np.array(answer["lam_g"]).ravel(), rows, task.scale)
+    return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message, multipliers=multipliers), stuck
+
+
+def _multipliers(found: np.ndarray, rows: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """See `Solved.multipliers`, from those of the program's rows, by the scales of the NLP's rows (r,) and of the objectives (m,)."""
+    of_rows, moving, resting = np.split(found, np.cumsum([len(rows), len(scales)]))
+    return np.concatenate([(moving + resting) / scales, of_rows / rows])
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

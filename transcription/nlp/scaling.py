@@ -1,16 +1,15 @@
-"""Scaling of nonlinear programs, their derivatives, and options of IPOPT."""
+"""Scaling of nonlinear programs, and options of IPOPT."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from problems.derived import remembered
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
-from .pieces import jacobian
+from .derivatives import gradients, objective_gradients
 
 STATUS_OF_IPOPT = {
     "Infeasible_Problem_Detected": INFEASIBLE,
@@ -54,22 +53,24 @@ def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
     return np.clip(z, nlp.lower, nlp.upper)
 
 
-DENSE = 0.25
-"""Share of the variables that a row is dense with."""
 SAMPLES = 31
 """Number of places where the slopes of objectives are evaluated for their scales."""
+ROUNDING = 1e-12
+"""An objective that changes by less than this part of its size is constant: its slopes are rounding errors."""
 
 
 @remembered
 def nlp_scales(nlp: NLP) -> np.ndarray:
     """The scales of the objectives (m,) where the front is not known: its change, to first order, if all variables moved by
-    their scales; the median over the box, 1 where that is 0.
+    their scales; the median over the box, 1 where that is 0 or rounding.
     """
     rng = np.random.default_rng(0)
     lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
-    slopes = [np.array(gradients(nlp)(lower + rng.random(len(lower)) * (upper - lower))[0]) for _ in range(SAMPLES)]
-    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=0)
-    return np.where(sizes > 0, sizes, 1.0)
+    Z = lower + rng.random((SAMPLES, len(lower))) * (upper - lower)
+    slopes = np.array(objective_gradients(nlp)(Z.T)).reshape(-1, SAMPLES, len(lower))
+    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=1)
+    least = ROUNDING * np.median(np.nan_to_num(np.abs(nlp.evaluate(Z)[0]), posinf=0.0), axis=0)
+    return np.where(sizes > least, sizes, 1.0)
 
 
 @remembered
@@ -77,25 +78,6 @@ def _places(nlp: NLP) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the derivatives of g that may differ from 0."""
     i, j = gradients(nlp).sparsity_out(1).get_triplet()
     return np.array(i, dtype=int), np.array(j, dtype=int)
-
-
-@remembered
-def gradients(nlp: NLP) -> ca.Function:
-    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
-    z = symbol(nlp, "z", len(nlp.variables))
-    F, g = nlp.functions(z)
-    return ca.Function("gradients", [z], [ca.jacobian(F, z), _jacobian(g, z), F, g], ["z"], ["dF", "dg", "F", "g"])
-
-
-def _jacobian(rows: Any, z: Any) -> Any:
-    """Derivatives of the rows; dense ones, those of integrals, apart: one sweep for many columns is lost where there is one such row."""
-    counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
-    dense = np.flatnonzero(counts > DENSE * max(z.numel(), 1))
-    if not len(dense) or len(dense) == len(counts):
-        return jacobian(rows, z)
-    sparse = np.setdiff1d(np.arange(len(counts)), dense)
-    blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
-    return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
 
 
 ROUNDS = 5
@@ -121,9 +103,3 @@ def equilibrated(nlp: NLP, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             scales *= np.where(largest > 0, largest, 1.0) ** power
     columns = np.clip(columns, LEAST_SCALE * nlp.scale, nlp.scale)
     return columns, np.clip(rows, ROW_SCALES[0] * nlp.g_scale, ROW_SCALES[1] * nlp.g_scale)
-
-
-def symbol(nlp: NLP, name: str, size: int) -> Any:
-    """A column of symbols of the kind that the functions of an NLP are made of: derivatives of flat lists of scalar operations are best
-    made, and fastest, as such lists; a Callback allows none."""
-    return (ca.SX if nlp.functions.is_a("SXFunction") else ca.MX).sym(name, size)

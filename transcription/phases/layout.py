@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -42,8 +41,7 @@ class Layout:
     def add_table(self, prefix: str, variables: Sequence[Variable], rows: int, columns: int, *, free: bool = False) -> np.ndarray:
         """The same quantities at rows x columns places (elements x coefficients); returns slots (rows, columns, len(variables))."""
         slots = [
-            [[self.add(replace(v, name=f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)]
-            for j in range(rows)
+            [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)] for j in range(rows)
         ]
         return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
 

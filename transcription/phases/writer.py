@@ -17,6 +17,7 @@ from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 from .guess import along, state_along
 from .layout import Layout
+from .pointwise import Pointwise
 from .state_equations import StateEquations
 
 
@@ -38,14 +39,20 @@ class Ends:
 
 @dataclass
 class Rows:
-    """Rows of constraints as they come together."""
+    """Rows of constraints as they come together.
 
+    `points`, where it is a list, gets what is evaluated `at_points`; by default that is no more than a call.
+    """
+
+    points: list[Pointwise] | None = None
     expressions: list[ca.MX] = field(default_factory=list)
     lower: list[np.ndarray] = field(default_factory=list)
     upper: list[np.ndarray] = field(default_factory=list)
     scale: list[np.ndarray] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
     propagated: list[bool] = field(default_factory=list)
+    dynamics: dict[str, slice] = field(default_factory=dict)
+    """Where the rows of dynamics of each phase are."""
 
     def add(
         self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
@@ -60,6 +67,22 @@ class Rows:
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+    def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
+        """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
+        sizes = [function.numel_out(i) for i in range(function.n_out())]
+        if not sum(sizes):
+            return [ca.MX(0, inputs[0].shape[1])] * len(sizes)
+        point = Pointwise.of(function, inputs)
+        if self.points is not None:
+            self.points.append(point)
+        values = point.evaluated if self.points is None else point.values
+        return ca.vertsplit(values, np.cumsum([0, *sizes]).tolist())
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return sum(expression.numel() for expression in self.expressions)
 
     @property
     def propagated_equations(self) -> ca.MX:
@@ -107,12 +130,16 @@ class PhaseWriter(ABC):
         Whether fast propagation, and `sensitivity`, can be written in C.
     wide : bool
         Whether `propagate` takes several extended vectors side by side.
+    affine : bool
+        Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
+        variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
     """
 
     interior: np.ndarray = np.empty(0, dtype=int)
     magnitudes: np.ndarray = np.empty(0, dtype=int)
     compilable: bool = False
     wide: bool = False
+    affine: bool = False
 
     def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
         self.phase, self.layout, self.ends = phase, layout, ends
@@ -136,6 +163,11 @@ class PhaseWriter(ABC):
     @abstractmethod
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """The phase's trajectory from one extended vector; `trajectory` completes what the method knows."""
+
+    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
+        """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
+        None: what these say between their places is not known."""
+        return None
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -235,14 +267,13 @@ class PhaseWriter(ABC):
             f"final value of {self.phase.name}.{v.name}" if low == high else name
             for v, (low, high), name in zip(states, self.phase.final, names, strict=True)
         ]
+        rows.dynamics[self.phase.name] = slice(rows.count, rows.count + len(states) * k)
         rows.add(residual, 0, 0, np.tile([v.scale for v in states], k), names * (k - 1) + last, propagated=True)
 
-    def add_paths(self, rows: Rows, values: ca.MX, equalities: ca.MX | None = None) -> None:
-        """Add the path constraints, of which `values` (npath, k) are samples; those that are equalities at `equalities` (npath, j) instead,
-        if that is given."""
-        for k, limit in enumerate(self.phase.paths):
-            samples = values if equalities is None or limit.lower < limit.upper else equalities
-            rows.add(samples[k, :], limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+    def add_paths(self, rows: Rows, values: ca.MX | list[ca.MX]) -> None:
+        """Add the path constraints, of which `values` (npath, k) are samples; or one row of samples for each, of any lengths."""
+        for limit, samples in zip(self.phase.paths, ca.vertsplit(values) if isinstance(values, ca.MX) else values, strict=True):
+            rows.add(samples, limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

@@ -65,7 +65,7 @@ class ShootingPhase(PhaseWriter):
         for i, v in enumerate(phase.states if len(self.Y) else ()):
             rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
         seen = pick(extended, self.W)
-        self.add_paths(rows, seen)
+        self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
         return Written(self.step.controls(first, 0.0), self.step.controls(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
 

@@ -166,9 +166,10 @@ def reentry(
     problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
 
     guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
-    # Commands within bounds everywhere, and fine enough that most feasible points are feasible when simulated, to 1 % of each limit. It
-    # takes seconds to make a candidate feasible: they are only propagated, and the best are left to the gradients.
-    problem.default_transcription = "dfet:50x2:bernstein:1"
+    # Commands within bounds everywhere. On fewer or simpler elements simulations confirm hardly a point: the angles follow a jump of their
+    # commands within some ten seconds, what is allowed at the end is a hundredth of the altitude's span, and peaks and absolute values are
+    # sampled. It takes seconds to make a candidate feasible: they are only propagated, and the best are left to the gradients.
+    problem.default_transcription = "dfet:64x4:bernstein:1"
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs import MACS, Front
-from macs.fronts.merging import best_rows, extended
-from problems import Problem
+from macs import Front
+from macs.fronts.merging import best_rows
 from problems.compiled import Objective, Variable
 
 GOALS = (Objective("time"), Objective("height", sense="maximize"))
@@ -79,39 +77,3 @@ def test_a_merged_front_has_a_table_with_the_marks():
     claims, actual = [[0.0, 0.0], [1.0, -1.0]], [[2.0, 2.0], [1.0, -1.0]]
     text = Front.merge([front(claims[:1], actual[:1], [False]), front(claims[1:], actual[1:], [True])]).table()
     assert "Not verified: simulated, these differ by more than 0.001." in text
-
-
-def extended_F(F, ends, good, limit=9) -> list[list[float]]:
-    """Objectives of a front of verified points after ends were offered to it, of which the `good` are verified."""
-    F, ends = np.asarray(F, dtype=float), np.asarray(ends, dtype=float)
-    return extended(front(F, F, np.ones(len(F), bool)), front(ends, ends, np.array(good)), 1e-3, limit).F.tolist()
-
-
-def test_a_front_gets_the_ends_that_it_lacks():
-    F = [[1.0, 3.0], [2.0, 2.0], [3.0, 1.0]]
-    assert extended_F(F, [[0.0, 4.0], [4.0, 0.0]], [True, True]) == [[0.0, 4.0], *F, [4.0, 0.0]]
-    assert extended_F(F, [[0.0, 4.0], [4.0, 0.0]], [False, True]) == [*F, [4.0, 0.0]], "one that is not verified is left out"
-    assert extended_F(F, [[0.999, 3.5], [2.5, 1.4]], [True, True]) == F, "what is hardly better, or between the ends, is left out"
-    assert extended_F(F, [[0.5, 1.5]], [True]) == [[0.5, 1.5], [3.0, 1.0]], "dominated points leave the front"
-    assert extended_F(np.empty((0, 2)), [[0.0, 4.0]], [True]) == [[0.0, 4.0]]
-
-
-def test_a_front_with_further_ends_keeps_its_size():
-    found = extended_F([[1.0, 3.0], [1.2, 2.8], [2.0, 2.0], [3.0, 1.0]], [[0.0, 4.0]], [True], limit=4)
-    assert len(found) == 4 and found[0] == [0.0, 4.0] and found[-1] == [3.0, 1.0]
-
-
-def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
-    """A few evaluations lead to few points, none of them an end; each objective alone was optimised before."""
-    problem = Problem("double integrator")
-    phase = problem.phase("run", t0=0, tf=(1.0, 4.0))
-    phase.state("x", bounds=(-1, 2), initial=0, final=1)
-    v = phase.state("v", bounds=(-2, 2), initial=0, final=0)
-    u = phase.control("u", bounds=(-8, 8))
-    phase.dynamics(x=v, v=u)
-    problem.minimize("time", phase.tf)
-    problem.minimize("effort", phase.integral(u**2))
-    found = MACS(agents=4).solve(problem, evaluations=6, seed=1)
-    # Least effort in a time T is 12 / T^3.
-    assert found.verified.all() and found.objectives[:, 0].min() == pytest.approx(1.0, abs=1e-6)
-    assert found.objectives[-1] == pytest.approx([4.0, 12 / 4**3], rel=1e-4)

@@ -10,8 +10,9 @@ import pytest
 from synthetic_fronts import black_box
 
 from macs import MACS, NSGA2, Front, optimize
+from macs.fronts import verified as module
 from macs.fronts.builders import vectors_points
-from macs.fronts.verified import COARSEST, FINEST, VERIFY, accuracy, objective_scales
+from macs.fronts.verified import COARSEST, FINEST, VERIFY, Simulations, accuracy, largest_miss, objective_scales, verified
 from problems import Problem
 from problems.compiled import Limit, Variable, verified_scale
 from transcription import DFET, SingleShooting
@@ -252,3 +253,61 @@ def test_tables_set_apart_what_is_not_verified():
     assert lines[at + 1].endswith("not verified") and "2 of 3 points are verified." in lines
     assert "Point 1: simulated, its objectives differ by 5.0e-02 of the front's range." in lines
     assert "The point is not verified." in found[[1]].table() and "None of 2 points is verified." in found[[1, 1]].table()
+
+
+# Simulations that are made once
+
+
+@pytest.fixture
+def simulated(monkeypatch) -> list:
+    """The trajectories that are simulated, in their order."""
+    seen, simulate_all = [], module.simulate_all
+
+    def counted(problem, trajectories, **about):
+        seen.extend(trajectories)
+        return simulate_all(problem, trajectories, **about)
+
+    monkeypatch.setattr(module, "simulate_all", counted)
+    return seen
+
+
+def test_a_trajectory_is_simulated_once(simulated):
+    front = points(cart(), *constant(0.5, 1.0, 1.5))
+    simulations = Simulations(front.compiled(), VERIFY)
+    first = verified(front[[0, 2]], VERIFY, simulations=simulations)
+    assert len(simulated) == 2
+    every = verified(front, VERIFY, simulations=simulations)
+    assert len(simulated) == 3 and simulated[2] is front.trajectories[1]
+    again = verified(every[::-1], VERIFY, simulations=simulations)
+    assert len(simulated) == 3 and first.verified.all() and again.verified.all()
+    np.testing.assert_array_equal(again.simulated_F[::-1], every.simulated_F)
+    alone = front.verify()
+    assert len(simulated) == 6 and alone.simulated_F == pytest.approx(every.simulated_F, rel=1e-9)
+
+
+def test_objectives_are_judged_anew_by_other_ranges_without_a_simulation(simulated):
+    """One that is off by a tenth of the whole range is right in units of it that are a thousand times as large."""
+    front = points(cart(), *constant(0.5, 1.0, 1.5))
+    wrong = front.replace(F=front.F + np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]))
+    simulations = Simulations(front.compiled(), VERIFY)
+    assert verified(wrong, VERIFY, simulations=simulations).verified.tolist() == [True, False, True]
+    assert verified(wrong, VERIFY, np.full(2, 1e3), simulations=simulations).verified.all() and len(simulated) == 3
+
+
+def test_a_simulation_that_was_made_elsewhere_serves(simulated):
+    front = points(cart(), *constant(1.0))
+    simulations = Simulations(front.compiled(), VERIFY)
+    other = slowed(front, 0.1)
+    simulations.keep(front.trajectories[0], simulations([other.trajectories[0]])[0])
+    found = verified(front, VERIFY, simulations=simulations)
+    assert len(simulated) == 1 and found.simulated_F[0] == pytest.approx([-1.8, 1.62])
+
+
+def test_the_largest_miss_is_what_is_compared_with_the_tolerance():
+    front = points(cart(lower=150.0), *constant(0.5, 1.0, 1.5))
+    marked, simulations = front.verify(), Simulations(front.compiled(), VERIFY)(front.trajectories)
+    scales = objective_scales(front)
+    misses = np.array([largest_miss(front.compiled(), one, F, scales) for one, F in zip(simulations, front.F, strict=True)])
+    assert misses == pytest.approx(np.maximum(marked.defect, marked.simulated_violation), abs=1e-8) and misses.max() > 0.1
+    off = largest_miss(front.compiled(), simulations[1], front.F[1] + [0.0, 0.3 * scales[1]], scales)
+    assert off == pytest.approx(max(0.3, misses[1]), abs=1e-8)

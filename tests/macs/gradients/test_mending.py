@@ -7,9 +7,14 @@ import pytest
 from test_front_polish_back_off import bryson_denham
 
 from macs import MACS, NSGA2, Front, payoff, sweep
+from macs.fronts import verified
+from macs.fronts.verified import unmarked
+from macs.gradients import mending
 from macs.gradients.front_polish import KEPT_INSIDE
+from macs.gradients.mesh_refinement import FrontRefinement
 from problems import Problem, load
 from transcription import DFET, SingleShooting
+from transcription.meshes.verdict import Wanted
 
 MESH = DFET(4, 6)
 LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
@@ -51,8 +56,21 @@ def test_points_that_are_verified_stay_as_they_are(marked, mended):
     assert again.stats["gradient_solves"] == mended.stats["gradient_solves"]
 
 
+@pytest.mark.parametrize("enough", [True, False])
+def test_no_further_mesh_is_tried_once_a_point_is_good_enough(marked, enough):
+    wanted = Wanted(1e-9, feasible=1e-9)
+    job = FrontRefinement(marked, wanted, 2, [0], enough=lambda point: enough)
+    job.go()
+    assert len(job.found[0].meshes) == (1 if enough else 2)
+    assert (job.found[0].best.method == job.found[0].meshes[0]) >= enough
+
+
+def test_what_is_verified_has_no_complaint_about_its_mesh(mended):
+    assert [point.note for point in mended] == ["", "", ""]
+
+
 def test_the_work_is_counted(marked, mended):
-    assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"]
+    assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"] and mended.stats["work"] > marked.stats["work"] > 0
     assert mended.stats["wall_time"] > marked.stats["wall_time"] and mended.stats["verify"] == marked.stats["verify"]
     assert mended.solver == marked.solver and mended.message == marked.message
 
@@ -117,7 +135,37 @@ def test_points_of_shooting_are_moved_inside_their_limits():
         assert point.transcription["method"] == "SingleShooting"
 
 
+def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
+    """The same on elements, whose states are exact: only between nodes is the height too large."""
+    rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5)
+    again = rough.mended()
+    assert rough.verified.sum() == 1 and rough.simulated_violation.max() < 1e-3 and again.verified.all() and len(again) == 4
+    for point in again:
+        effort, height = point.simulated.values()
+        assert 1 - 1e-4 < effort / (4 / (9 * height)) < 1.01
+    moved = [point for point in again if KEPT_INSIDE in point.note]
+    assert len(moved) == 3 and {point.transcription["settings"]["mesh"] for point in again} == {None}
+
+
 def test_points_that_were_not_simulated_are_simulated_first():
     front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
     assert not front.was_simulated.any() and front.mended().verified.all()
     assert len(front[[]].mended()) == 0
+
+
+@pytest.mark.parametrize("fine", [None, DFET(4, 7)])
+def test_an_empty_front_stays_empty_and_keeps_its_reason(fine):
+    front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
+    nothing = mending.mended(front[[]].replace(message="no feasible point"), 1e-3, fine=fine)
+    assert len(nothing) == 0 and nothing.message == "no feasible point" and nothing.stats["verify"] == 1e-3
+
+
+def test_a_fine_mesh_is_for_all_points_and_each_is_simulated_once(monkeypatch):
+    """All verified already on the mesh of the search, and solved on the fine one all the same; nothing else is simulated."""
+    front = sweep(load("goddard"), DFET(8, 6), points=3)
+    seen, simulate_all = [], verified.simulate_all
+    monkeypatch.setattr(verified, "simulate_all", lambda problem, some, **about: seen.extend(some) or simulate_all(problem, some, **about))
+    found = mending.mended(unmarked(front), 1e-3, fine=DFET(9, 7))
+    assert found.verified.all() and {one["settings"]["order"] for one in found.transcriptions} == {7}
+    assert len(seen) == len({id(one) for one in seen}) == 3
+    assert (np.abs(found.F - front.F) / np.ptp(front.F, axis=0)).max() < 0.01

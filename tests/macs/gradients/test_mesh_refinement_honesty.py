@@ -132,7 +132,6 @@ def keeps_what_came_in(seed: int) -> None:
 
 
 QUICK = (0, 1, 2, 8, 11)
-KNOWN = {4: pytest.mark.xfail(reason="two of four points end with a note: no finer mesh helps an end and its neighbour", strict=True)}
 
 
 @pytest.mark.parametrize("seed", QUICK)
@@ -141,7 +140,7 @@ def test_random_fronts_keep_what_came_in(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [pytest.param(seed, marks=KNOWN.get(seed, ())) for seed in range(40) if seed not in QUICK])
+@pytest.mark.parametrize("seed", [seed for seed in range(40) if seed not in QUICK])
 def test_many_random_fronts_keep_what_came_in(seed):
     keeps_what_came_in(seed)
 
@@ -226,6 +225,13 @@ def test_a_mesh_is_found(name):
     assert value.met(simulated) and loop.solves.counts.gradient_solves <= 12
 
 
+def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
+    """Twelve switches, of pulses down to 0.06 of 11.9 seconds. Without some of them, simulations and finer meshes of the same kind agree on
+    11.54; an independent mesh, of 200 equal elements with constant controls, has 11.4689."""
+    point = optimize(random_problem(4), objective="miss")
+    assert point.verified and point.note == "" and point.simulated["miss"] < 11.4689
+
+
 def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
     hopeless = DFET(1, 1, control_order=0)
     problem = load("standard/bryson_denham")
@@ -238,9 +244,11 @@ def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
 def test_work_ends_where_it_is_to_end():
     problem, wanted = layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6)
     whole, free = searched(problem, wanted)
-    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.work)
+    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.counts.work)
     assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
-    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.work < 0.8 * free.solves.work
+    assert (
+        loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
+    )
 
 
 def test_programs_of_earlier_meshes_are_not_kept():

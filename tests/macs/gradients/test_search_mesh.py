@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from macs import MACS
 from macs.gradients.search_mesh import COARSE, MOST, _together, default_transcription, found_mesh
 from problems import Problem, load
+from problems.cases.standard.collection import published
 from transcription import parse
 from transcription.phases.mesh import PhaseMesh
 
@@ -46,13 +47,15 @@ def test_a_problem_has_its_own_default_or_a_coarse_mesh():
 
 
 def test_a_smooth_problem_keeps_the_coarse_mesh():
-    method, counts = found_mesh(smooth().compile(), 1e-3, 1e-6)
-    assert method == COARSE and 2 <= counts.gradient_solves < 20
+    found = found_mesh(smooth().compile(), 1e-3, 1e-6)
+    assert found.search == COARSE and found.fine is None and 2 <= found.counts.gradient_solves < 20
+    assert found.ends is not None and len(found.ends) == 2
 
 
 def test_boundary_layers_get_short_elements():
-    method, _ = found_mesh(layered(0.01).compile(), 1e-3, 1e-6)
-    edges = np.array(method.mesh_of("run").edges)
+    found = found_mesh(layered(0.01).compile(), 1e-3, 1e-6)
+    assert found.search == COARSE and found.fine is not None
+    edges = np.array(found.fine.mesh_of("run").edges)
     assert len(edges) - 1 <= MOST
     lengths = np.diff(edges)
     assert lengths[0] < 0.03 and lengths[-1] < 0.03 and lengths.max() > 0.05
@@ -64,10 +67,24 @@ def test_a_search_without_a_transcription_finds_one():
     assert front.stats["gradient_solves"] > 200 // 20, "what the mesh cost is counted"
 
 
+def test_a_search_begins_with_the_optima_of_single_objectives():
+    """Of this arm's quickest way there are many local optima, in which searches of thousands of candidates end: 3.2 seconds and more."""
+    front = MACS(agents=4).solve(load("standard/two_link_arm"), evaluations=30, seed=1)
+    assert front.verified.all() and front.F.min() == pytest.approx(published("two_link_arm")[0].value, rel=5e-4)
+
+
+def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
+    """A few evaluations lead to few points. Least effort in a time T is 12 / T^3, least time 1."""
+    problem = smooth()
+    found = MACS(agents=4).solve(problem, evaluations=6, seed=1)
+    assert found.verified.all() and found.objectives[0] == pytest.approx([1.0, 12.0], rel=1e-4)
+    assert found.objectives[-1] == pytest.approx([2.0, 12 / 2**3], rel=1e-4)
+
+
 def test_what_peaks_forbid_is_searched_on_the_coarse_mesh():
     problem = smooth()
     problem.maximize("top speed", problem.phases["move"].peak(ca.fabs(problem.phases["move"]["v"])))
-    assert found_mesh(problem.compile(), 1e-3, 1e-6)[0] == COARSE
+    assert found_mesh(problem.compile(), 1e-3, 1e-6).fine is None
 
 
 meshes = st.lists(

@@ -1,0 +1,180 @@
+"""By how much controls miss Pontryagin's minimum principle, and where: what the control itself could still gain, whatever its mesh.
+
+At an optimum the Hamiltonian H = costates' rates + weighted integrands is at its least for the controls at every time. Where other values
+of the controls make it less by d, having them for a time dt instead makes the weighted objectives less by d dt (Pontryagin et al., "The
+Mathematical Theory of Optimal Processes", 1962, chapter II). A mesh whose elements are too long to let a control leave its bound for a
+moment is a local optimum of its own, and its own multipliers tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
+from problems.derived import remembered
+
+from ..base import NLP
+from ..numerics.polynomials import gauss_legendre
+from ..trajectories.limits import paths_and_peaks
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+
+TAU, WEIGHTS = gauss_legendre(24)
+"""Where the Hamiltonian is looked at on each element."""
+GRID = 11
+"""Number of values of each control, from bound to bound, that are compared with its own."""
+STEPS = (-0.05, -0.01, 0.01, 0.05)
+"""Further ones beside its own, in spans."""
+JUMP = 0.5
+"""A control jumps where it changes by more than this from one place to the next, in spans."""
+CORNERS = 4
+"""Most controls of which all combinations of bounds are tried, too."""
+NEAR = 1e-3
+"""Where a state, a path constraint or a peak is this near to its limit, in scales, multipliers of that are part of the principle, and
+nothing is said."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Costates of an optimum on its mesh by phase, and the multipliers of objectives (m,) and of the problem's constraints."""
+
+    costates: Mapping[str, PiecewisePolynomial]
+    of_objectives: np.ndarray
+    of_constraints: np.ndarray
+
+    @classmethod
+    def of(cls, nlp: NLP, z: np.ndarray, multipliers: np.ndarray) -> Optimum:
+        """From the multipliers (m + r,) of the objectives and rows of an NLP at its optimum z (n,)."""
+        m, constraints = len(nlp.problem.goals), len(nlp.problem.limits)
+        return cls(nlp.costates(z, multipliers[m:]), multipliers[:m], multipliers[len(multipliers) - constraints :])
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """What controls of a phase could gain.
+
+    Attributes
+    ----------
+    amounts : array (N,)
+        The integral, over each element, of how much less the Hamiltonian could be: what the weighted objectives could gain there, to first
+        order, in units.
+    places : list of arrays
+        Where the controls for which it is least jump, on (-1, 1) of each element.
+    """
+
+    amounts: np.ndarray
+    places: list[np.ndarray]
+
+
+def gains(
+    problem: CompiledProblem, trajectory: Trajectory, optimum: Optimum, quantities: Sequence[np.ndarray], units: np.ndarray
+) -> dict[str, Gain]:
+    """What the controls of each phase with costates could gain.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    trajectory : Trajectory
+        An optimum on its mesh.
+    optimum : Optimum
+    quantities : sequence of arrays
+        What objectives and constraints see of each phase.
+    units : array (m,)
+        What counts as one in each objective.
+    """
+    # The sum of the objectives in which a gain is one unit of each.
+    total = float(optimum.of_objectives @ units)
+    if not total > 0:
+        return {}
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    slopes = _slopes(problem).call([*quantities, parameters, optimum.of_objectives / total, optimum.of_constraints / total])
+    found = {}
+    for phase, slope in zip(problem.phases, slopes, strict=True):
+        costates, flown = optimum.costates.get(phase.name), trajectory[phase.name]
+        if costates is not None and phase.controls and flown.tf > flown.t0:
+            first = 2 + phase.initials.size1_out(0) + phase.finals.size1_out(0)
+            weights = np.array(slope).ravel()[first : first + phase.integrands.size1_out(0)]
+            scaled = replace(costates, coefficients=costates.coefficients / total)
+            found[phase.name] = _gain(phase, flown, scaled, weights, parameters)
+    return found
+
+
+@remembered
+def _slopes(problem: CompiledProblem) -> ca.Function:
+    """(q of each phase, parameters, multipliers of objectives and of constraints) -> gradient of their sum by each q."""
+    inputs = problem.objectives.mx_in()
+    of_objectives, of_constraints = ca.MX.sym("f", len(problem.goals)), ca.MX.sym("c", len(problem.limits))
+    total = ca.dot(problem.objectives(*inputs), of_objectives) + ca.dot(problem.constraints(*inputs), of_constraints)
+    outputs = [ca.densify(ca.gradient(total, q)) for q in inputs[:-1]]
+    return ca.Function("slopes", [*inputs, of_objectives, of_constraints], outputs)
+
+
+def _gain(
+    phase: CompiledPhase, trajectory: PhaseTrajectory, costates: PiecewisePolynomial, weights: np.ndarray, parameters: np.ndarray
+) -> Gain:
+    """What the controls of one phase could gain, from its costates and the weights of its integrands."""
+    times, shape = trajectory.state.times(TAU), (len(trajectory.state.edges) - 1, len(TAU))
+    x, u, adjoint = (
+        values.reshape(times.size, -1)
+        for values in (trajectory.state.on_elements(TAU), trajectory.controls_on_elements(TAU), costates.on_elements(TAU))
+    )
+    s = np.array([trajectory.t0, trajectory.tf, *parameters])
+    t = times.ravel()
+
+    def hamiltonian(controls: np.ndarray) -> np.ndarray:
+        inputs = x.T, controls.T, t[None], s
+        rates, integrands = (np.array(function(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
+        return np.einsum("ki,ik->k", adjoint, rates) + weights @ integrands
+
+    own, (paths, peaks) = hamiltonian(u), paths_and_peaks(phase, x, u, t, s)
+    highest = peaks.max(axis=0)
+    clear = _clear(phase, x, paths, peaks, highest)
+    best, least = np.zeros(len(t)), u.copy()
+    for controls in _others(phase, u):
+        values, (limited, raised) = hamiltonian(controls), paths_and_peaks(phase, x, controls, t, s)
+        allowed = _within(phase, limited) & (raised <= highest).all(axis=1)
+        better = allowed & (own - values > best)
+        best[better], least[better] = (own - values)[better], controls[better]
+    rates = np.where(clear & np.isfinite(own), best, 0.0).reshape(shape)
+    amounts = 0.5 * np.diff(trajectory.state.edges) * (rates @ WEIGHTS)
+    jumps = np.abs(np.diff(least.reshape(*shape, -1), axis=1)) > JUMP * np.array([v.span for v in phase.controls])
+    middles = 0.5 * (TAU[1:] + TAU[:-1])
+    return Gain(amounts, [middles[one] for one in np.any(jumps, axis=2)])
+
+
+def _others(phase: CompiledPhase, u: np.ndarray) -> list[np.ndarray]:
+    """Other controls (k, nu) to be compared with those of the trajectory: one changed at a time, and all of them on bounds."""
+    lower, upper = (np.array([getattr(v, side) for v in phase.controls]) for side in ("lower", "upper"))
+    found = []
+    for i in range(len(lower)):
+        span = upper[i] - lower[i]
+        values = [np.full(len(u), value) for value in np.linspace(lower[i], upper[i], GRID)]
+        values += [np.clip(u[:, i] + step * span, lower[i], upper[i]) for step in STEPS]
+        for one in values:
+            other = u.copy()
+            other[:, i] = one
+            found.append(other)
+    if 1 < len(lower) <= CORNERS:
+        found += [np.tile(corner, (len(u), 1)) for corner in product(*zip(lower, upper, strict=True))]
+    return found
+
+
+def _within(phase: CompiledPhase, paths: np.ndarray) -> np.ndarray:
+    """Mask (k,) of the places at which all path constraints are satisfied."""
+    lower, upper = (np.array([getattr(limit, side) for limit in phase.paths]) for side in ("lower", "upper"))
+    return np.all((paths >= lower) & (paths <= upper), axis=1)
+
+
+def _clear(phase: CompiledPhase, x: np.ndarray, paths: np.ndarray, peaks: np.ndarray, highest: np.ndarray) -> np.ndarray:
+    """Mask (k,) of the places at which no state, path constraint or peak is at its limit."""
+    clear = np.ones(len(x), dtype=bool)
+    limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.paths)
+    for limit, column in zip(limits, np.hstack([x, paths]).T, strict=True):
+        near = NEAR * limit.scale
+        clear &= (column - limit.lower > near) & (limit.upper - column > near)
+    sizes = np.where(highest != 0, np.abs(highest), 1.0)
+    return clear & (highest - peaks > NEAR * sizes).all(axis=1)

@@ -1,0 +1,74 @@
+"""Sparse derivatives of NLPs: put together from those at points where an NLP has such parts, else of one long list of operations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from problems.derived import remembered
+
+from ..base import NLP
+from .from_points import FromPoints, kind_of
+from .pieces import jacobian, weighted_hessian
+
+DENSE = 0.25
+"""Share of the variables that a row is dense with."""
+
+
+@remembered
+def gradients(nlp: NLP) -> ca.Function:
+    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
+    whole = _from_points(nlp)
+    if whole is not None:
+        z, values = whole.z, whole.gradients()
+    else:
+        z = _symbol(nlp, "z", len(nlp.variables))
+        F, g = nlp.functions(z)
+        values = [ca.jacobian(F, z), _jacobian(g, z), F, g]
+    return ca.Function("gradients", [z], values, ["z"], ["dF", "dg", "F", "g"])
+
+
+@remembered
+def objective_gradients(nlp: NLP) -> ca.Function:
+    """z -> dF/dz (m, n), sparse."""
+    whole = _from_points(nlp)
+    if whole is not None:
+        return ca.Function("slopes", [whole.z], whole.gradients()[:1], ["z"], ["dF"])
+    z = _symbol(nlp, "z", len(nlp.variables))
+    return ca.Function("slopes", [z], [ca.jacobian(nlp.functions(z)[0], z)], ["z"], ["dF"])
+
+
+@remembered
+def hessian(nlp: NLP) -> ca.Function:
+    """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse."""
+    whole, sizes = _from_points(nlp), {"of_F": len(nlp.problem.goals), "of_g": len(nlp.g_scale)}
+    if whole is not None:
+        z, (of_F, of_g) = whole.z, (ca.MX.sym(name, size) for name, size in sizes.items())
+        H = whole.hessian(of_F, of_g)
+    else:
+        z, of_F, of_g = (_symbol(nlp, name, size) for name, size in {"z": len(nlp.variables), **sizes}.items())
+        F, g = nlp.functions(z)
+        H = weighted_hessian(g, of_g, z, ca.dot(of_F, F))
+    return ca.Function("hessian", [z, of_F, of_g], [H], ["z", *sizes], ["H"])
+
+
+@remembered
+def _from_points(nlp: NLP) -> FromPoints | None:
+    return None if nlp.parts is None else FromPoints(nlp, nlp.parts)
+
+
+def _symbol(nlp: NLP, name: str, size: int) -> Any:
+    return kind_of(nlp.functions).sym(name, size)
+
+
+def _jacobian(rows: Any, z: Any) -> Any:
+    """Derivatives of the rows; dense ones, those of integrals, apart: one sweep for many columns is lost where there is one such row."""
+    counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
+    dense = np.flatnonzero(counts > DENSE * max(z.numel(), 1))
+    if not len(dense) or len(dense) == len(counts):
+        return jacobian(rows, z)
+    sparse = np.setdiff1d(np.arange(len(counts)), dense)
+    blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
+    return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
