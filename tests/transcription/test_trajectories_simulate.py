@@ -184,6 +184,22 @@ def test_a_phase_of_no_duration_is_simulated():
     assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
 
 
+def test_a_phase_that_ends_before_it_begins_by_a_tolerance_has_its_values():
+    problem, phase = integrator()
+    problem.minimize("end", phase.final(phase["x"]))
+    nlp = DFET(2, 2).transcribe(problem)
+    whole = nlp.unpack(propagated(nlp)[0])[phase.name]
+    edges = np.array([2.0, 2.0 - 3e-8, 2.0 - 6e-8])
+    short = replace(
+        whole,
+        state=PiecewisePolynomial(edges, np.full_like(whole.state.coefficients, 0.5), whole.state.basis),
+        control=PiecewisePolynomial(edges, whole.control.coefficients, whole.control.basis),
+    )
+    assert short.tf < short.t0 and all(short.at(time)["x"] == pytest.approx(0.5) for time in (short.t0, short.tf))
+    with pytest.raises(ValueError, match="asked for"):
+        short.at(2.1)
+
+
 # Trouble
 
 

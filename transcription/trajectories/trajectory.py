@@ -141,7 +141,9 @@ class PhaseTrajectory:
         """
         times = np.asarray(time, dtype=float)
         slack = 1e-12 * max(1.0, abs(self.t0), abs(self.tf))
-        if not np.all((times >= self.t0 - slack) & (times <= self.tf + slack)):
+        # A phase of no duration may end before it begins, by the tolerance of a feasible point.
+        first, last = min(self.t0, self.tf), max(self.t0, self.tf)
+        if not np.all((times >= first - slack) & (times <= last + slack)):
             raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
         values = np.concatenate([self.state(times), wrapped(self.control(times), self.control_variables)], axis=-1)
         return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
