@@ -32,8 +32,9 @@ MESHES = 6
 """Most meshes of one point."""
 SHARE = 0.4
 """What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
-LEAST = 100.0
-"""Iterations for each point that is missed, which are allowed even where all that was spent already: enough for one more mesh."""
+LEAST, LITTLE = 100.0, 2e5
+"""What is allowed even where all that was spent already: iterations for each point that is missed, enough for one more mesh; and what takes
+about a second, since a mesh that is coarse for its search is refined to many times its variables."""
 
 
 def mended(
@@ -169,7 +170,7 @@ class _Mending:
             return None
         spent = points.stats.get("work", 0) - self._work + BUILDING * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places]))
-        return max(SHARE * self._work - spent, LEAST * count * size)
+        return max(SHARE * self._work - spent, LEAST * count * size, LITTLE)
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float) -> Points:
