@@ -32,9 +32,10 @@ MESHES = 6
 """Most meshes of one point."""
 SHARE = 0.4
 """What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
-LEAST = 100.0
-"""Iterations for each point that is missed, which are allowed even where all that was spent already: enough for one more mesh."""
-LITTLE, LOSS = 0.1, 5e-3
+LEAST, LITTLE = 100.0, 2e5
+"""What is allowed even where all that was spent already: iterations for each point that is missed, enough for one more mesh; and what takes
+about a second, since a mesh that is coarse for its search is refined to many times its variables."""
+SLIGHTLY, LOSS = 0.1, 5e-3
 """Excess over limits, in their scales, up to which a point is rather moved inside of them than solved on a finer mesh; what that may cost
 in each objective, in ranges of the front."""
 
@@ -191,13 +192,13 @@ class _Mending:
             return None
         spent = points.stats.get("work", 0) - self._work + BUILDING * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places]))
-        return max(SHARE * self._work - spent, LEAST * count * size)
+        return max(SHARE * self._work - spent, LEAST * count * size, LITTLE)
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:
     """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
     they have, whose program is there already, a solve costs far less than on any other."""
-    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= LITTLE) & (points.status == CONVERGED)
+    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= SLIGHTLY) & (points.status == CONVERGED)
     off = np.abs(points.simulated_F - points.F) / objective_scales(points)
     return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
 
