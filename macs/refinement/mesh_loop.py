@@ -26,8 +26,8 @@ from ..gradients.tasks import Task
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
-BUILDING = 100
-"""Iterations of IPOPT that take as long as it takes to make a program with its derivatives: measured 90 to 180."""
+BUILDING = 30
+"""Iterations of IPOPT that take as long as it takes to make a program with its derivatives: measured 18 to 53."""
 LITTLE = 1e-4
 """Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
 PATIENCE = 3
