@@ -20,7 +20,7 @@ def guessed_elements(problem: CompiledProblem) -> int:
     """The least number of equal elements on which cubic polynomials describe each guessed profile of a problem; the largest of `COUNTS` if
     none of these is enough, the least if no profile is guessed."""
     profiles = [profile for phase in problem.phases for profile in phase.guesses.values() if _sampled(profile)]
-    return next((count for count in COUNTS if all(_missed(*profile, count) <= LOST for profile in profiles)), COUNTS[-1])
+    return next((count for count in COUNTS if all(_missed(times, values, count) <= LOST for times, values in profiles)), COUNTS[-1])
 
 
 def _sampled(guess: Any) -> bool:

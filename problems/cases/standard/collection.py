@@ -7,18 +7,21 @@ from importlib import import_module
 from .published import Published
 
 ROOMS: dict[str, dict[str, str]] = {
+    "curves": {
+        "brachistochrone": "the quickest way down",
+        "dubins": "the shortest way of a car to a place behind it, with local optima",
+        "hanging_chain": "the shape of the least potential energy",
+        "isoperimetric": "the largest area within a curve",
+        "newton_nose": "least drag of a body of revolution",
+    },
     "smooth": {
         "batch_reactor": "the temperatures that make the most of a product",
-        "brachistochrone": "the quickest way down",
         "bryson_max_range": "as far as possible in a given time",
         "climb": "the quickest climb of a supersonic aircraft, with tables",
         "hang_glider": "as far as possible through a thermal",
-        "hanging_chain": "the shape of the least potential energy",
         "hypersensitive": "a boundary layer at each end of a long rest",
-        "isoperimetric": "the largest area within a curve",
         "linear_tangent": "the quickest way to a height and a speed",
         "low_thrust": "many turns around the earth, to a high orbit",
-        "newton_nose": "least drag of a body of revolution",
         "orbit_raising": "from the earth's orbit to that of Mars by a small thrust",
         "stirred_tank": "a hot reaction that is cooled to rest, with a local optimum",
         "tuberculosis": "treatment of two strains at the least cost",
@@ -40,7 +43,6 @@ ROOMS: dict[str, dict[str, str]] = {
         "aly_chan": "a control that is singular all along",
         "car": "the quickest way from rest to rest, bang-bang",
         "catalyst_mixing": "the best blend along a reactor, singular",
-        "dubins": "the shortest way of a car to a place behind it, with local optima",
         "f8": "the quickest return of an aircraft to trim, bang-bang, with local optima",
         "fast_oscillator": "the quickest way of an oscillator, bang-bang",
         "free_flying_robot": "least fuel of jets, to a place and an attitude",
