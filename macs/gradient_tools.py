@@ -42,9 +42,9 @@ from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.search_mesh import default_transcription, search_transcription
 from .solvers.start import beginning, check_run
 
-PART, MESHES, MOST_WORK = 0.1, 8, 3e6
+PART, MESHES, MOST_WORK = 0.1, 8, 1.5e6
 """What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it; work, in iterations times variables,
-after which no other mesh is begun: about a minute."""
+after which no other mesh is begun: some half a minute, more where programs are large."""
 AUTO = "auto"
 """As many starts as pay."""
 ROUNDS = 3

@@ -8,7 +8,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 
-COUNTS, ORDER = (8, 16, 32, 64), 3
+COUNTS, ORDER = (8, 16, 32), 3
 """Numbers of elements that are considered, and the degree of what is described on each."""
 LOST = 0.1
 """Part of its range by which a guess may be missed."""

@@ -27,7 +27,7 @@ def test_the_table_of_contents_has_every_module_once():
         assert list(texts) == sorted(texts)
     assert {path.name for path in folder.iterdir() if path.is_dir()} - {"__pycache__"} == set(ROOMS)
     assert len(cases()) == sum(map(len, ROOMS.values())) >= 24, "no name in two rooms"
-    with pytest.raises(ValueError, match="no problem 'breakwall' in the collection; there are batch_reactor, "):
+    with pytest.raises(ValueError, match="no problem 'breakwall' in the collection; there are brachistochrone, "):
         published("breakwall")
 
 

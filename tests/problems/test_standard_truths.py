@@ -10,8 +10,9 @@ from scipy.optimize import brentq, fsolve
 from macs import optimize
 from problems import Problem, load
 from problems.cases.standard import published
+from problems.cases.standard.curves import dubins
 from problems.cases.standard.singular import rocket
-from problems.cases.standard.switching import dubins, fast_oscillator
+from problems.cases.standard.switching import fast_oscillator
 from transcription import parse
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}

@@ -29,8 +29,9 @@ SLACK = 1e-2
 runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge."""
 AT_END, RESTARTS = 1e-2, 3
 """Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
-USEFUL = 1e-6
-"""Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended."""
+USEFUL = 1e-4
+"""Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended: in the
+objective's own size, how much of it could be gained over a whole span of the variables."""
 LITTLE = 1e-4
 """Part of what an objective could change by that counts as one unit of it at least, where it is near zero."""
 AT_LIMIT = "maximum iterations exceeded"

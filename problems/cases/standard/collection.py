@@ -7,14 +7,17 @@ from importlib import import_module
 from .published import Published
 
 ROOMS: dict[str, dict[str, str]] = {
-    "smooth": {
-        "batch_reactor": "the temperatures that make the most of a product",
+    "curves": {
         "brachistochrone": "the quickest way down",
-        "bryson_max_range": "as far as possible in a given time",
+        "dubins": "the shortest way of a car to a place behind it, with local optima",
         "hanging_chain": "the shape of the least potential energy",
-        "hypersensitive": "a boundary layer at each end of a long rest",
         "isoperimetric": "the largest area within a curve",
         "newton_nose": "least drag of a body of revolution",
+    },
+    "smooth": {
+        "batch_reactor": "the temperatures that make the most of a product",
+        "bryson_max_range": "as far as possible in a given time",
+        "hypersensitive": "a boundary layer at each end of a long rest",
         "stirred_tank": "a hot reaction that is cooled to rest, with a local optimum",
         "tuberculosis": "treatment of two strains at the least cost",
         "van_der_pol": "an oscillator that is brought to rest",
@@ -40,7 +43,6 @@ ROOMS: dict[str, dict[str, str]] = {
     },
     "switching": {
         "car": "the quickest way from rest to rest, bang-bang",
-        "dubins": "the shortest way of a car to a place behind it, with local optima",
         "f8": "the quickest return of an aircraft to trim, bang-bang, with local optima",
         "fast_oscillator": "the quickest way of an oscillator, bang-bang",
         "free_flying_robot": "least fuel of jets, to a place and an attitude",

@@ -1,0 +1,1 @@
+"""Classical problems of the best curve."""
