@@ -146,7 +146,7 @@ def test_they_are_not_built_to_the_end(method, built, monkeypatch):
 
 
 def test_a_time_limit_ends_them_on_a_fine_mesh():
-    nlp = DFET(100, 5).transcribe(load("orbit_rise"))
+    nlp = DFET(600, 6).transcribe(load("orbit_rise"))
     start = nlp.first_guess(nlp.lower[nlp.free][None])[0]
     with Interrupts(LIMIT), within(BOUND):
         solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
