@@ -30,6 +30,8 @@ PART = 0.8
 """What points are to miss at most, as a fraction of what they may."""
 MESHES = 6
 """Most meshes of one point."""
+PATIENCE = 150
+"""Most iterations of one solve: from a trajectory nearby most take some tens."""
 SHARE = 0.4
 """What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
 LEAST, LITTLE = 100.0, 2e5
@@ -176,7 +178,7 @@ class _Mending:
             return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
 
         most = self._most_work(points, len(rows))
-        job = FrontRefinement(points, wanted, MESHES, rows, most, programs=self.programs, enough=enough)
+        job = FrontRefinement(points, wanted, MESHES, rows, most, programs=self.programs, enough=enough, max_iterations=PATIENCE)
         job.go(self.show)
         if wanted.accuracy <= accuracy(self.verify)[0]:
             for found in job.found.values():

@@ -20,7 +20,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import vectors_points
 from ..fronts.points import Point, Points
 from ..fronts.provenance import more_costs
-from ..gradients.multistart import GradientSolves
+from ..gradients.multistart import MOST_ITERATIONS, GradientSolves
 from ..gradients.targets import moved_along
 from ..gradients.tasks import Along, End, Task
 from ..io.console import working
@@ -88,6 +88,8 @@ class FrontRefinement:
         The NLPs on meshes that others have solved on, too.
     enough : callable
         See `MeshLoop`.
+    max_iterations : int
+        Most iterations of one gradient solve.
     """
 
     def __init__(
@@ -100,11 +102,12 @@ class FrontRefinement:
         knots: bool = True,
         programs: Programs | None = None,
         enough: Callable[[OnMesh], bool] = lambda point: False,
+        max_iterations: int = MOST_ITERATIONS,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
-        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])))
+        self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
         self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self._most_work = most_work
