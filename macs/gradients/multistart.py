@@ -50,7 +50,7 @@ class GradientSolves:
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts = Counts()
+        self.counts, self._persistent = Counts(), True
         self.before: Callable[[], None] = lambda: None
 
     def __call__(
@@ -58,19 +58,20 @@ class GradientSolves:
     ) -> Solved:
         """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
         self.before()
-        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations}
+        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
         solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, **limits)
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
 
     @contextmanager
     def at_most(self, iterations: int) -> Iterator[None]:
-        """Solves within take no more iterations than these."""
-        usual, self.max_iterations = self.max_iterations, min(self.max_iterations, iterations)
+        """Solves within take no more iterations than these, of which the first strategy may take all."""
+        usual = self.max_iterations
+        self.max_iterations, self._persistent = min(usual, iterations), False
         try:
             yield
         finally:
-            self.max_iterations = usual
+            self.max_iterations, self._persistent = usual, True
 
 
 class MultistartSolver:

@@ -28,10 +28,10 @@ COARSE: tuple[Meshed, ...] = (
 """Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
 SECOND: Meshed = DFET(16, 3)
 """A mesh for other starts, beside that from which the optimum came: what one basis hides another may show."""
-OTHERS, SHORT, SHARE, AGAIN = 4, 200, 0.5, 0.5
+OTHERS, SHORT, SHARE, AGAIN = 6, 200, 0.5, 0.5
 """Other starts on each of the two; most iterations of each; what they may take together, and what refining what they find may take, as
 shares of the work before."""
-LITTLE, MUCH = 2e5, 1e6
+LITTLE, MUCH = 6e5, 2e6
 """Work, see `MeshLoop`, that is a matter of a second or two, so that other starts may always take it; and that after which no other mesh is
 tried, if there is a result."""
 PASSABLE = 5.0
