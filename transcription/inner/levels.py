@@ -12,6 +12,11 @@ from .ipopt import Ipopt
 from .newton import Newton
 
 
+PATIENCE = 150
+"""Most iterations of a projection, and of each further try, for what Newton's method leaves: most that succeed take some tens, and those that
+fail take all."""
+
+
 @dataclass(frozen=True)
 class Auto(InnerSolver):
     """Newton's method over propagated states, which needs one propagation where these are feasible already; a projection by IPOPT for what
@@ -24,7 +29,7 @@ class Auto(InnerSolver):
         if not len(rest) or found.clocked:
             return found
         start = started(nlp, candidates, warm)
-        repaired = Ipopt().solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
+        repaired = Ipopt(max_iterations=PATIENCE).solve(nlp, candidates[rest], start[rest], tolerance=tolerance)
         for name in ("z", "F", "violation", "status", "moved", "residuals"):
             getattr(found, name)[rest] = getattr(repaired, name)
         found.iterations[rest] += repaired.iterations
