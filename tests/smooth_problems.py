@@ -113,3 +113,17 @@ def vector(nlp: NLP, **values: float) -> np.ndarray:
         name = v.name.rpartition(".")[2].partition("[")[0]
         z[i] = values.get(name, z[i])
     return nlp.propagate(z[None])[0]
+
+
+def bryson_denham() -> Problem:
+    """Effort against the height of a ceiling: Bryson and Denham, on a path from side to side."""
+    problem = Problem("Bryson and Denham")
+    phase = problem.phase("flight", t0=0.0, tf=1.0)
+    x, v = phase.state("x", bounds=(-0.5, 0.5), initial=0.0, final=0.0), phase.state("v", bounds=(-2.0, 2.0), initial=1.0, final=-1.0)
+    u = phase.control("u", bounds=(-30.0, 30.0))
+    limit = problem.parameter("limit", bounds=(0.04, 1 / 6))
+    phase.dynamics(x=v, v=u)
+    phase.path("height", x - limit, upper=0.0)
+    problem.minimize("effort", phase.integral(u**2 / 2))
+    problem.minimize("highest", limit)
+    return problem

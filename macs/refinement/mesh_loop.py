@@ -40,6 +40,8 @@ DETOURS = 4
 """Number of other meshes that are tried for a point where solves fail."""
 BLUNT = 1e-3
 """Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
+HOLLOW = 0.1
+"""Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs."""
 DRIFT = 1e-2
 """If a point gets worse by more than this, in units, other starts are tried too."""
 
@@ -95,7 +97,7 @@ class OnMesh:
     change : float
         Largest change of an objective that matters from the mesh before, in units; infinite where there was none.
     tried : bool
-        Whether elements were cut where other controls would gain, which changed nothing.
+        Whether elements were cut where other controls would gain, which changed next to nothing.
     """
 
     method: Meshed
@@ -314,7 +316,9 @@ class MeshLoop:
             hint = waiting.pop(0)
             yield hint, hint != present.method
         if present.gaining and not present.verdict.complaints():
-            yield where_controls_gain(present.method, present.verdict, present.trajectory), False
+            cut = where_controls_gain(present.method, present.verdict, present.trajectory)
+            if cut not in seen:
+                yield cut, False
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield knots, True
@@ -334,7 +338,7 @@ class MeshLoop:
         reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients, optimum)
         # On the same mesh nothing can be seen of what that has wrong.
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
-        tried = present.gaining and change <= self.wanted.settled
+        tried = present.gaining and change <= HOLLOW * present.verdict.gain
         return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:

@@ -11,10 +11,9 @@ from .base import InnerResult, InnerSolver, scored, started
 from .ipopt import Ipopt
 from .newton import Newton
 
-
 PATIENCE = 150
-"""Most iterations of a projection, and of each further try, for what Newton's method leaves: most that succeed take some tens, and those that
-fail take all."""
+"""Most iterations of a projection, and of each further try, for what Newton's method leaves: most that succeed take some tens, and those
+that fail take all."""
 
 
 @dataclass(frozen=True)

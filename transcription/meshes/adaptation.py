@@ -36,7 +36,8 @@ def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory
         old = method.mesh_of(name).found_in(trajectory[name].state.edges)
         worst_first = [int(j) for j in np.argsort(-gain.amounts, kind="stable") if gain.amounts[j] >= WORST_SHARE * most > 0]
         if worst_first:
-            limit = max(method.most_elements, 2 * method.elements)
+            # Switches that are found leave fewer.
+            limit = 2 * max(method.most_elements, 2 * method.elements)
             edges = split(np.array(old.edges), {j: gain.places[j].tolist() or [0.0] for j in worst_first}, limit)
             finer[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
     return method.remeshed(finer)

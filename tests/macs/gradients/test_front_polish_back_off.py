@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from smooth_problems import bryson_denham
 
 from macs import MACS, Front
 from macs.evaluation.bilevel import Bilevel
@@ -24,19 +25,6 @@ from transcription.inner import Propagate
 
 COARSE, SHOOTING = DFET(3, 3), SingleShooting(10, control="linear")
 VERIFY = 1e-4
-
-
-def bryson_denham() -> Problem:
-    problem = Problem("Bryson and Denham")
-    phase = problem.phase("flight", t0=0.0, tf=1.0)
-    x, v = phase.state("x", bounds=(-0.5, 0.5), initial=0.0, final=0.0), phase.state("v", bounds=(-2.0, 2.0), initial=1.0, final=-1.0)
-    u = phase.control("u", bounds=(-30.0, 30.0))
-    limit = problem.parameter("limit", bounds=(0.04, 1 / 6))
-    phase.dynamics(x=v, v=u)
-    phase.path("height", x - limit, upper=0.0)
-    problem.minimize("effort", phase.integral(u**2 / 2))
-    problem.minimize("highest", limit)
-    return problem
 
 
 def gust() -> Problem:

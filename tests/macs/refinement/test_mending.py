@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_front_polish_back_off import bryson_denham
+from smooth_problems import bryson_denham
 
 from macs import MACS, NSGA2, Front, payoff, sweep
 from macs.fronts import verified
