@@ -21,6 +21,8 @@ from ..gradients.tasks import Along, End, Task
 from ..pareto.dominance import extremes
 from .mesh_loop import DRIFT, MeshLoop, Programs, differentiable
 
+PATIENCE = 250
+"""Most iterations of one solve, of which the first strategy may take all: from a trajectory nearby most take some tens."""
 NEIGHBOURS = 2
 """Number of neighbours from which a point is solved, too, where it is lost or gets worse from its own trajectory."""
 
@@ -95,7 +97,8 @@ class _FineFront:
         near = sorted(self.done, key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         bound, best = task.loss(self.front.F[i]) + DRIFT, None
         for start in (self._start(i), *(self.done[j].z for j in near)):
-            solved = task.solve(self.solves, self.nlp, start)
+            with self.solves.at_most(PATIENCE):
+                solved = task.solve(self.solves, self.nlp, start)
             if solved.status == CONVERGED and (best is None or task.loss(solved.F) < task.loss(best.F)):
                 best = solved
             if stopping() or (best is not None and task.loss(best.F) <= bound):
