@@ -44,7 +44,7 @@ def solved_on(
     fine : Meshed
     programs : Programs
     show : callable
-        Is told what is done.
+        Called with words on what is being done.
     """
     if not (rows and differentiable(points.compiled())):
         return points

@@ -87,7 +87,7 @@ class _Mending:
     verify : float
         How much a point may miss.
     show : callable
-        Is told what is done.
+        Called with words on what is being done.
 
     Attributes
     ----------

@@ -84,7 +84,7 @@ def search_transcription(
 def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: Callable[[str], None] = lambda words: None) -> Chosen:
     """DFET on a coarse mesh for a search, and on a mesh for all points of its front.
 
-    Each objective is optimised, and for its best value the others, from the problem's guess or a random start, on a coarse mesh and then on
+    Each objective is optimised, and for its best value the others, from the problem's guess and random starts, on a coarse mesh and then on
     finer ones, until a simulation agrees and a finer mesh changes nothing. The mesh has the elements of all these.
 
     Parameters
