@@ -1,7 +1,7 @@
 """Floor 2: from a continuous problem to an NLP and back: transcriptions, the inner level, trajectories, their simulation."""
 
 from .base import NLP, Meshed, Transcription
-from .catalogue import from_dict, parse, word
+from .catalogue import from_dict, parse, stated, word
 from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
 from .shooting.method import MultipleShooting, SingleShooting
@@ -25,5 +25,6 @@ __all__ = [
     "Transcription",
     "from_dict",
     "parse",
+    "stated",
     "word",
 ]

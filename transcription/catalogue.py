@@ -22,6 +22,11 @@ def parse(text: str) -> Transcription:
         raise ValueError(f"transcription '{text}': {error}") from None
 
 
+def stated(given: str | Mapping[str, Any]) -> Transcription:
+    """A transcription as a case or a study file states it: in one word, or as a table that `from_dict` takes."""
+    return parse(given) if isinstance(given, str) else from_dict(given)
+
+
 def word(method: Transcription) -> str | None:
     """A transcription in one word, such that `parse` gives it again; None if it has no such word."""
     if type(method).__name__ not in Transcription.registered:

@@ -10,7 +10,7 @@ import numpy as np
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Meshed, Transcription
-from transcription.catalogue import parse
+from transcription.catalogue import stated
 from transcription.dfet.method import DFET
 from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
@@ -39,8 +39,8 @@ NEAR = 0.25
 
 def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
     """The problem's own default, or a coarse mesh."""
-    word = problem.default_transcription if isinstance(problem, Problem) else None
-    return COARSE if word is None else parse(word)
+    own = problem.default_transcription if isinstance(problem, Problem) else None
+    return COARSE if own is None else stated(own)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def search_transcription(
 ) -> Chosen:
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
-        return Chosen(parse(problem.default_transcription), None, Counts())
+        return Chosen(stated(problem.default_transcription), None, Counts())
     return found_mesh(compiled, verify, tolerance, show)
 
 

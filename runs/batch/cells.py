@@ -19,7 +19,7 @@ from macs.solvers.solver import Solver
 from problems import Problem, load
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
-from transcription import Transcription, parse, word
+from transcription import Transcription, stated, word
 
 from ..data.schema import errors_begin_with, plain
 from ..execution.task import Payload
@@ -123,10 +123,13 @@ def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> d
     """Transcriptions by label, for each problem."""
     if isinstance(given, Mapping) and not set(given) & set(problems):
         return dict.fromkeys(problems, _named_schemes(given))
-    by_problem = _by_problem(
-        "transcriptions", given, problems, lambda problem: problem.default_transcription or default_transcription(problem)
-    )
+    by_problem = _by_problem("transcriptions", given, problems, _own_scheme)
     return {label: _named_schemes(one) for label, one in by_problem.items()}
+
+
+def _own_scheme(problem: Problem) -> Any:
+    method = default_transcription(problem)
+    return method if word(method) else {OWN: method}
 
 
 def _named_schemes(given: Any) -> dict[str, Transcription]:
@@ -134,11 +137,14 @@ def _named_schemes(given: Any) -> dict[str, Transcription]:
 
 
 def _scheme(label: str, given: Any) -> Transcription:
-    if isinstance(given, str):
+    if isinstance(given, str | Mapping):
         with errors_begin_with("transcriptions"):
-            return parse(given)
+            return stated(given)
     if not isinstance(given, Transcription):
-        raise ValueError(f"transcriptions: '{label}' must be a word such as dfet:4x6 or a Transcription, not {given!r}")
+        raise ValueError(
+            f"transcriptions: '{label}' must be a word such as dfet:4x6, a table with its method and settings, or a Transcription, "
+            f"not {given!r}"
+        )
     return given
 
 
@@ -191,6 +197,8 @@ def _pickled(place: str, *parts: Any) -> bytes:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error
 
 
+OWN = "the problem's own mesh"
+"""Label of a default transcription that cannot be written in a word."""
 LONGEST = 80
 """Characters of a folder's name."""
 

@@ -48,6 +48,11 @@ UP = {
 """A flight to begin with, at these shares of its phases: a glide, then up without much thrust."""
 DURATIONS = {DESCENT: 900.0, ASCENT: 130.0}
 """Of that flight, s."""
+MESHES = {
+    DESCENT: {"edges": [*np.linspace(0.0, 0.5, 7), *np.linspace(0.5, 0.85, 9)[1:], *np.linspace(0.85, 1.0, 15)[1:]], "order": 5},
+    ASCENT: {"edges": [*np.linspace(0.0, 0.4, 17), *np.linspace(0.4, 1.0, 11)[1:]], "order": 5, "control_order": 1},
+}
+"""Shorter elements before and after the lowest point, where two limits are reached and the engine burns for a moment."""
 
 
 def problem(
@@ -79,8 +84,10 @@ def problem(
     problem.maximize("terminal mass", ascent.final(ascent["mass"]), unit="kg")
     problem.maximize("terminal speed", ascent.final(ascent["speed"]), unit="m/s")
     _guess(problem, lowest, mass)
-    # The limits are sharp: elements of half this length lose a twentieth of a per cent of the mass less, and take twice the time.
-    problem.default_transcription = "dfet:30x3:bernstein:1"
+    problem.default_transcription = {
+        "method": "DFET",
+        "settings": {"elements": 12, "order": 5, "control_order": 2, "basis": "bernstein", "mesh": MESHES},
+    }
     return problem
 
 
