@@ -14,7 +14,7 @@ from macs import MACS, payoff, sweep
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, from_dict, parse, word
-from transcription.dfet.phase import DFETPhase
+from transcription.elements.phase import ElementsPhase
 from transcription.inner import inner_solver
 from transcription.phases.writer import PhaseWriter
 from transcription.trajectories.simulate import simulate
@@ -96,8 +96,8 @@ def test_default_propagation_and_derivatives_are_those_of_the_method_itself(meth
     found = own.reduced.propagate(Z)
     derivatives = own.reduced.derivatives(found, rows)
     for name in ("propagate", "sensitivity"):
-        monkeypatch.setattr(DFETPhase, name, getattr(PhaseWriter, name))
-    monkeypatch.setattr(DFETPhase, "compilable", False)
+        monkeypatch.setattr(ElementsPhase, name, getattr(PhaseWriter, name))
+    monkeypatch.setattr(ElementsPhase, "compilable", False)
     plain = method.transcribe(problem)
     again = plain.reduced.propagate(plain.first_guess(Z[:, plain.free]))
     assert np.abs(again.Z - Z).max() < 1e-11 and np.abs(again.values - found.values).max() < 1e-11
