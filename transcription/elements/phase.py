@@ -157,7 +157,7 @@ class ElementsPhase(PhaseWriter):
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.state_nodes`."""
         inside = self.mesh.inside(self.tables.nodes).ravel()
-        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), -1)])
+        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), self.B.shape[1])])
         return slots, np.concatenate([self.mesh.edges[1:], inside])
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:

@@ -118,12 +118,14 @@ def lagrange_integrals(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
 def _lagrange(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
     difference = np.asarray(tau, dtype=float)[:, None] - points
     hit = np.abs(difference) < 1e-15
-    at_points = hit.any()
-    if at_points:
-        difference[hit] = 1.0
+    if not hit.any():
+        values = weights / difference
+        return values / values.sum(axis=1, keepdims=True)
+    on = hit.any(axis=1, keepdims=True)
+    difference[hit] = 1.0
     values = weights / difference
-    values /= values.sum(axis=1, keepdims=True)
-    return np.where(hit.any(axis=1, keepdims=True), hit, values) if at_points else values
+    # What stands there at a point may sum to zero, and is not used.
+    return np.where(on, hit, values / np.where(on, 1.0, values.sum(axis=1, keepdims=True)))
 
 
 @cache
