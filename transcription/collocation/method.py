@@ -155,9 +155,7 @@ class Collocation(Meshed):
         controls = [one for one in others if not one.isdecimal()]
         if len(numbers) != 2 or len(orders) > 1 or len(controls) > 1:
             raise ValueError(f"write it as {cls.examples}")
-        return cls(
-            *numbers, points=points, control_order=orders[0] if orders else None, control=controls[0] if controls else "polynomial"
-        )
+        return cls(*numbers, points=points, control_order=orders[0] if orders else None, control=controls[0] if controls else "polynomial")
 
     def to_word(self) -> str:
         """See `Transcription.to_word`."""

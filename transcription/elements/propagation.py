@@ -1,8 +1,8 @@
 """The initial value problem of a phase, element after element, and its derivatives.
 
 On each element the equations give the states at its points, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that system is
-small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element; elsewhere, and where
-these five do not converge, a rootfinder iterates.
+small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element; elsewhere, and
+where these five do not converge, a rootfinder iterates.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class Propagation:
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
     def elements(self, robust: bool) -> ca.Function:
-        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N k), residuals (1, N)); inputs of
-        elements stand side by side."""
+        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N k), residuals (1, N)); inputs
+        of elements stand side by side."""
         return self.step(robust).mapaccum("elements", self.n)
 
     def step(self, robust: bool) -> ca.Function:
@@ -136,7 +136,8 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
 
 
 def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> ca.Function:
-    """(X, right, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the equations."""
+    """(X, right, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the
+    equations."""
     y, *inputs = element.symbols
     along = ca.veccat(*inputs)
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right

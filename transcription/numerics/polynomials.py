@@ -47,8 +47,8 @@ def chebyshev_nodes(n: int) -> np.ndarray:
 def nodes(basis: str, degree: int) -> np.ndarray:
     """The places of a basis' coefficients on [-1, 1], shape (degree + 1,).
 
-    Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends; "closed-radau": Gauss-Radau nodes and 1),
-    those of Bernstein's the equally spaced abscissae of the control points. Raises ValueError for an unknown basis.
+    Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends; "closed-radau": Gauss-Radau nodes and
+    1), those of Bernstein's the equally spaced abscissae of the control points. Raises ValueError for an unknown basis.
     """
     if basis == "lobatto":
         points = lobatto_nodes(degree + 1)
