@@ -13,7 +13,7 @@ from euler import Euler, EulerPhase
 from macs import MACS, payoff, sweep
 from problems import Problem, load
 from problems.cases.goddard import reference
-from transcription import DFET, from_dict, parse, word
+from transcription import DFET, Collocation, from_dict, parse, word
 from transcription.elements.phase import ElementsPhase
 from transcription.inner import inner_solver
 from transcription.phases.writer import PhaseWriter
@@ -87,7 +87,16 @@ def jump() -> Problem:
     return problem
 
 
-@pytest.mark.parametrize("method", [DFET(3, 2), DFET(2, 3, basis="bernstein")])
+@pytest.mark.parametrize(
+    "method",
+    [
+        DFET(3, 2),
+        DFET(2, 3, basis="bernstein"),
+        Collocation(3, 3),
+        Collocation(2, 3, control="bernstein", control_order=1),
+        *(Collocation(2, 3, points=points) for points in ("gauss", "lobatto", "chebyshev")),
+    ],
+)
 def test_default_propagation_and_derivatives_are_those_of_the_method_itself(method, monkeypatch):
     problem = jump().compile()
     own = method.transcribe(problem)
