@@ -257,6 +257,8 @@ class NLP(Deriving):
     costates : callable
         A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
         multipliers say nothing between their places.
+    widen : callable
+        NLP -> the same one with all variables free that have bounds; see `whole`.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
@@ -278,6 +280,7 @@ class NLP(Deriving):
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
+    widen: Callable[[NLP], NLP]
     parts: Parts | None = None
 
     def __repr__(self) -> str:
@@ -288,6 +291,12 @@ class NLP(Deriving):
     def reduced(self) -> Reduced:
         """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
         return self.reduce()
+
+    @cached_property
+    def whole(self) -> NLP:
+        """The same NLP for a search over whole vectors: states are free, too, and among its profiles. Only what has no bounds (peaks, absolute
+        values) follows from the rest."""
+        return self.widen(self)
 
     @cached_property
     def lower(self) -> np.ndarray:
