@@ -294,8 +294,8 @@ class NLP(Deriving):
 
     @cached_property
     def whole(self) -> NLP:
-        """The same NLP for a search over whole vectors: states are free, too, and among its profiles. Only what has no bounds (peaks, absolute
-        values) follows from the rest."""
+        """The same NLP for a search over whole vectors: states are free, too, and among its profiles. Only what has no bounds (peaks,
+        absolute values) follows from the rest."""
         return self.widen(self)
 
     @cached_property
