@@ -120,7 +120,7 @@ class Assembly:
     def widened(self, nlp: NLP) -> NLP:
         """See `NLP.widen`; what the user guessed of the states, or the line that stands for it, is a guess like others."""
         free = np.flatnonzero(np.isfinite(nlp.lower) & np.isfinite(nlp.upper))
-        known = np.where(np.isfinite(nlp.guess), nlp.guess, 0.5 * (nlp.lower + nlp.upper)[nlp.free])
+        known = np.where(np.isfinite(nlp.guess), nlp.guess, 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free]))
         guess = self.guessed(known[None])[0]
         guess[nlp.free] = nlp.guess
 

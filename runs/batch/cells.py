@@ -49,8 +49,8 @@ def combine(
     for label, given in terms.items():
         if "transcription" in given:
             with errors_begin_with(f"terms of '{label}'"):
-                one = _by_problem("transcription", given["transcription"], stated, lambda problem: problem.default_transcription)
-                own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in one.items()}
+                own = _by_problem("transcription", given["transcription"], stated, lambda problem: problem.default_transcription)
+                own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in own.items()}
         if "evaluations" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)

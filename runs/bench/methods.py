@@ -96,7 +96,7 @@ def _optimum(problem: Problem, method: Transcription, objective: str, start: Fro
     given = None
     if start is not None and start[0].trajectory is not None:
         given = method.nlp(problem).interpolate(start[0].trajectory)[None]
-    front = optimize(problem, method, objective=objective, start=given, verify=None).alone()
+    front = Front.of(optimize(problem, method, objective=objective, start=given, verify=None).alone())
     if isinstance(method, Meshed) and front.status[0] == CONVERGED:
         front = front.refine_mesh(tolerance=TOLERANCE, limit=MESHES)
     return front.verify(AGREE)
