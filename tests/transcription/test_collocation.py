@@ -229,6 +229,41 @@ def test_global_collocation_converges_exponentially(points):
     assert of_objective[3:].max() < 1e-10 and of_state[3:].max() < 1e-8
 
 
+def regulated(method: Collocation) -> tuple[float, float]:
+    """x' = u from 1, least integral of (x^2 + u^2) / 2 over 4 seconds: errors of the optimum, tanh(4) / 2, and of u at the nodes of the
+    trajectory, -sinh(4 - t) / cosh(4)."""
+    problem = Problem("regulator")
+    run = problem.phase("run", t0=0, tf=4)
+    x, u = run.state("x", bounds=(-2, 2), initial=1), run.control("u", bounds=(-2, 2))
+    run.dynamics(x=u)
+    problem.minimize("cost", run.integral(0.5 * (x**2 + u**2)))
+    nlp = method.nlp(problem.compile())
+    solved = scalarize(nlp, np.zeros(len(nlp.variables)), reference=np.zeros(1), weights=np.ones(1))
+    flown = nlp.unpack(solved.z)["run"]
+    assert solved.status == "converged"
+    return abs(solved.F[0] - 0.5 * np.tanh(4)), np.abs(flown["u"] + np.sinh(4 - flown.time) / np.cosh(4)).max()
+
+
+@pytest.mark.parametrize(
+    "methods",
+    [
+        *([Collocation(1, n, points=points) for n in (4, 6, 8, 10)] for points in ("gauss", "radau", "lobatto")),
+        [Collocation(1, 2 * n, points="chebyshev", control_order=n) for n in (4, 6, 8, 10)],
+    ],
+    ids=["gauss", "radau", "lobatto", "chebyshev, half"],
+)
+def test_an_integral_cost_converges_exponentially(methods):
+    of_optimum, of_control = np.array([regulated(method) for method in methods]).T
+    assert (of_optimum[:-1] / of_optimum[1:] > 50).all() and of_optimum[-1] < 1e-11
+    assert (of_control[:-1] / of_control[1:] > 10).all() and of_control[-1] < 1e-5
+
+
+def test_chebyshev_points_with_controls_of_the_full_degree_converge_like_a_power_alone():
+    """As the differential form of the literature does: the weights of Clenshaw and Curtis do not integrate what the optimum balances."""
+    (_, coarse), (_, fine) = regulated(Collocation(1, 12, points="chebyshev")), regulated(Collocation(1, 24, points="chebyshev"))
+    assert np.log2(coarse / fine) == pytest.approx(2.3, abs=0.4)
+
+
 @pytest.mark.parametrize(
     "method", [Collocation(1, 24), Collocation(6, 5), Collocation(1, 24, points="gauss"), Collocation(6, 5, points="gauss")]
 )

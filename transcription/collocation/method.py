@@ -15,6 +15,9 @@ one interval this is what the literature calls global, or pseudospectral.
   49(2), 2011; Patterson and Rao, "GPOPS-II", ACM TOMS 41(1), 2014.
 - "lobatto": N + 1 points, both ends among them; order 2 N.
 - "chebyshev": N + 1 points -cos(pi k / N), both ends among them, with the weights of Clenshaw and Curtis; order N + 1, or N + 2 for even N.
+  These weights integrate polynomials of degree N only, not the products of costates and controls that an optimum balances: with controls of
+  the full degree, an optimum converges like a power of N (N^-2 in the controls of a quadratic cost), here as in the differential form of
+  the literature. With `control_order` N/2, whose products are integrated, it converges exponentially.
 
 For Gauss and Radau this is the differential form D X = h/2 f of the literature, where D differentiates the polynomial of degree N through
 the points and the left end (Gauss), or both (Radau). The literature's differential form for Lobatto and Chebyshev points (Elnagar, Kazemi
