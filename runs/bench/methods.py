@@ -57,8 +57,8 @@ def solved(name: str) -> list[dict[str, float | str]]:
     """What each method finds for a problem, printed as soon as it is known.
 
     First all begin with the problem's own guess. Those whose optimum differs from the best one begin once more from that, or from the next
-    best: where there are several optima, which of them is found is a matter of starts. Shooting cannot express a path constraint that is an equality, which
-    would leave its controls between two nodes no freedom.
+    best: where there are several optima, which of them is found is a matter of starts. Shooting cannot express a path constraint that is
+    an equality, which would leave its controls between two nodes no freedom.
     """
     record = published(name)[0]
     problem = load(STANDARD + name, **record.data)
