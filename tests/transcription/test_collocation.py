@@ -12,7 +12,7 @@ from gauss import integrate
 from numpy.polynomial import Polynomial, legendre
 from scipy.integrate import solve_ivp
 
-from macs import MACS, Front, optimize, payoff
+from macs import MACS, Front, optimize, payoff, sweep
 from problems import Problem, load
 from transcription import DFET, Collocation, from_dict, parse, word
 from transcription.collocation.tables import POINTS, collocation_tables, degree_of_controls
@@ -434,6 +434,8 @@ def test_searches_are_solved_saved_and_loaded(method, tmp_path):
     for name in ("y", "u"):
         assert np.array_equal(again[3].trajectory["ascent"].at(times)[name], front[3].trajectory["ascent"].at(times)[name])
     assert again[3].simulate().max_defect == front[3].simulate().max_defect
+    swept = sweep(load("goddard"), method, points=3, verify=None)
+    assert len(swept) == 3 and (swept.status == "converged").all()
 
 
 @pytest.mark.parametrize("points", POINTS)

@@ -37,11 +37,10 @@ def collocation_tables(points: str, degree: int, control_order: int, bernstein: 
     integrals, weights = polynomials.lagrange_integrals(tau, tau), polynomials.lagrange_integrals(tau, np.ones(1))[0]
     integrals[tau == -1.0], integrals[tau == 1.0] = 0.0, weights
     own = np.flatnonzero((tau > -1.0) & (tau < 1.0))
-    k = len(own)
     nodes = np.array([-1.0, *tau[own], 1.0])
     inside = (nodes[:, None] == tau).astype(float)
-    found = _tested(tau, weights, nodes) if points in ("radau", "gauss") else _integrated(tau, integrals, nodes)
-    balance, test, costates = found
+    rows = _tested(tau, weights, nodes) if points in ("radau", "gauss") else _integrated(tau, integrals, nodes)
+    balance, test, costates = rows
     return Tables(
         tau=tau,
         weights=weights,
@@ -52,7 +51,7 @@ def collocation_tables(points: str, degree: int, control_order: int, bernstein: 
         recover=0.5 * integrals.T[:, own],
         nodes=tau[own],
         stages=tau[own],
-        at_stages=np.eye(k),
+        at_stages=np.eye(len(own)),
         closed=CLOSED[points],
         control_basis="bernstein" if bernstein else basis,
         control_order=control_order,
@@ -65,10 +64,10 @@ def collocation_tables(points: str, degree: int, control_order: int, bernstein: 
 def _tested(tau: np.ndarray, weights: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Balance, test and costates of Gauss's or Radau's points.
 
-    The differential form D X = h/2 f at the points is tested with the polynomials of the degree that makes as many equations as it is,
-    and integrated by parts, which is exact for these quadratures. The tests are Lagrange polynomials on the points, for Radau's without
-    the last one, and 1: so the right end enters one equation only, and multipliers are values of the costates. These are those of the
-    covector mapping of the differential form: its multipliers over the weights.
+    The differential form D X = h/2 f at the points is multiplied by test polynomials, of which there are as many as equations, summed with
+    the weights, and integrated by parts, which is exact for these quadratures. The tests are the Lagrange polynomials on the points, for
+    Radau's without the last one, and 1: so the right end enters one equation only, and the multipliers are values of the costates there.
+    They are those of the covector mapping of the differential form: its multipliers over the weights.
     """
     radau = tau[0] == -1.0
     of_tests = np.append(tau[:-1] if radau else tau, 1.0)
