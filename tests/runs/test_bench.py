@@ -224,7 +224,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, peers, population, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "inner, methods, peers, population, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],
