@@ -343,6 +343,27 @@ def test_bernstein_controls_stay_within_their_bounds_everywhere(points):
     assert np.abs(free.trajectory["ascent"].control(np.linspace(0, 109, 500))).max() > np.pi / 2 + 1e-3, "else this shows nothing"
 
 
+@pytest.mark.parametrize("points", POINTS)
+def test_peaks_absolute_values_and_periodic_controls(points):
+    """From 0 to 1 in two seconds: the least peak of u^2 is 1/4 with the least way 1; a heading is turned no further than it must."""
+    method, (problem, run) = Collocation(3, 4, points=points), integrator(final=1)
+    problem.minimize("peak", run.peak(run["u"] ** 2))
+    problem.minimize("way", run.integral(ca.fabs(run["u"])))
+    front = payoff(problem, method, verify=1e-5)
+    assert front.verified.all() and front.objectives[0] == pytest.approx([0.25, 1.0], abs=1e-6)
+    assert front.objectives[1, 1] == pytest.approx(1.0, abs=1e-6)
+    problem, run = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi)
+    run._rates = {}
+    run.dynamics(x=ca.cos(run["u"]))
+    problem.maximize("end", run.final(run["x"]))
+    nlp = method.transcribe(problem)
+    Z = nlp.propagate(nlp.first_guess(candidates(nlp, 3)))
+    moved = Z.copy()
+    moved[:, nlp.free] += 2 * np.pi * np.random.default_rng(0).integers(-1, 2, (3, len(nlp.free)))
+    assert nlp.residuals(moved)[0] == pytest.approx(nlp.residuals(Z)[0], abs=1e-12)
+    assert np.abs(np.array(nlp.functions(moved.T)[1])).max() < 1e-10, "the dynamics hold a period on as well"
+
+
 def test_controls_of_a_lower_degree_have_so_many_values():
     for points in POINTS:
         nlp = Collocation(3, 4, points=points, control_order=1).transcribe(load("goddard"))
