@@ -2,6 +2,7 @@
 
 from .base import NLP, Meshed, Transcription
 from .catalogue import from_dict, parse, stated, word
+from .collocation.method import Collocation
 from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
 from .shooting.method import MultipleShooting, SingleShooting
@@ -12,6 +13,7 @@ from .trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Traje
 __all__ = [
     "DFET",
     "NLP",
+    "Collocation",
     "InnerResult",
     "InnerSolver",
     "Meshed",

@@ -87,13 +87,14 @@ class Assembly:
             g_scale=np.concatenate(rows.scale),
             g_labels=tuple(rows.labels),
             guess=self.guess(),
-            profiles=self.profiles(),
+            profiles=self.profiles(self.layout.free),
             guessed=self.guessed,
             reduce=lambda: self._reduced(function, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
             costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
+            widen=self.widened,
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
@@ -116,19 +117,38 @@ class Assembly:
             found |= writer.guess_controls(*times)
         return np.array([found.get(slot, np.nan) for slot in self.layout.free])
 
-    def profiles(self) -> tuple[Profile, ...]:
-        """See `NLP.profiles`."""
-        column = {slot: i for i, slot in enumerate(self.layout.free)}
+    def widened(self, nlp: NLP) -> NLP:
+        """See `NLP.widen`; what the user guessed of the states, or the line that stands for it, is a guess like others."""
+        free = np.flatnonzero(np.isfinite(nlp.lower) & np.isfinite(nlp.upper))
+        known = np.where(np.isfinite(nlp.guess), nlp.guess, 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free]))
+        guess = self.guessed(known[None])[0]
+        guess[nlp.free] = nlp.guess
+
+        def guessed(candidates: np.ndarray) -> np.ndarray:
+            Z = np.zeros((len(candidates), len(nlp.variables)))
+            Z[:, free] = candidates
+            return Z
+
+        return replace(nlp, free=free, guess=guess[free], guessed=guessed, profiles=self.profiles(free.tolist(), states=True))
+
+    def profiles(self, free: Sequence[int], *, states: bool = False) -> tuple[Profile, ...]:
+        """See `NLP.profiles`, where these variables are `free`; with `states`, those of the states, too."""
+        column = {slot: i for i, slot in enumerate(free)}
         found = []
         for writer in self._declared:
-            slots, places = writer.control_nodes()
-            for control, own in zip(writer.phase.controls, slots.T, strict=True):
-                # A control whose bounds coincide is no variable, and one that is constant for a while only one.
-                free = np.sort(np.unique(own, return_index=True)[1])
-                free = free[own[free] >= 0]
-                if free.size:
-                    columns = np.array([column[int(slot)] for slot in own[free]])
-                    found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
+            tables = [(writer.phase.controls, *writer.control_nodes())]
+            if states:
+                slots, places = writer.state_nodes()
+                in_time = np.argsort(places, kind="stable")
+                tables.append((writer.phase.states, slots[in_time], places[in_time]))
+            for variables, slots, places in tables:
+                for variable, own in zip(variables, slots.T, strict=True):
+                    # A control whose bounds coincide is no variable, and one that is constant for a while only one.
+                    rows = np.sort(np.unique(own, return_index=True)[1])
+                    rows = rows[np.isin(own[rows], free)]
+                    if rows.size:
+                        columns = np.array([column[int(slot)] for slot in own[rows]])
+                        found.append(Profile(f"{writer.phase.name}.{variable.name}", columns, places[rows]))
         return tuple(found)
 
     def guessed(self, candidates: np.ndarray) -> np.ndarray:

@@ -45,8 +45,12 @@ def combine(
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
-    own_budgets = {}
+    own_budgets, own_schemes = {}, {}
     for label, given in terms.items():
+        if "transcription" in given:
+            with errors_begin_with(f"terms of '{label}'"):
+                own = _by_problem("transcription", given["transcription"], stated, lambda problem: problem.default_transcription)
+                own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in own.items()}
         if "evaluations" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
@@ -63,7 +67,7 @@ def combine(
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         for one in methods:
             if one not in common:
-                offered += [(name, scheme, [one]) for name, scheme in _named_schemes(terms[one]["transcription"]).items()]
+                offered += [(name, scheme, [one]) for name, scheme in own_schemes[one][label].items()]
         for scheme_label, scheme, method_labels in offered:
             stated_so = _pickled(f"{label}, {scheme_label}", problem, scheme)
             for method_label in method_labels:

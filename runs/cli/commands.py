@@ -162,8 +162,7 @@ def bench(arguments: Namespace) -> int:
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)
-    benchmarks.bench(kinds, arguments.quick, arguments.csv)
-    return DONE
+    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv) else FAILED
 
 
 # Arguments
