@@ -17,6 +17,7 @@ from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
+from .phases.adjoint import Adjoint
 from .phases.mesh import PhaseMesh, as_meshes
 from .phases.pointwise import Parts
 from .phases.reduced import Reduced
@@ -247,6 +248,11 @@ class NLP(Deriving):
     costates : callable
         A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
         multipliers say nothing between their places.
+    adjoint : callable
+        A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
+        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places.
+    measure : callable
+        () -> `quantities`.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
@@ -268,6 +274,8 @@ class NLP(Deriving):
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
+    adjoint: Callable[[np.ndarray, np.ndarray, np.ndarray, Mapping[str, np.ndarray]], dict[str, Adjoint]]
+    measure: Callable[[], ca.Function]
     parts: Parts | None = None
 
     def __repr__(self) -> str:
@@ -278,6 +286,11 @@ class NLP(Deriving):
     def reduced(self) -> Reduced:
         """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
         return self.reduce()
+
+    @cached_property
+    def quantities(self) -> ca.Function:
+        """z -> what objectives and constraints see of each phase: t0, tf, initials, finals, integrals, peaks; a column a phase."""
+        return self.measure()
 
     @cached_property
     def lower(self) -> np.ndarray:

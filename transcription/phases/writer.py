@@ -15,6 +15,7 @@ from problems.compiled import CompiledPhase
 from ..numerics.periodic import wrapped
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from .adjoint import Adjoint, Ending, PhaseMultipliers, swept
 from .guess import along, state_along
 from .layout import Layout
 from .pointwise import Pointwise
@@ -53,6 +54,9 @@ class Rows:
     propagated: list[bool] = field(default_factory=list)
     dynamics: dict[str, slice] = field(default_factory=dict)
     """Where the rows of dynamics of each phase are."""
+    samples: dict[tuple[str, str], list[slice]] = field(default_factory=dict)
+    """Where the rows of each of its path constraints ("path"), peaks ("peak") and bounded hidden states ("state") are, by its name and
+    that word."""
 
     def add(
         self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
@@ -67,6 +71,13 @@ class Rows:
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+    def add_samples(
+        self, phase: str, kind: str, expression: ca.MX, lower: object, upper: object, scale: object, label: str, *, propagated: bool = False
+    ) -> None:
+        """Rows that are samples of one quantity of a phase, so that their multipliers are found again; see `add` and `samples`."""
+        self.samples.setdefault((phase, kind), []).append(slice(self.count, self.count + expression.numel()))
+        self.add(expression, lower, upper, scale, label, propagated=propagated)
 
     def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
         """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
@@ -168,6 +179,52 @@ class PhaseWriter(ABC):
         """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
         None: what these say between their places is not known."""
         return None
+
+    def adjoint(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
+        """The costates of the phase along one extended vector that is optimal: `costates`, else `swept`."""
+        known = self.costates(extended, multipliers.dynamics)
+        return self.swept(extended, multipliers) if known is None else Adjoint(known)
+
+    def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
+        """The costates by the adjoint equation, integrated backward along the trajectory.
+
+        At tf they are the derivatives of the Lagrangian by the final states, as far as these belong to the phase's dynamics and integrals:
+        whatever else the method or the problem makes of them follows tf. Limits of states, path constraints and peaks make them jump, at
+        the nodes of the states in which these are written.
+        """
+        dynamics, limits = (np.array(one).ravel() for one in self._by_states(extended, *self._columns(multipliers)))
+        mine = multipliers.variables
+        limits = limits + np.concatenate([mine, np.zeros(len(limits) - len(mine))])
+        slots, places = self.state_nodes()
+        inside = (places > 0) & (places < 1)
+        index = self.layout.index
+        ending = Ending(
+            final=-dynamics[index(self.ends.final)],
+            initial=dynamics[index(self.ends.initial)],
+            places=places[inside],
+            jumps=limits[index(slots)].reshape(slots.shape)[inside],
+        )
+        s = extended[index(self.ends.statics)]
+        return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
+
+    def _columns(self, multipliers: PhaseMultipliers) -> tuple[np.ndarray, ...]:
+        """Multipliers as inputs of `_by_states`."""
+        paths, peaks = (np.concatenate([np.empty(0), *several]) for several in (multipliers.paths, multipliers.peaks))
+        return multipliers.dynamics, paths, peaks, multipliers.integrals
+
+    @cached_property
+    def _by_states(self) -> ca.Function:
+        """(extended vector, multipliers of dynamics, paths, peaks and integrals) -> derivatives by the extended vector of the Lagrangian's
+        terms of dynamics and integrals, and of those of paths and peaks."""
+        extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
+        written = self.write(self.fill(extended), rows)
+        g, name = ca.vertcat(*rows.expressions), self.phase.name
+        paths = ca.vertcat(ca.MX(0, 1), *(g[one] for one in rows.samples.get((name, "path"), ())))
+        columns = [g[rows.dynamics[name]], paths, ca.vec(written.peak_samples.T), written.integrals]
+        symbols = [ca.MX.sym(f"of_{k}", one.numel()) for k, one in enumerate(columns)]
+        dynamics, of_paths, of_peaks, integrals = (ca.dot(*one) for one in zip(columns, symbols, strict=True))
+        outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_paths + of_peaks)]
+        return ca.Function("by_states", [extended, *symbols], outputs)
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -273,7 +330,8 @@ class PhaseWriter(ABC):
     def add_paths(self, rows: Rows, values: ca.MX | list[ca.MX]) -> None:
         """Add the path constraints, of which `values` (npath, k) are samples; or one row of samples for each, of any lengths."""
         for limit, samples in zip(self.phase.paths, ca.vertsplit(values) if isinstance(values, ca.MX) else values, strict=True):
-            rows.add(samples, limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+            label = f"path '{limit.name}' of '{self.phase.name}'"
+            rows.add_samples(self.phase.name, "path", samples, limit.lower, limit.upper, limit.scale, label)
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

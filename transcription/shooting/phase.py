@@ -63,7 +63,7 @@ class ShootingPhase(PhaseWriter):
         self.add_dynamics(rows, pick(extended, self.R) - pick(extended, self._arrivals))
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
-            rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
+            rows.add_samples(phase.name, "state", at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
         seen = pick(extended, self.W)
         self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
