@@ -96,7 +96,7 @@ class Assembly:
             interpolate=self.interpolate,
             costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
-            adjoint=lambda z, of_rows, of_bounds, weights: self.adjoint(z, self._split(rows, of_rows, of_bounds, weights)),
+            adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
@@ -190,10 +190,14 @@ class Assembly:
         found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
         return {name: costates for name, costates in found.items() if costates is not None}
 
-    def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers]) -> dict[str, Adjoint]:
+    def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
         """See `NLP.adjoint`; multipliers by phase."""
-        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
-        return {writer.phase.name: writer.adjoint(extended, multipliers[writer.phase.name]) for writer in self._declared}
+        extended, found = self.layout.extended(np.asarray(z, dtype=float)[None])[0], {}
+        for writer in self._declared:
+            own = multipliers[writer.phase.name]
+            known = None if swept else writer.costates(extended, own.dynamics)
+            found[writer.phase.name] = writer.swept(extended, own) if known is None else Adjoint(known)
+        return found
 
     def _split(
         self, rows: Rows, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]

@@ -250,7 +250,8 @@ class NLP(Deriving):
         multipliers say nothing between their places.
     adjoint : callable
         A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
-        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places.
+        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, and,
+        if `swept` (a keyword), everywhere.
     measure : callable
         () -> `quantities`.
     parts : Parts, optional
@@ -274,7 +275,7 @@ class NLP(Deriving):
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
-    adjoint: Callable[[np.ndarray, np.ndarray, np.ndarray, Mapping[str, np.ndarray]], dict[str, Adjoint]]
+    adjoint: Callable[..., dict[str, Adjoint]]
     measure: Callable[[], ca.Function]
     parts: Parts | None = None
 

@@ -15,8 +15,11 @@ from .hamiltonian import hamiltonian, integral_weights
 from .optimality import Certificate
 
 
-def costates(nlp: NLP, z: np.ndarray, found: Certificate) -> Costates | None:
-    """The costates of a vector (n,) that is optimal, from its certificate; None where they are no numbers."""
+def costates(nlp: NLP, z: np.ndarray, found: Certificate, *, swept: bool = False) -> Costates | None:
+    """The costates of a vector (n,) that is optimal, from its certificate; None where they are no numbers.
+
+    `swept`: by the adjoint equation, backward from tf, also where the multipliers of the method are costates themselves.
+    """
     z = np.asarray(z, dtype=float)
     problem, trajectory, total = nlp.problem, nlp.unpack(z), found.of_objectives.sum()
     of_objectives, of_rows, of_bounds = (one / total for one in (found.of_objectives, found.of_rows, found.of_bounds))
@@ -24,7 +27,7 @@ def costates(nlp: NLP, z: np.ndarray, found: Certificate) -> Costates | None:
     quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
     of_constraints = of_rows[len(of_rows) - len(problem.limits) :]
     weights = integral_weights(problem, quantities, parameters, of_objectives, of_constraints)
-    adjoints, phases = nlp.adjoint(z, of_rows, of_bounds, weights), {}
+    adjoints, phases = nlp.adjoint(z, of_rows, of_bounds, weights, swept=swept), {}
     for phase in problem.phases:
         name, flown, adjoint = phase.name, trajectory[phase.name], adjoints[phase.name]
         values = adjoint.costates(flown.time)

@@ -180,13 +180,8 @@ class PhaseWriter(ABC):
         None: what these say between their places is not known."""
         return None
 
-    def adjoint(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
-        """The costates of the phase along one extended vector that is optimal: `costates`, else `swept`."""
-        known = self.costates(extended, multipliers.dynamics)
-        return self.swept(extended, multipliers) if known is None else Adjoint(known)
-
     def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
-        """The costates by the adjoint equation, integrated backward along the trajectory.
+        """The costates of the phase by the adjoint equation, integrated backward along one extended vector that is optimal.
 
         At tf they are the derivatives of the Lagrangian by the final states, as far as these belong to the phase's dynamics and integrals:
         whatever else the method or the problem makes of them follows tf. Limits of states, path constraints and peaks make them jump, at

@@ -20,7 +20,7 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     ----------
     names : tuple of str
         The states.
-    values : array (k, nx)
+    at_nodes : array (k, nx)
         At the nodes of the trajectory.
     hamiltonian : array (k,)
         There.
@@ -32,18 +32,18 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     """
 
     names: tuple[str, ...]
-    values: np.ndarray
+    at_nodes: np.ndarray
     hamiltonian: np.ndarray
     polynomial: PiecewisePolynomial
     error: float | None = None
 
     def __repr__(self) -> str:
-        return f"PhaseCostates({len(self.values)} nodes, [{', '.join(self.names)}])"
+        return f"PhaseCostates({len(self.at_nodes)} nodes, [{', '.join(self.names)}])"
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.names:
             raise KeyError(f"there is no costate of '{name}'; there are those of {', '.join(self.names)}")
-        return self.values[:, self.names.index(name)]
+        return self.at_nodes[:, self.names.index(name)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
