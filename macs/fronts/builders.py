@@ -10,14 +10,20 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
-from transcription.nlp.optimality import optimality
+from transcription.nlp.costates import costates
+from transcription.nlp.optimality import Conditions
 from transcription.stopping import Stopped, check_stopping
+from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
 from ..pareto.archive import Archive
-from .points import Point, Points
+from .point import Point
+from .points import Points
+
+OPTIMAL = 1e-3
+"""Largest `optimality` of points whose multipliers are costates."""
 
 
 def trajectory_points(
@@ -27,12 +33,13 @@ def trajectory_points(
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
     *,
-    certified: bool,
+    certify: bool,
 ) -> Points:
-    """Points with the trajectories of an archive; if `certified`, with their optimality, for objectives in ranges of the archive."""
+    """Points with the trajectories of an archive; if `certify`, with their optimality and costates, for objectives in ranges of the
+    archive."""
     if len(archive):
-        found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
-        return vectors_points(nlp, archive.Z, solver, stats, optimality=found)
+        found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
+        return vectors_points(nlp, archive.Z, solver, stats, **found)
     nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
 
@@ -52,14 +59,19 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
     )
 
 
-def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> list[float | None]:
-    """Optimality of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left when the work is to end."""
-    found: list[float | None] = [None] * len(Z)
+def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> dict[str, list[Any]]:
+    """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
+    when the work is to end. Only what is `OPTIMAL` has costates."""
+    optimality: list[float | None] = [None] * len(Z)
+    found: list[Costates | None] = [None] * len(Z)
     with suppress(Stopped):
         for k, z in enumerate(Z):
             check_stopping()
-            found[k] = optimality(nlp, z, ranges)
-    return found
+            conditions = Conditions.of(nlp, z, ranges)
+            optimality[k] = float("inf") if conditions is None else conditions.residual
+            multipliers = conditions.multipliers() if conditions is not None and conditions.residual <= OPTIMAL else None
+            found[k] = None if multipliers is None else costates(nlp, z, multipliers)
+    return {"optimality": optimality, "costates": found}
 
 
 def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:

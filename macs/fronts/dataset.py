@@ -21,8 +21,7 @@ from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 from transcription.numerics.polynomials import BASES
 
-from ..io.netcdf import Group, Labelled, words
-from .labelled import (
+from ..io.labelled import (
     COUNT,
     NUMBER,
     TEXT,
@@ -43,6 +42,7 @@ from .labelled import (
     variable_columns,
     variable_table,
 )
+from ..io.netcdf import Group, Labelled, words
 from .points import Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes
 

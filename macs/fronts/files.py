@@ -23,6 +23,7 @@ import numpy as np
 
 from ..io import netcdf
 from ..io.atomic import check_target, read_whole, sealed, unsealed, write_whole
+from ..io.labelled import checked, document, read_attribute, read_document, variable_columns
 from ..io.netcdf import Group, Labelled, words
 from .dataset import (
     CLOSEST,
@@ -38,7 +39,6 @@ from .dataset import (
     root_dataset,
     split,
 )
-from .labelled import checked, document, read_attribute, read_document, variable_columns
 from .points import Points
 from .provenance import STATS, stats_attributes
 

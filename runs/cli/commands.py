@@ -14,7 +14,7 @@ import transcription
 from macs.front import Front
 from macs.fronts.front_plot import save_picture
 from macs.fronts.pictures.style import label
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target

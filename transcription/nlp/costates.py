@@ -12,11 +12,11 @@ import numpy as np
 from ..base import NLP
 from ..trajectories.costates import Costates, PhaseCostates
 from .hamiltonian import hamiltonian, integral_weights
-from .optimality import Certificate
+from .optimality import Multipliers
 
 
-def costates(nlp: NLP, z: np.ndarray, found: Certificate, *, swept: bool = False) -> Costates | None:
-    """The costates of a vector (n,) that is optimal, from its certificate; None where they are no numbers.
+def costates(nlp: NLP, z: np.ndarray, found: Multipliers, *, swept: bool = False) -> Costates | None:
+    """The costates of a vector (n,) that is optimal, from its multipliers; None where they are no numbers.
 
     `swept`: by the adjoint equation, backward from tf, also where the multipliers of the method are costates themselves.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
@@ -19,26 +20,25 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
+SMALL = 1e-10
+"""What a multiplier of an inequality counts as a residual of its own where the smallest ones are wanted."""
 REFINEMENTS, EXACT = 3, 1e-12
 """As many at most, until what is left of the right-hand sides is this part of them."""
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
-    """How far a vector is from Pareto optimality, and its multipliers.
+class Multipliers:
+    """Multipliers of a vector of an NLP, in the user's units: up to the residual of its `optimality`, the derivatives of the sum of
+    objectives, rows and variables, each times its own, vanish.
 
     Attributes
     ----------
-    residual : float
-        See `optimality`.
     of_objectives : array (m,)
         Not negative; in the scales of the objectives they sum to 1.
     of_rows, of_bounds : arrays (r,), (n,)
-        Of the rows and of the variables' bounds, positive at upper limits: up to the residual, the derivatives of the sum of objectives,
-        rows and variables, each times its own, vanish. All in the user's units.
+        Of the rows and of the variables' bounds, positive at upper limits.
     """
 
-    residual: float
     of_objectives: np.ndarray
     of_rows: np.ndarray
     of_bounds: np.ndarray
@@ -75,36 +75,80 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         Not negative; infinite where a derivative is no number, where the equations do not determine the states, and where no multipliers
         are found.
     """
-    found = certificate(nlp, z, F_scales)
-    return float("inf") if found is None else found.residual
+    conditions = Conditions.of(nlp, z, F_scales)
+    return float("inf") if conditions is None else conditions.residual
 
 
-def certificate(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Certificate | None:
-    """The residual of `optimality` with the multipliers for which it is least; None where it is infinite."""
-    z = np.asarray(z, dtype=float)
-    found = gradients(nlp)(z)
-    dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
-    if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
-        return None
-    natural = nlp_scales(nlp)
-    scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
-    unit, used, equal = _units(nlp), np.isfinite(scales), nlp.g_lower == nlp.g_upper
-    dF = (dF * unit / scales[:, None])[used]
-    dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
-    near, sides, slack = _inequalities(nlp, z, g, dg)
-    try:
-        reduced, adjoints = _reduced(nlp, dg[equal], np.vstack([dF, -sides]))
-        residual, x = _least(reduced, slack)
-    except (RuntimeError, np.linalg.LinAlgError):
-        return None
-    if not np.isfinite(residual):
-        return None
-    of_objectives, of_rows, of_bounds = np.zeros(len(scales)), np.zeros(len(g)), np.zeros(len(z))
-    of_objectives[used], inequalities = x[: len(dF)], np.split(x[len(dF) :], np.cumsum([np.count_nonzero(one) for one in near])[:-1])
-    of_rows[equal] = -adjoints @ x
-    for target, which, sign, values in zip((of_bounds, of_bounds, of_rows, of_rows), near, (-1, 1, -1, 1), inequalities, strict=True):
-        target[which] += sign * values
-    return Certificate(residual, of_objectives / scales, of_rows / nlp.g_scale, of_bounds / unit)
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others.
+
+    Attributes
+    ----------
+    nlp : NLP
+    scales : array (m,)
+        Of the objectives; infinite for those left out.
+    near : list of arrays
+        Masks of the bounds and limits that may have a multiplier: lower and upper bounds (n,), lower and upper limits of rows (r,).
+    reduced, adjoints : arrays (d, k), (equations, k)
+        Reduced gradients of the objectives and of these inequalities, and the multipliers of the equations that belong to them.
+    slack : array
+        Of the inequalities.
+    """
+
+    nlp: NLP
+    scales: np.ndarray
+    near: list[np.ndarray]
+    reduced: np.ndarray
+    adjoints: np.ndarray
+    slack: np.ndarray
+
+    @classmethod
+    def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Conditions | None:
+        """Those at z, see `optimality`; None where they cannot be formed."""
+        z = np.asarray(z, dtype=float)
+        found = gradients(nlp)(z)
+        dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
+        if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
+            return None
+        natural = nlp_scales(nlp)
+        scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
+        unit = _units(nlp)
+        dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
+        dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
+        near, sides, slack = _inequalities(nlp, z, g, dg)
+        try:
+            reduced, adjoints = _reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides]))
+        except RuntimeError:
+            return None
+        return cls(nlp, scales, near, reduced, adjoints, slack)
+
+    @cached_property
+    def residual(self) -> float:
+        """See `optimality`."""
+        try:
+            return _least(self.reduced, self.slack)[0]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return float("inf")
+
+    def multipliers(self) -> Multipliers | None:
+        """Those that leave the least residual, and of these, where limits depend on each other, the smallest; None where none are found.
+
+        Where limits depend on each other, as do those of a state along an arc on one, their multipliers are not unique, and round-off would
+        choose among them.
+        """
+        try:
+            x = _least(self.reduced, self.slack, SMALL)[1]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return None
+        nlp, used = self.nlp, np.isfinite(self.scales)
+        of_objectives, of_rows, of_bounds = np.zeros(len(used)), np.zeros(len(nlp.g_scale)), np.zeros(len(nlp.variables))
+        of_objectives[used], rest = np.split(x, [np.count_nonzero(used)])
+        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ x
+        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in self.near])[:-1])
+        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), self.near, (-1, 1, -1, 1), each, strict=True):
+            target[which] += side * values
+        return Multipliers(of_objectives / self.scales, of_rows / nlp.g_scale, of_bounds / _units(nlp))
 
 
 def _units(nlp: NLP) -> np.ndarray:
@@ -170,14 +214,14 @@ def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
     return solution
 
 
-def _least(A: np.ndarray, slack: np.ndarray) -> tuple[float, np.ndarray]:
-    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x.
+def _least(A: np.ndarray, slack: np.ndarray, small: float = 0.0) -> tuple[float, np.ndarray]:
+    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x; with `small` nu among the residuals, too.
 
     Without that last condition, but with (sum mu - 1) among the residuals, the answer is the same up to a factor: the residual of the
     direction of x only shrinks with its length, and the length that is best is a growing function of how small it is.
     """
     k, m = len(slack), A.shape[1] - len(slack)
-    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(slack)])])
+    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(slack if not small else np.hypot(slack, small))])])
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
     x = nnls(full, right, maxiter=10 * full.shape[1])[0]

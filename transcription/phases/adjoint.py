@@ -52,8 +52,8 @@ class PhaseMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Adjoint:
-    """Costates of one phase on their own elements, and their error where it is known: by how much, in the largest costate of each state,
-    those at t0 differ from what the multipliers there say."""
+    """Costates of one phase on their own elements, and their error where it is known: the largest difference at t0 from what the
+    multipliers say there, as a part of the largest costate, all of them in scales of their states."""
 
     costates: PiecewisePolynomial
     error: float | None = None
@@ -61,8 +61,8 @@ class Adjoint:
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """What multipliers say of costates: their values (nx,) just before tf and just after t0, and by how much (k, nx) they fall at places
-    (k,) in [0, 1]."""
+    """What multipliers say of costates: their values (nx,) at tf and t0, and by how much (k, nx) they fall at places (k,) in [0, 1]; what
+    falls at the ends themselves does so within the phase."""
 
     final: np.ndarray
     initial: np.ndarray
@@ -93,18 +93,18 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
     by_x, own = by_x.reshape(*times.shape, nx, nx), own.reshape(*times.shape, nx)
     # Integrals of the Lagrange functions of the stages from the right end to the stages, and to where the results are kept.
     to_stages, to_kept = _integrals(nodes), _integrals(tau)
-    kept, p = np.empty((len(h), STAGES + 1, nx)), ending.final
+    kept, p = np.empty((len(h), STAGES + 1, nx)), ending.final + jumps[-1]
     for j in range(len(h) - 1, -1, -1):
         # Rates r_i = -(A_i'p_i + l_i) at the stages, where p_i = p + h sum_j to_stages_ij r_j.
         A = h[j] * np.einsum("iab,ij->iajb", by_x[j], to_stages).reshape(STAGES * nx, STAGES * nx)
         right = -(by_x[j] @ p + own[j]).ravel()
         rates = np.linalg.solve(np.eye(STAGES * nx) + A, right).reshape(STAGES, nx)
         kept[j] = p + h[j] * to_kept @ rates
-        p = kept[j, 0] + (jumps[j] if j else 0.0)
-    # Before what jumps at t0 itself.
-    size = np.abs(kept).max(axis=(0, 1), initial=0.0)
-    missed = np.abs(p - ending.initial) / np.where(size > 0, size, 1.0)
-    return Adjoint(PiecewisePolynomial(edges, kept, "lobatto"), float(missed.max(initial=0.0)))
+        p = kept[j, 0] + jumps[j]
+    units = np.array([v.scale for v in phase.states])
+    size = float(np.abs(kept * units).max(initial=0.0))
+    missed = float(np.abs((p - ending.initial) * units).max(initial=0.0)) / (size if size > 0 else 1.0)
+    return Adjoint(PiecewisePolynomial(edges, kept, "lobatto"), missed)
 
 
 def slopes(

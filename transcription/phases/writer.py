@@ -191,7 +191,7 @@ class PhaseWriter(ABC):
         mine = multipliers.variables
         limits = limits + np.concatenate([mine, np.zeros(len(limits) - len(mine))])
         slots, places = self.state_nodes()
-        inside = (places > 0) & (places < 1)
+        inside = (slots != self.ends.final).any(axis=1)
         index = self.layout.index
         ending = Ending(
             final=-dynamics[index(self.ends.final)],

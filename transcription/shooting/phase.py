@@ -133,7 +133,9 @@ class ShootingPhase(PhaseWriter):
         rows, points = self.step.rows, len(self.step.points)
         D, at_end = (np.array(one) for one in self._linearised(extended))
         D = D.reshape(-1, n, self.step.inputs).swapaxes(0, 1)[:, :, :nx]
-        steps = Steps(D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx), at_end.reshape(-1, self.step.inputs)[:, :nx])
+        steps = Steps(
+            D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx), at_end.reshape(-1, self.step.inputs)[:, :nx]
+        )
         seen = np.array([*multipliers.paths, *multipliers.peaks]).reshape(self.W.shape[::-1]).T
         inside = self.mesh.ends[1:-1]
         falls = np.zeros((n, nx))

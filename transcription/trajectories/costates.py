@@ -27,8 +27,8 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     polynomial : PiecewisePolynomial
         The costates between the nodes.
     error : float or None
-        Of costates that were integrated backward: by how much they miss, in the largest one of each state, what the multipliers say at t0.
-        None for those that are multipliers themselves.
+        Of costates that were integrated backward: the largest difference at t0 from what the multipliers say there, as a part of the
+        largest costate, all in scales of their states. None for those that are multipliers themselves, or follow from these exactly.
     """
 
     names: tuple[str, ...]
