@@ -252,6 +252,7 @@ class _Job:
         self._rng = np.random.default_rng(self._seed)
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
+        self._sole: np.ndarray | None = None
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
         if transcription is not None:
@@ -288,6 +289,7 @@ class _Job:
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
         """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is
         found for it."""
+        self._sole = reference < np.inf
         if self.fixed:
             return self.run(lambda: self.front([self.solver.solve(reference, weights)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
@@ -315,7 +317,7 @@ class _Job:
                 self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
                 status=[found.status],
                 notes=[found.note],
-                **certified(found.nlp, found.z[None], None),
+                **certified(found.nlp, found.z[None], None, self._sole),
             )
             return Front.of(points).verify(verify)
 
@@ -392,7 +394,7 @@ class _Job:
         """The results as a front, with their optimality and costates; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         status = [solved.status for solved in found]
-        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges), **more))
+        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more))
 
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts

@@ -12,6 +12,7 @@ from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
 from transcription.nlp.costates import costates
 from transcription.nlp.optimality import Conditions
+from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
@@ -59,9 +60,10 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
     )
 
 
-def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> dict[str, list[Any]]:
+def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None = None) -> dict[str, list[Any]]:
     """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
-    when the work is to end. Only what is `OPTIMAL` has costates."""
+    when the work is to end. Only what is `OPTIMAL` has costates; if it is so for the objectives of a mask `sole` (m,) by themselves, theirs:
+    at an end of a front, other weights may do as well."""
     optimality: list[float | None] = [None] * len(Z)
     found: list[Costates | None] = [None] * len(Z)
     with suppress(Stopped):
@@ -69,7 +71,9 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> dict[str, l
             check_stopping()
             conditions = Conditions.of(nlp, z, ranges)
             optimality[k] = float("inf") if conditions is None else conditions.residual
-            multipliers = conditions.multipliers() if conditions is not None and conditions.residual <= OPTIMAL else None
+            some = None if sole is None else Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
+            best = next((one for one in (some, conditions) if one is not None and one.residual <= OPTIMAL), None)
+            multipliers = None if best is None else best.multipliers()
             found[k] = None if multipliers is None else costates(nlp, z, multipliers)
     return {"optimality": optimality, "costates": found}
 
