@@ -394,7 +394,9 @@ class _Job:
         """The results as a front, with their optimality and costates; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         status = [solved.status for solved in found]
-        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more))
+        return Front.of(
+            vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
+        )
 
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts

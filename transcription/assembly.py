@@ -26,6 +26,8 @@ from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
+TRUSTED = 1e-3
+"""Largest error of costates by the adjoint equation that are preferred to those of a method."""
 
 WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 
@@ -192,12 +194,8 @@ class Assembly:
 
     def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
         """See `NLP.adjoint`; multipliers by phase."""
-        extended, found = self.layout.extended(np.asarray(z, dtype=float)[None])[0], {}
-        for writer in self._declared:
-            own = multipliers[writer.phase.name]
-            known = None if swept else writer.costates(extended, own.dynamics)
-            found[writer.phase.name] = writer.swept(extended, own) if known is None else Adjoint(known)
-        return found
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        return {name: _adjoint(writer, extended, multipliers[name], swept) for name, writer in ((w.phase.name, w) for w in self._declared)}
 
     def _split(
         self, rows: Rows, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]
@@ -305,6 +303,16 @@ class Assembly:
         for first, second, scale, label in self._joined:
             ends = self.layout.pick(extended, np.array([first, second]))
             rows.add(ends[0] - ends[1], 0, 0, scale, label)
+
+
+def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers, swept: bool) -> Adjoint:
+    """The costates of one phase. Polynomials of a method do not jump inside its elements, where multipliers of limits of states do: there,
+    those by the adjoint equation are better."""
+    known = None if swept else writer.costates(extended, multipliers.dynamics)
+    if known is not None and not writer.limited(multipliers):
+        return Adjoint(known)
+    found = writer.swept(extended, multipliers)
+    return found if known is None or (found.error or 0.0) <= TRUSTED else Adjoint(known)
 
 
 def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:

@@ -250,8 +250,8 @@ class NLP(Deriving):
         multipliers say nothing between their places.
     adjoint : callable
         A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
-        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, and,
-        if `swept` (a keyword), everywhere.
+        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, or
+        limits of states have multipliers; if `swept` (a keyword), everywhere.
     measure : callable
         () -> `quantities`.
     parts : Parts, optional

@@ -62,8 +62,11 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
 
 def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None = None) -> dict[str, list[Any]]:
     """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
-    when the work is to end. Only what is `OPTIMAL` has costates; if it is so for the objectives of a mask `sole` (m,) by themselves, theirs:
-    at an end of a front, other weights may do as well."""
+    when the work is to end.
+
+    Only what is `OPTIMAL` has costates: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
+    may do as well at an end of a front.
+    """
     optimality: list[float | None] = [None] * len(Z)
     found: list[Costates | None] = [None] * len(Z)
     with suppress(Stopped):

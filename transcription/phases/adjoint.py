@@ -17,6 +17,7 @@ from problems.compiled import CompiledPhase
 from problems.derived import remembered
 
 from ..numerics.batched import Batched, expanded
+from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix, gauss_legendre, lobatto_nodes
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 
@@ -88,7 +89,8 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
     nodes, _ = gauss_legendre(STAGES)
     h, tau = 0.5 * np.diff(edges), lobatto_nodes(STAGES + 1)
     times = edges[:-1, None] + h[:, None] * (1.0 + nodes)
-    x, u = trajectory.state(times).reshape(-1, nx), _controls(trajectory, times)
+    x = trajectory.state(times).reshape(times.size, -1)
+    u = wrapped(trajectory.control(times), phase.controls).reshape(times.size, -1 if phase.controls else 0)
     by_x, own = slopes(phase, x, u, times.ravel(), s, weights)
     by_x, own = by_x.reshape(*times.shape, nx, nx), own.reshape(*times.shape, nx)
     # Integrals of the Lagrange functions of the stages from the right end to the stages, and to where the results are kept.
@@ -124,11 +126,6 @@ def _slopes(phase: CompiledPhase) -> Batched:
     weights = ca.MX.sym("w", phase.integrands.size1_out(0))
     values = ca.jacobian(phase.dynamics(*inputs), inputs[0]), ca.gradient(ca.dot(phase.integrands(*inputs), weights), inputs[0])
     return Batched(expanded(ca.Function("slopes", [*inputs, weights], [ca.densify(one) for one in values])))
-
-
-def _controls(trajectory: PhaseTrajectory, times: np.ndarray) -> np.ndarray:
-    values = trajectory.control(times)
-    return values.reshape(-1, values.shape[-1])
 
 
 def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

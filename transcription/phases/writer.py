@@ -202,6 +202,12 @@ class PhaseWriter(ABC):
         s = extended[index(self.ends.statics)]
         return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
 
+    def limited(self, multipliers: PhaseMultipliers) -> bool:
+        """Whether a limit of states, a path constraint or a peak has a multiplier before tf."""
+        slots = self.state_nodes()[0]
+        between = slots[(slots >= 0) & (slots != self.ends.final)]
+        return any(np.any(one) for one in (multipliers.variables[between], *multipliers.paths, *multipliers.peaks))
+
     def _columns(self, multipliers: PhaseMultipliers) -> tuple[np.ndarray, ...]:
         """Multipliers as inputs of `_by_states`."""
         paths, peaks = (np.concatenate([np.empty(0), *several]) for several in (multipliers.paths, multipliers.peaks))
