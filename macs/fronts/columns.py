@@ -51,6 +51,16 @@ def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | 
     return tuple(found)
 
 
+def padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
+    """Arrays of the same rank in one, NaN where they end; `like` is the shape to take where there is none."""
+    shapes = [row.shape for row in rows if row is not None] or [like]
+    padded = np.full((len(rows), *np.max(shapes, axis=0)), np.nan)
+    for i, row in enumerate(rows):
+        if row is not None:
+            padded[i][tuple(slice(length) for length in row.shape)] = row
+    return padded
+
+
 @dataclass(frozen=True, eq=False)
 class Decisions:
     """n decision vectors as one table, a column for each variable that any of them has.
