@@ -184,12 +184,13 @@ class Point:
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
 
     def plot(self, figure: Any = None) -> np.ndarray:
-        """Axes with the states, controls and path constraints over time, one for each of them."""
+        """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
+        there are any."""
         from .pictures.flight_plot import draw_flight
 
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
-        return draw_flight(self.trajectory, self.title, figure)
+        return draw_flight(self.trajectory, self.title, figure, self.costates)
 
     @property
     def title(self) -> str:

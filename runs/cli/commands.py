@@ -254,6 +254,9 @@ def describe(front: Front, point: Point) -> str:
         "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,
+        "costates are those of the sum of objectives, minimised, times": {
+            name: f"{one:.6g}" for name, one in (point.weights or {}).items()
+        },
     }
     lines = [front.table().splitlines()[0], ""]
     for title, values in groups.items():

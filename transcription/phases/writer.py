@@ -21,6 +21,9 @@ from .layout import Layout
 from .pointwise import Pointwise
 from .state_equations import StateEquations
 
+NEGLIGIBLE = 1e-8
+"""Multipliers of limits that are smaller than this part of the costates are none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ends:
@@ -203,10 +206,15 @@ class PhaseWriter(ABC):
         return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
 
     def limited(self, multipliers: PhaseMultipliers) -> bool:
-        """Whether a limit of states, a path constraint or a peak has a multiplier before tf."""
-        slots = self.state_nodes()[0]
-        between = slots[(slots >= 0) & (slots != self.ends.final)]
-        return any(np.any(one) for one in (multipliers.variables[between], *multipliers.paths, *multipliers.peaks))
+        """Whether a limit of states, a path constraint or a peak has a multiplier before tf that counts for something beside costates, both
+        in the scales of what they belong to."""
+        phase, slots = self.phase, self.state_nodes()[0]
+        scales = np.array([v.scale for v in phase.states])
+        between = (slots >= 0) & (slots != self.ends.final)
+        of_states = np.where(between, multipliers.variables[np.where(between, slots, 0)], 0.0) * scales
+        of_paths = [limit.scale * one for limit, one in zip(phase.paths, multipliers.paths, strict=True)]
+        least = NEGLIGIBLE * np.abs(multipliers.dynamics.reshape(-1, len(scales)) * scales).max(initial=0.0)
+        return any(np.abs(one).max(initial=0.0) > least for one in (of_states, *of_paths, *multipliers.peaks))
 
     def _columns(self, multipliers: PhaseMultipliers) -> tuple[np.ndarray, ...]:
         """Multipliers as inputs of `_by_states`."""
