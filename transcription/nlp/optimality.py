@@ -20,8 +20,9 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
-SMALL = 1e-10
-"""What a multiplier of an inequality counts as a residual of its own where the smallest ones are wanted."""
+SMALL = 1e-6
+"""What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
+that the residual asks for, far more than round-off."""
 REFINEMENTS, EXACT = 3, 1e-12
 """As many at most, until what is left of the right-hand sides is this part of them."""
 
@@ -132,13 +133,13 @@ class Conditions:
             return float("inf")
 
     def multipliers(self) -> Multipliers | None:
-        """Those that leave the least residual, and of these, where limits depend on each other, the smallest; None where none are found.
+        """Those that leave the least residual; None where none are found.
 
-        Where limits depend on each other, as do those of a state along an arc on one, their multipliers are not unique, and round-off would
-        choose among them.
+        Where limits depend on each other, as do those of a state along an arc on one, or of a mass and of the thrust while it is off, they
+        are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others.
         """
         try:
-            x = _least(self.reduced, self.slack, SMALL)[1]
+            x = _least(self.reduced, self.slack, SMALL * np.concatenate(self._others()))[1]
         except (RuntimeError, np.linalg.LinAlgError):
             return None
         nlp, used = self.nlp, np.isfinite(self.scales)
@@ -149,6 +150,11 @@ class Conditions:
         for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), self.near, (-1, 1, -1, 1), each, strict=True):
             target[which] += side * values
         return Multipliers(of_objectives / self.scales, of_rows / nlp.g_scale, of_bounds / _units(nlp))
+
+    def _others(self) -> list[np.ndarray]:
+        """Masks of the inequalities, group by group, that are no bounds of free variables."""
+        kept = np.setdiff1d(np.arange(len(self.nlp.variables)), self.nlp.free)
+        return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.near)]
 
 
 def _units(nlp: NLP) -> np.ndarray:
@@ -214,14 +220,14 @@ def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
     return solution
 
 
-def _least(A: np.ndarray, slack: np.ndarray, small: float = 0.0) -> tuple[float, np.ndarray]:
-    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x; with `small` nu among the residuals, too.
+def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) -> tuple[float, np.ndarray]:
+    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x; with nu times `small` among the residuals, too.
 
     Without that last condition, but with (sum mu - 1) among the residuals, the answer is the same up to a factor: the residual of the
     direction of x only shrinks with its length, and the length that is best is a growing function of how small it is.
     """
     k, m = len(slack), A.shape[1] - len(slack)
-    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(slack if not small else np.hypot(slack, small))])])
+    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(np.hypot(slack, small))])])
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
     x = nnls(full, right, maxiter=10 * full.shape[1])[0]
