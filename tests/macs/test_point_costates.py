@@ -72,7 +72,7 @@ def refined(name: str):
     [
         ("brachistochrone", -1.0),
         ("car", -1.0),
-        ("hang_glider", 0.0),
+        pytest.param("hang_glider", 0.0, marks=pytest.mark.slow),
         ("linear_tangent", -1.0),
         ("moon_landing", 0.0),
         ("robot_arm", -1.0),
