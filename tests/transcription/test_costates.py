@@ -7,6 +7,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
+from euler import Euler
 
 from problems import Problem, load
 from problems.cases import goddard
@@ -19,9 +20,9 @@ WORDS = ["dfet:8x6", "dfet:8x6:bernstein", "multiple-shooting:30:linear", "shoot
 """Methods and meshes that resolve the optima here."""
 
 
-def solved(problem, word: str, reference=None, weights=None):
+def solved(problem, word, reference=None, weights=None):
     """The NLP and its optimum: by default of the first objective alone."""
-    nlp = parse(word).nlp(problem.compile())
+    nlp = (parse(word) if isinstance(word, str) else word).nlp(problem.compile())
     m = len(nlp.problem.goals)
     own = np.arange(m) == 0
     middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])
@@ -64,7 +65,7 @@ def test_the_ascent_has_the_costates_of_the_linear_tangent_law(word, flight_time
     ascent, flown = found["ascent"], trajectory["ascent"]
     weights, closed = tangent_law(flown.tf, flown.time)
     # The more curved the law, the longer the steps of shooting are for it.
-    tolerance = 1e-4 if flight_time > 200 or word.startswith("dfet") else 1e-3
+    tolerance = 1e-4 if flight_time > 200 or "shooting" not in word else 1e-3
     assert found.weights == pytest.approx(weights, rel=tolerance)
     for name, values in closed.items():
         assert ascent[name] == pytest.approx(values, abs=tolerance * (np.abs(values).max() + 1e-3)), name
@@ -76,8 +77,21 @@ def test_by_the_adjoint_equation_they_are_the_same():
         _, own = adjoint(pendulum(0.4), word)
         _, other = adjoint(pendulum(0.4), word, swept=True)
         assert other["run"].error < 1e-6
-        assert own["run"].at_nodes == pytest.approx(other["run"].at_nodes, abs=1e-5 * np.abs(own["run"].at_nodes).max())
+        assert own["run"].at_nodes == pytest.approx(other["run"].at_nodes, abs=2e-5 * np.abs(own["run"].at_nodes).max())
         assert own["run"].error is None
+
+
+def test_a_method_that_knows_none_gets_them_by_the_adjoint_equation():
+    """Euler's, whose states are straight lines between nodes: with errors of order 1, of which `error` tells."""
+    errors = []
+    for steps in (50, 100):
+        nlp, found = solved(pendulum(0.4), Euler(steps))
+        run = costates(nlp, found.z, Conditions.of(nlp, found.z).multipliers())["run"]
+        _, fine = adjoint(pendulum(0.4), "dfet:8x5")
+        away = np.abs(run.at_nodes - fine["run"].polynomial(nlp.unpack(found.z)["run"].time)).max() / np.abs(run.at_nodes).max()
+        errors.append((away, run.error))
+    assert np.array(errors[1]) == pytest.approx(0.5 * np.array(errors[0]), rel=0.3)
+    assert errors[1][0] < 0.05 and 0.1 * errors[1][0] < errors[1][1] < 10 * errors[1][0]
 
 
 # What a unit of the initial state is worth: the costate at t0 is the derivative of the optimum.
@@ -223,7 +237,7 @@ def test_costates_jump_at_one_instant(word):
     """At a wall of 0.2, which is touched at 1/2 only, u = a + b t with b = 24 (1 - 4 wall) before, and -b after it."""
     trajectory, found = adjoint(load("standard/bryson_denham", wall=0.2), word)
     move, time = found["move"], trajectory["move"].time
-    assert move["x"] == pytest.approx(np.where(time < 0.5, 4.8, -4.8), rel=2e-3), "right-continuous at the node itself"
+    assert move["x"] == pytest.approx(np.where(time < 0.5, 4.8, -4.8), rel=1e-2), "right-continuous at the node itself"
     assert 0.5 in time
 
 
@@ -270,7 +284,7 @@ def two_legs(parts: int) -> Problem:
 def test_costates_go_on_across_links(words):
     whole_trajectory, whole = adjoint(two_legs(1), words[0])
     trajectory, split = adjoint(two_legs(2), words[1])
-    assert split["leg0"].at_nodes[-1] == pytest.approx(split["leg1"].at_nodes[0], rel=1e-6)
+    assert split["leg0"].at_nodes[-1] == pytest.approx(split["leg1"].at_nodes[0], abs=1e-6)
     assert split["leg0"].hamiltonian[-1] == pytest.approx(split["leg1"].hamiltonian[0], rel=1e-4)
     for name, phase in trajectory.items():
         assert split[name].at_nodes == pytest.approx(whole["leg0"].polynomial(phase.time), abs=2e-3)
