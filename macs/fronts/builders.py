@@ -24,7 +24,7 @@ from .point import Point
 from .points import Points
 
 OPTIMAL = 1e-3
-"""Largest `optimality` of points whose multipliers are costates."""
+"""Largest `optimality`, and largest violation, of points whose multipliers are costates."""
 
 
 def trajectory_points(
@@ -75,7 +75,8 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
             conditions = Conditions.of(nlp, z, ranges)
             optimality[k] = float("inf") if conditions is None else conditions.residual
             some = None if sole is None else Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
-            best = next((one for one in (some, conditions) if one is not None and one.residual <= OPTIMAL), None)
+            feasible = nlp.evaluate(z[None])[1][0] <= OPTIMAL
+            best = next((one for one in (some, conditions) if feasible and one is not None and one.residual <= OPTIMAL), None)
             multipliers = None if best is None else best.multipliers()
             found[k] = None if multipliers is None else costates(nlp, z, multipliers)
     return {"optimality": optimality, "costates": found}

@@ -131,8 +131,8 @@ class Point:
         its weight (`weights`). Where they jump, as at limits of states, they are those just after; at the end of a phase those just
         before. A costate is in units of that sum per unit of the state.
 
-        None where there is no trajectory, where `optimality` was not computed, and where it exceeds 1e-3: then the multipliers are no
-        costates.
+        None where there is no trajectory, where `optimality` was not computed, and where it or the violation exceeds 1e-3: then the
+        multipliers are no costates.
         """
         return self._points.costates[self.index]
 

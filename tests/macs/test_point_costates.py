@@ -11,7 +11,7 @@ from synthetic_fronts import black_box
 
 from macs import MACS, Front, optimize, sweep
 from macs.fronts.dataset import phase_dataset, root_dataset
-from problems import load
+from problems import Problem, load
 from problems.cases import goddard
 from runs.cli import main
 from transcription import parse
@@ -131,6 +131,18 @@ def test_points_that_are_not_optimal_have_none():
 def test_a_black_box_and_a_simulated_point_have_none(ascents):
     assert black_box()[0].costates is black_box()[0].weights is None
     assert all(point.costates is None for point in ascents[:2].simulate())
+
+
+def test_where_nothing_is_feasible_there_are_none():
+    problem = Problem("too far")
+    run = problem.phase("run", t0=0, tf=1)
+    x = run.state("x", bounds=(0, 9), initial=0, final=5)
+    u = run.control("u", bounds=(-1, 1))
+    run.dynamics(x=u + 0 * x)
+    problem.minimize("effort", run.integral(u**2))
+    point = optimize(problem, parse("dfet:4x3"))
+    assert point.status != "converged" and point.costates is None
+    assert point.plot().shape == (2,)
 
 
 # Files and pictures.

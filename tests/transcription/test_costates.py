@@ -291,7 +291,10 @@ def test_costates_go_on_across_links(words):
     assert whole["leg0"].hamiltonian == pytest.approx(np.full(len(whole_trajectory["leg0"].time), whole["leg0"].hamiltonian[0]), abs=1e-2)
 
 
-def test_a_phase_without_length_and_one_without_controls():
+@pytest.mark.parametrize(
+    ("word", "swept"), [("dfet:4x3", False), ("dfet:4x3", True), ("multiple-shooting:6", False), ("shooting:7", False)]
+)
+def test_a_phase_without_length_and_one_without_controls(word, swept):
     problem = Problem("stop")
     fall = problem.phase("fall", t0=0, tf=(0, 1))
     h = fall.state("h", bounds=(-5, 5), initial=2)
@@ -302,7 +305,7 @@ def test_a_phase_without_length_and_one_without_controls():
     climb.dynamics(h=u)
     problem.link(fall, climb)
     problem.minimize("time", climb.tf + 0 * fall.final(h) + 0 * climb.final(g))
-    trajectory, found = adjoint(problem, "dfet:4x3")
+    trajectory, found = adjoint(problem, word, swept=swept)
     assert trajectory["fall"].tf < 1e-6
     assert all(np.isfinite(one.at_nodes).all() and np.isfinite(one.hamiltonian).all() for one in found.values())
     # A unit higher is half a unit of time less.
