@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from itertools import pairwise
 
 import casadi as ca
+import h5py
 import numpy as np
 import pytest
 from synthetic_fronts import black_box
 
 from macs import MACS, Front, optimize, sweep
+from macs.fronts import files
 from macs.fronts.dataset import phase_dataset, root_dataset
+from macs.io.atomic import sealed, unsealed
 from problems import Problem, load
 from problems.cases import goddard
 from runs.cli import main
@@ -179,6 +183,47 @@ def test_a_file_without_any_has_no_array_of_them(ascents):
     plain = ascents.replace(costates=[None] * len(ascents))
     arrays = {*root_dataset(plain).arrays, *phase_dataset(plain, "ascent").arrays}
     assert not [name for name in arrays if "costate" in name or name in ("hamiltonian", "weights")]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "why"),
+    [
+        ("ascent/costate_edge_count", 3, "elements of its costates"),
+        ("ascent/costate_element_count", -1, "elements of its costates"),
+        ("ascent/costate_function_count", 99, "elements of its costates"),
+        ("ascent/costate_basis", "fourier", "no known basis"),
+        ("ascent/hamiltonian", None, "'hamiltonian' is missing"),
+        ("ascent/costate_of_y", None, "'costate_of_y' is missing"),
+        ("weights", np.nan, "without weights"),
+        ("weights", None, "without weights"),
+    ],
+)
+def test_a_forged_file_is_refused(ascents, tmp_path, name, change, why):
+    buffer = io.BytesIO(unsealed(files.to_bytes(ascents[:3])))
+    with h5py.File(buffer, "r+") as file:
+        if change is None:
+            del file[name]
+        else:
+            file[name][1] = change
+    (tmp_path / "front.nc").write_bytes(sealed(buffer.getvalue()))
+    with pytest.raises(ValueError, match=why):
+        Front.load(tmp_path / "front.nc")
+
+
+def test_a_state_may_be_called_hamiltonian(tmp_path):
+    problem = Problem("names")
+    run = problem.phase("run", t0=0, tf=1)
+    x = run.state("hamiltonian", bounds=(-9, 9), initial=0, final=1)
+    y = run.state("costate of x", bounds=(-9, 9), initial=0)
+    u = run.control("u", bounds=(-9, 9))
+    run.dynamics(**{"hamiltonian": u, "costate of x": x + 0 * y})
+    problem.minimize("effort", run.integral(u**2))
+    front = Front.of(optimize(problem, parse("dfet:2x3")).alone())
+    front.save(tmp_path / "front.nc")
+    loaded = Front.load(tmp_path / "front.nc")
+    assert same(front[0], loaded[0])
+    assert loaded.to_xarray("run")["hamiltonian"].values[0, -1] == pytest.approx(1.0)
+    assert loaded.to_xarray("run")["costate_hamiltonian"].attrs["long_name"] == "Hamiltonian"
 
 
 def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):

@@ -64,8 +64,7 @@ def test_the_ascent_has_the_costates_of_the_linear_tangent_law(word, flight_time
     trajectory, found = adjoint(load("goddard"), word, reference=np.array([flight_time, 0.0]), weights=np.array([0.0, 1.0]))
     ascent, flown = found["ascent"], trajectory["ascent"]
     weights, closed = tangent_law(flown.tf, flown.time)
-    # The more curved the law, the longer the steps of shooting are for it.
-    tolerance = 1e-4 if flight_time > 200 or "shooting" not in word else 1e-3
+    tolerance = 1e-4
     assert found.weights == pytest.approx(weights, rel=tolerance)
     for name, values in closed.items():
         assert ascent[name] == pytest.approx(values, abs=tolerance * (np.abs(values).max() + 1e-3)), name
