@@ -62,13 +62,14 @@ class Adjoint:
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """What multipliers say of costates: their values (nx,) at tf and t0, and by how much (k, nx) they fall at places (k,) in [0, 1]; what
-    falls at the ends themselves does so within the phase."""
+    """What multipliers say of costates: their values (nx,) at tf and t0, and by how much (k, nx) they fall at places (k,) in [0, 1], by
+    jumps there and spread about these places; what falls at the ends themselves does so within the phase."""
 
     final: np.ndarray
     initial: np.ndarray
     places: np.ndarray
     jumps: np.ndarray
+    spread: np.ndarray
 
 
 def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weights: np.ndarray, ending: Ending) -> Adjoint:
@@ -85,7 +86,8 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
     ending : Ending
     """
     t0, length, nx = trajectory.t0, trajectory.tf - trajectory.t0, len(phase.states)
-    edges, jumps = _pieces(trajectory, t0 + length * ending.places, ending.jumps)
+    cells, densities = _cells(t0 + length * ending.places, ending.spread, trajectory)
+    edges, jumps = _pieces(trajectory, t0 + length * ending.places, ending.jumps, cells)
     nodes, _ = gauss_legendre(STAGES)
     h, tau = 0.5 * np.diff(edges), lobatto_nodes(STAGES + 1)
     times = edges[:-1, None] + h[:, None] * (1.0 + nodes)
@@ -93,6 +95,8 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
     u = wrapped(trajectory.control(times), phase.controls).reshape(times.size, -1 if phase.controls else 0)
     by_x, own = slopes(phase, x, u, times.ravel(), s, weights)
     by_x, own = by_x.reshape(*times.shape, nx, nx), own.reshape(*times.shape, nx)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    own += densities[np.clip(np.searchsorted(cells, middles) - 1, 0, len(densities) - 1)][:, None]
     # Integrals of the Lagrange functions of the stages from the right end to the stages, and to where the results are kept.
     to_stages, to_kept = _integrals(nodes), _integrals(tau)
     kept, p = np.empty((len(h), STAGES + 1, nx)), ending.final + jumps[-1]
@@ -128,9 +132,23 @@ def _slopes(phase: CompiledPhase) -> Batched:
     return Batched(expanded(ca.Function("slopes", [*inputs, weights], [ca.densify(one) for one in values])))
 
 
-def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cells(times: np.ndarray, falls: np.ndarray, trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of cells (k + 1,) about these times, halfway between them, and how steeply (k, nx) costates fall in each; one cell over the
+    whole phase where nothing falls."""
+    whole = np.array([trajectory.t0, trajectory.tf])
+    if not falls.any():
+        return whole, np.zeros((1, falls.shape[1]))
+    nodes = np.unique(times)
+    total = np.zeros((len(nodes), falls.shape[1]))
+    np.add.at(total, np.searchsorted(nodes, times), falls)
+    cells = np.concatenate([whole[:1], 0.5 * (nodes[1:] + nodes[:-1]), whole[1:]])
+    widths = np.diff(cells)[:, None]
+    return cells, np.where(widths > 0, total / np.where(widths > 0, widths, 1.0), 0.0)
+
+
+def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray, further: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ends of pieces (N + 1,) within which states, controls and costates are smooth, and the jumps (N + 1, nx) there."""
-    every = np.sort(np.concatenate([trajectory.state.edges, trajectory.control.edges, times]))
+    every = np.sort(np.concatenate([trajectory.state.edges, trajectory.control.edges, times, further]))
     every = np.clip(every, trajectory.t0, trajectory.tf)
     apart = np.diff(every) > SAME * (trajectory.tf - trajectory.t0)
     edges = every[np.append(True, apart)]

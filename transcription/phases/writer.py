@@ -187,10 +187,10 @@ class PhaseWriter(ABC):
         """The costates of the phase by the adjoint equation, integrated backward along one extended vector that is optimal.
 
         At tf they are the derivatives of the Lagrangian by the final states, as far as these belong to the phase's dynamics and integrals:
-        whatever else the method or the problem makes of them follows tf. Limits of states, path constraints and peaks make them jump, at
-        the nodes of the states in which these are written.
+        whatever else the method or the problem makes of them follows tf. Limits of states, path constraints on states alone and peaks make
+        them jump, at the nodes of the states in which these are written; what other path constraints do there is spread between the nodes.
         """
-        dynamics, limits = (np.array(one).ravel() for one in self._by_states(extended, *self._columns(multipliers)))
+        dynamics, limits, mixed = (np.array(one).ravel() for one in self._by_states(extended, *self._columns(multipliers)))
         mine = multipliers.variables
         limits = limits + np.concatenate([mine, np.zeros(len(limits) - len(mine))])
         slots, places = self.state_nodes()
@@ -201,38 +201,47 @@ class PhaseWriter(ABC):
             initial=dynamics[index(self.ends.initial)],
             places=places[inside],
             jumps=limits[index(slots)].reshape(slots.shape)[inside],
+            spread=mixed[index(slots)].reshape(slots.shape)[inside],
         )
         s = extended[index(self.ends.statics)]
         return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
 
     def limited(self, multipliers: PhaseMultipliers) -> bool:
-        """Whether a limit of states, a path constraint or a peak has a multiplier before tf that counts for something beside costates, both
-        in the scales of what they belong to."""
+        """Whether limits that make costates jump have a multiplier before tf that counts for something beside costates, both in the scales
+        of what they belong to: limits of states, path constraints on states alone, and peaks."""
         phase, slots = self.phase, self.state_nodes()[0]
         scales = np.array([v.scale for v in phase.states])
         between = (slots >= 0) & (slots != self.ends.final)
         of_states = np.where(between, multipliers.variables[np.where(between, slots, 0)], 0.0) * scales
-        of_paths = [limit.scale * one for limit, one in zip(phase.paths, multipliers.paths, strict=True)]
+        jumping = zip(phase.paths, multipliers.paths, self._mixed, strict=True)
+        of_paths = [limit.scale * one for limit, one, mixed in jumping if not mixed]
         least = NEGLIGIBLE * np.abs(multipliers.dynamics.reshape(-1, len(scales)) * scales).max(initial=0.0)
         return any(np.abs(one).max(initial=0.0) > least for one in (of_states, *of_paths, *multipliers.peaks))
+
+    @cached_property
+    def _mixed(self) -> list[bool]:
+        """Which of the path constraints depend on controls: their multipliers are densities."""
+        rows, _ = self.phase.path.jac_sparsity(0, 1).get_triplet()
+        return [k in rows for k in range(len(self.phase.paths))]
 
     def _columns(self, multipliers: PhaseMultipliers) -> tuple[np.ndarray, ...]:
         """Multipliers as inputs of `_by_states`."""
         paths, peaks = (np.concatenate([np.empty(0), *several]) for several in (multipliers.paths, multipliers.peaks))
-        return multipliers.dynamics, paths, peaks, multipliers.integrals
+        mixed = np.concatenate([np.empty(0), *(np.full(len(one), of_u) for one, of_u in zip(multipliers.paths, self._mixed, strict=True))])
+        return multipliers.dynamics, np.where(mixed, 0.0, paths), np.where(mixed, paths, 0.0), peaks, multipliers.integrals
 
     @cached_property
     def _by_states(self) -> ca.Function:
-        """(extended vector, multipliers of dynamics, paths, peaks and integrals) -> derivatives by the extended vector of the Lagrangian's
-        terms of dynamics and integrals, and of those of paths and peaks."""
+        """(extended vector, multipliers of dynamics, path constraints on states alone, others, peaks and integrals) -> derivatives by the
+        extended vector of the Lagrangian's terms of dynamics and integrals, of those that make costates jump, and of the others."""
         extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
         written = self.write(self.fill(extended), rows)
         g, name = ca.vertcat(*rows.expressions), self.phase.name
         paths = ca.vertcat(ca.MX(0, 1), *(g[one] for one in rows.samples.get((name, "path"), ())))
-        columns = [g[rows.dynamics[name]], paths, ca.vec(written.peak_samples.T), written.integrals]
+        columns = [g[rows.dynamics[name]], paths, paths, ca.vec(written.peak_samples.T), written.integrals]
         symbols = [ca.MX.sym(f"of_{k}", one.numel()) for k, one in enumerate(columns)]
-        dynamics, of_paths, of_peaks, integrals = (ca.dot(*one) for one in zip(columns, symbols, strict=True))
-        outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_paths + of_peaks)]
+        dynamics, of_states, mixed, of_peaks, integrals = (ca.dot(*one) for one in zip(columns, symbols, strict=True))
+        outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_states + of_peaks, mixed)]
         return ca.Function("by_states", [extended, *symbols], outputs)
 
     def fill(self, extended: ca.MX) -> ca.MX:
