@@ -202,8 +202,8 @@ FINE = {"dfet": "dfet:24x3", "single": "shooting:61:linear", "multiple": "multip
 @pytest.mark.parametrize("method", FINE)
 @pytest.mark.parametrize("name", STATEMENTS)
 def test_the_first_costate_is_the_slope_of_the_optimum(name, method):
-    """On the mesh itself, so that the slope is exact but for the differences; and but for what a constraint that is active at t0 does there,
-    which is a share of a step."""
+    """On the mesh itself, so that the slope is exact but for the differences; and but for what a constraint that is active at t0 does
+    there, which is a share of a step."""
     statement: Callable[[float], Problem] = STATEMENTS[name]
     x0, step = STARTS.get(name, 0.1), 1e-3
     _, found = adjoint(statement(x0), FINE[method])
@@ -230,13 +230,13 @@ def test_what_path_constraints_on_controls_do_is_spread():
 def test_methods_agree_along_the_whole_way(name):
     """Also where a limit pushes, in the mean over a short while: there costates of a mesh are steps."""
     places = np.linspace(0.025, 0.975, 20)[:, None] + np.linspace(-0.025, 0.025, 26)[:-1]
-    means = []
+    means: list[np.ndarray] = []
     for word in FINE.values():
         trajectory, found = adjoint(STATEMENTS[name](STARTS.get(name, 0.1)), word)
         means.append(found["run"].polynomial(trajectory["run"].tf * places).mean(axis=1))
     size = np.abs(means[0]).max()
-    assert means[1] == pytest.approx(means[0], abs=0.03 * size)
-    assert means[2] == pytest.approx(means[0], abs=0.03 * size)
+    for other in means[1:]:
+        assert other == pytest.approx(means[0], abs=0.03 * size)
 
 
 # Jumps at limits of states.
