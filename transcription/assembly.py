@@ -16,6 +16,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import NLP, Profile, Transcription
 from .numerics.batched import Batched, expanded
+from .phases.adjoint import Adjoint, PhaseMultipliers
 from .phases.guess import along
 from .phases.layout import Layout
 from .phases.pointwise import Parts, Pointwise
@@ -25,6 +26,8 @@ from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
+TRUSTED = 1e-3
+"""Largest error of costates by the adjoint equation that are preferred to those of a method."""
 
 WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 
@@ -95,6 +98,8 @@ class Assembly:
             interpolate=self.interpolate,
             costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
             widen=self.widened,
+            measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
+            adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
@@ -207,6 +212,24 @@ class Assembly:
         found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
         return {name: costates for name, costates in found.items() if costates is not None}
 
+    def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
+        """See `NLP.adjoint`; multipliers by phase."""
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        return {name: _adjoint(writer, extended, multipliers[name], swept) for name, writer in ((w.phase.name, w) for w in self._declared)}
+
+    def _split(
+        self, rows: Rows, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]
+    ) -> dict[str, PhaseMultipliers]:
+        """Multipliers of rows (r,) and of bounds (n,), and the weights of integrals, by phase."""
+
+        def of(phase: str, kind: str) -> list[np.ndarray]:
+            return [of_rows[one] for one in rows.samples.get((phase, kind), ())]
+
+        return {
+            name: PhaseMultipliers(of_rows[own], of(name, "path"), of(name, "peak"), of(name, "state"), weights[name], of_bounds)
+            for name, own in rows.dynamics.items()
+        }
+
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
         """See `NLP.interpolate`."""
         extended = self.layout.extended(np.zeros((1, len(self.layout.variables))))
@@ -274,7 +297,7 @@ class Assembly:
         for k in range(len(peaks)):
             samples = written.peak_samples[k, :]
             scale = self.layout.variables[peaks[k]].scale
-            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
+            rows.add_samples(phase.name, "peak", samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
         (initials,) = rows.at_points(phase.initials, first, written.first_control, s[0], s)
         (finals,) = rows.at_points(phase.finals, last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
@@ -300,6 +323,16 @@ class Assembly:
         for first, second, scale, label in self._joined:
             ends = self.layout.pick(extended, np.array([first, second]))
             rows.add(ends[0] - ends[1], 0, 0, scale, label)
+
+
+def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers, swept: bool) -> Adjoint:
+    """The costates of one phase. Polynomials of a method do not jump inside its elements, where multipliers of limits of states do: there,
+    those by the adjoint equation are better."""
+    known = None if swept else writer.costates(extended, multipliers.dynamics)
+    if known is not None and not writer.limited(multipliers):
+        return Adjoint(known)
+    found = writer.swept(extended, multipliers)
+    return found if known is None or (found.error or 0.0) <= TRUSTED else Adjoint(known)
 
 
 def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:

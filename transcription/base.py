@@ -17,6 +17,7 @@ from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
+from .phases.adjoint import Adjoint
 from .phases.mesh import PhaseMesh, as_meshes
 from .phases.pointwise import Parts
 from .phases.reduced import Reduced
@@ -259,6 +260,12 @@ class NLP(Deriving):
         multipliers say nothing between their places.
     widen : callable
         NLP -> the same one with all variables free that have bounds; see `whole`.
+    adjoint : callable
+        A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
+        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, or
+        limits of states have multipliers; if `swept` (a keyword), everywhere.
+    measure : callable
+        () -> `quantities`.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
@@ -281,6 +288,8 @@ class NLP(Deriving):
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
     widen: Callable[[NLP], NLP]
+    adjoint: Callable[..., dict[str, Adjoint]]
+    measure: Callable[[], ca.Function]
     parts: Parts | None = None
 
     def __repr__(self) -> str:
@@ -297,6 +306,11 @@ class NLP(Deriving):
         """The same NLP for a search over whole vectors: states are free, too, and among its profiles. Only what has no bounds (peaks,
         absolute values) follows from the rest."""
         return self.widen(self)
+
+    @cached_property
+    def quantities(self) -> ca.Function:
+        """z -> what objectives and constraints see of each phase: t0, tf, initials, finals, integrals, peaks; a column a phase."""
+        return self.measure()
 
     @cached_property
     def lower(self) -> np.ndarray:

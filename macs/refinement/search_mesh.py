@@ -16,7 +16,7 @@ from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certificates, vectors_points
+from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
@@ -106,7 +106,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     solved = solver.ends([first.single(k) for k in range(m)])
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
+    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)

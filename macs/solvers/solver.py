@@ -177,7 +177,7 @@ class Solver(SearchMethod):
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
             if state is None:
                 return Front.of(no_points(problem.goals, problem, about, stats | level))
-            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified))
+            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certify=certified))
 
         return SearchRun(
             self,
