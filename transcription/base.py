@@ -107,8 +107,9 @@ def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | No
 class Meshed(Transcription):
     """A transcription on elements: any phase may have a mesh of its own, so that mesh refinement works on it.
 
-    An implementation is a frozen dataclass with these three settings among others (`order` may be a constant of the class), whose
-    `__post_init__` calls that of this class.
+    An implementation is a frozen dataclass with these three settings among others (`elements` and `order` may follow from others, or be
+    constants of the class), whose `__post_init__` calls that of this class. One that goes from mesh to mesh by a rule of its own has
+    `adapted`, too.
 
     Attributes
     ----------
@@ -165,6 +166,22 @@ class Meshed(Transcription):
         again. To hold them there, see `PhaseMesh.moving`."""
         meshes = {name: mesh.found_in(trajectory[name].state.edges) for name, mesh in self.meshes.items() if mesh.moving}
         return self.remeshed(meshes) if meshes else self
+
+    def adapted(
+        self, problem: CompiledProblem, trajectory: Trajectory, errors: Mapping[str, np.ndarray], of_controls: Mapping[str, np.ndarray]
+    ) -> Self | None:
+        """The method on the next meshes for a trajectory that it made, by a rule of its own; None where elements are cut and merged, and
+        their order raised, by their errors alone.
+
+        Parameters
+        ----------
+        problem : CompiledProblem
+        trajectory : Trajectory
+        errors, of_controls : mappings of arrays (N,)
+            For each phase the errors of the trajectory's elements, in units of what they may be: of states, limits and integrals, and of
+            controls that are described poorly. Where none is more than 1, a finer mesh is to confirm it.
+        """
+        return None
 
     def alternatives(self) -> tuple[Self, ...]:
         """Other methods on much the same meshes, to be tried where solves with this one fail."""
