@@ -183,6 +183,10 @@ class Meshed(Transcription):
         """
         return None
 
+    def suits(self, problem: CompiledProblem) -> bool:
+        """Whether no element is certainly too long for the problem, so that it cannot be transcribed."""
+        return True
+
     def alternatives(self) -> tuple[Self, ...]:
         """Other methods on much the same meshes, to be tried where solves with this one fail."""
         return ()

@@ -6,9 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from problems.compiled import CompiledProblem
+
 from ..base import Meshed
 from ..phases.mesh import PhaseMesh
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from .density import LEAST, equidistributed, raised, trajectory_density
 from .errors import PhaseErrors
 from .verdict import ElementScores, Verdict
 
@@ -31,6 +34,24 @@ def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Met
         if mesh != old:
             finer[name] = mesh
     return method.remeshed(finer, bounded=bounded)
+
+
+def redistributed(method: Method, problem: CompiledProblem, trajectory: Trajectory) -> Method:
+    """The method with as many elements in each phase as before, spread by the density of the trajectory; see `density`. Phases whose edges
+    move keep theirs."""
+    found = method
+    for least in LEAST:
+        meshes = {}
+        for name, phase in trajectory.items():
+            old = method.mesh_of(name)
+            if phase.tf > phase.t0 and not old.moving:
+                places, values = trajectory_density(phase)
+                edges = equidistributed(places, raised(places, values, least), old.elements)
+                meshes[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
+        found = method.remeshed(meshes)
+        if found.suits(problem):
+            break
+    return found
 
 
 def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:

@@ -18,9 +18,10 @@ import numpy as np
 from ..trajectories.trajectory import PhaseTrajectory
 from .scales import state_scales
 
-LEAST = 0.25
-"""The floor of a density, as a part of its mean: no interval is longer than so many times the mean one inverted, 4. Where all states are
-straight lines their curvature is 0, but constraints, peaks and what controls do between nodes are still to be seen there."""
+LEAST = (0.25, 0.5, 0.75, 1.0)
+"""The floor of a density, as a part of its mean, and those that are tried where intervals get too long by it: none is longer than the mean
+one divided by this. Where all states are straight lines their curvature is 0, but constraints, peaks and what controls do are still to be
+seen there, and decays that have died out must stay stable."""
 
 
 def curvatures(places: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -87,7 +88,7 @@ def normalised(places: np.ndarray, values: np.ndarray) -> np.ndarray:
     return values * ((places[-1] - places[0]) / total) if total > 0.0 else np.ones_like(values)
 
 
-def raised(places: np.ndarray, values: np.ndarray, least: float = LEAST) -> np.ndarray:
+def raised(places: np.ndarray, values: np.ndarray, least: float = LEAST[0]) -> np.ndarray:
     """The density with a mean of 1 and nowhere below `least` of that: so much of it everywhere, and the rest in the old shape."""
     return least + (1.0 - least) * normalised(places, values)
 

@@ -31,9 +31,6 @@ from .runge_kutta import TABLEAUX
 from .stability import check_steps
 from .step import Step, StepMesh
 
-MORE_EVEN = (0.5, 0.75, 1.0)
-"""Least densities that are tried where intervals get too long for the least one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Shooting(Transcription):
@@ -244,7 +241,7 @@ class MultipleShooting(Meshed, Shooting):
         stable, they are more even."""
         degree, most = DEGREES[self.control], max(self.most_elements, 2 * self.elements)
         found = self
-        for least in (LEAST, *MORE_EVEN):
+        for least in LEAST:
             found = self.remeshed(
                 {
                     name: next_intervals(self.mesh_of(name), phase, errors[name], of_controls[name], degree, least, most)
@@ -252,14 +249,14 @@ class MultipleShooting(Meshed, Shooting):
                     if phase.tf > phase.t0
                 }
             )
-            if found.stable(problem):
+            if found.suits(problem):
                 break
         return found
 
-    def stable(self, problem: Problem | CompiledProblem) -> bool:
-        """Whether no steps are certainly too long to be stable."""
+    def suits(self, problem: CompiledProblem) -> bool:
+        """See `Meshed.suits`: whether all steps may be stable."""
         try:
-            self._check_steps(problem.compile())
+            self._check_steps(problem)
         except ValueError:
             return False
         return True

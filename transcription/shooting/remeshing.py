@@ -10,6 +10,8 @@ from ..trajectories.trajectory import PhaseTrajectory
 
 SHORTER = 4.0
 """A step becomes so many times shorter at most from one mesh to the next: its error says little about meshes that are much finer."""
+SAFETY = 1.25
+"""Steps that are too long become so many times shorter than their errors ask for."""
 MORE = 1.5
 """How many times the intervals there are on a mesh that is to confirm another one."""
 
@@ -42,7 +44,8 @@ def next_intervals(
     curved = count * raised(places, values, least)
     # Errors of a step fall with the order and one more, those of controls of this degree twice as fast as their last coefficient.
     shorter = np.maximum(errors ** (1.0 / (old.order + 1)), of_controls ** (0.5 / max(degree, 1)))
-    needed = np.minimum(np.nan_to_num(shorter, nan=SHORTER), SHORTER) / np.diff(places)
+    shorter = np.minimum(np.nan_to_num(np.where(shorter > 1.0, SAFETY * shorter, shorter), nan=SHORTER), SHORTER)
+    needed = shorter / np.diff(places)
     density = np.maximum(curved, (needed * old.elements / (len(places) - 1))[:, None])
     count = max(count, min(most, int(np.ceil(integrals(places, density)[-1] - 1e-9))))
     return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
