@@ -18,6 +18,8 @@ import numpy as np
 from ..trajectories.trajectory import PhaseTrajectory
 from .scales import state_scales
 
+FLAT = 0.03
+"""Density that is added everywhere: curvatures far below its third power, per length of the phase, are rounding of straight lines."""
 LEAST = (0.25, 0.5, 0.75, 1.0)
 """The floor of a density, as a part of its mean, and those that are tried where intervals get too long by it: none is longer than the mean
 one divided by this. Where all states are straight lines their curvature is 0, but constraints, peaks and what controls do are still to be
@@ -69,7 +71,7 @@ def trajectory_density(phase: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
     if len(places) < 3:
         return places, np.ones((len(places) - 1, 2))
     x = lowered(places, phase.edge_states / state_scales(phase))
-    return places, continuous(curvature_density(curvatures(places, x)))
+    return places, FLAT + continuous(curvature_density(curvatures(places, x)))
 
 
 def continuous(values: np.ndarray) -> np.ndarray:
