@@ -331,7 +331,7 @@ class _Job:
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
-        return [self.solver.lexicographic(i) for i in range(len(self.nlp.problem.goals))]
+        return self.solver.ends()
 
     def along(self, tasks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Solved]:
         """The results of all tasks (reference, weights), in their order.

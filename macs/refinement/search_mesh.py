@@ -103,8 +103,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
     first, solver = (MultistartSolver(nlp, guessed_start(nlp), starts, rng, solves) for starts in (STARTS, 1))
     show("ends of the front on a coarse mesh")
-    best = [first.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
-    solved = [solver.lexicographic(k, best[k].z) for k in range(m)]
+    solved = solver.ends([first.single(k) for k in range(m)])
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))

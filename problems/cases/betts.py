@@ -11,9 +11,10 @@ from math import degrees, radians
 import numpy as np
 
 from ..problem import Problem
-from .reentry import vehicle
 from .reentry.nominal import guess
 from .reentry.statement import ANGLES, END, START, declare
+from .reentry.vehicle import MASS, SHUTTLE
+from .winged import STATES
 
 BOUNDS = {"angle of attack": (radians(-90.0), radians(90.0)), "bank angle": (radians(-89.0), radians(1.0))}
 FINAL_GUESS = 2000.0
@@ -35,12 +36,12 @@ def betts(name: str, heating_rate: float | None = None) -> Problem:
     """State it, with a limit to the heating rate, Btu/ft2/s, or none."""
     problem = Problem(name)
     phase = problem.phase("entry", t0=0.0, tf=(500.0, 4000.0))
-    states = declare(phase, {state: START[state] for state in vehicle.STATES}, END)
+    states = declare(phase, {state: START[state] for state in STATES}, END)
     attack, bank = (phase.control(angle, bounds=BOUNDS[angle], unit="rad") for angle in ANGLES)
-    rates = vehicle.rates(states, attack, bank)
+    rates = SHUTTLE.rates(states, attack, bank, MASS)
     phase.dynamics(**rates)
     if heating_rate is not None:
-        heating = vehicle.heating_rate(states["altitude"], states["speed"], attack)
+        heating = SHUTTLE.heating_rate(states["altitude"], states["speed"], attack)
         phase.path("heating rate", heating, upper=heating_rate, scale=heating_rate)
     problem.maximize("cross-range", degrees(1.0) * phase.final(states["latitude"]), unit="deg")
     guess(phase, rates, START, FINAL_GUESS, ANGLES)

@@ -31,7 +31,8 @@ from macs.pareto.dominance import nondominated
 from problems import load
 from problems.cases.reentry import case1, case2, statement
 from problems.cases.reentry.case3 import ZONES
-from problems.cases.reentry.statement import FOOT, Limits
+from problems.cases.reentry.statement import Limits
+from problems.cases.winged import FOOT
 from transcription import DFET
 from transcription.nlp.scalarized import Solved
 from transcription.trajectories.simulate import simulate

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from statements import refused
 
 from problems import load
-from problems.cases.reentry import case1, case2, case3, statement, vehicle
+from problems.cases.reentry import case1, case2, case3, statement
+from problems.cases.reentry.vehicle import MASS, PRESSURE, SHUTTLE
 from transcription import DFET, Trajectory, parse
 from transcription.trajectories.simulate import simulate
 
@@ -66,13 +67,13 @@ def test_the_vehicle_is_the_published_one(case):
 
 
 def test_the_constants_are_those_of_the_literature():
-    assert pytest.approx(R, abs=0.01) == vehicle.EARTH_RADIUS
-    assert pytest.approx(MU, rel=1e-6) == vehicle.EARTH_MU
-    assert pytest.approx(M, abs=0.1) == vehicle.MASS and pytest.approx(S, abs=1e-3) == vehicle.AREA
-    assert pytest.approx(1.570305e-8, rel=1e-6) == vehicle.HEATING_CONSTANT
+    assert pytest.approx(R, abs=0.01) == SHUTTLE.radius
+    assert pytest.approx(MU, rel=1e-6) == SHUTTLE.mu
+    assert pytest.approx(M, abs=0.1) == MASS and pytest.approx(S, abs=1e-3) == SHUTTLE.area
+    assert pytest.approx(1.570305e-8, rel=1e-6) == SHUTTLE.heating_constant
     # 280 lbf/ft2 are 13406.46 Pa.
-    assert float(vehicle.dynamic_pressure(1e9, 0.0)) == 0.0
-    assert pytest.approx(13406.46, abs=0.02) == 280 * vehicle.POUND / vehicle.FOOT**2
+    assert float(SHUTTLE.dynamic_pressure(1e9, 0.0)) == 0.0
+    assert pytest.approx(13406.46, abs=0.02) == 280 * PRESSURE
 
 
 def test_the_ends_and_the_limits_are_those_of_the_paper():
@@ -132,33 +133,33 @@ def test_far_above_the_air_the_flight_is_kepler_s():
 
     def invariants(y: np.ndarray) -> list[float]:
         h, lon, lat, v, path, heading = y
-        r = vehicle.EARTH_RADIUS + h
+        r = SHUTTLE.radius + h
         up = np.array([math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)])
         east, north = np.array([-math.sin(lon), math.cos(lon), 0.0]), np.array([
             -math.sin(lat) * math.cos(lon), -math.sin(lat) * math.sin(lon), math.cos(lat)])  # fmt: skip
         velocity = v * (math.sin(path) * up + math.cos(path) * (math.sin(heading) * east + math.cos(heading) * north))
-        return [v**2 / 2 - vehicle.EARTH_MU / r, *np.cross(r * up, velocity)]
+        return [v**2 / 2 - SHUTTLE.mu / r, *np.cross(r * up, velocity)]
 
-    end = integrated(lambda state: vehicle.rates(state, 0.3, -1.0), start, 1500.0)
+    end = integrated(lambda state: SHUTTLE.rates(state, 0.3, -1.0, MASS), start, 1500.0)
     assert abs(end[0] - start[0]) > 1e5 and abs(end[1] - start[1]) > 0.5
     np.testing.assert_allclose(invariants(end), invariants(np.array(start)), rtol=1e-9)
 
 
 def test_without_bank_the_flight_stays_in_its_vertical_plane():
     """Along the equator; and anywhere on a great circle, by Clairaut's relation."""
-    along = integrated(lambda state: vehicle.rates(state, 0.3, 0.0), [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2], 800.0)
+    along = integrated(lambda state: SHUTTLE.rates(state, 0.3, 0.0, MASS), [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2], 800.0)
     assert abs(along[2]) < 1e-12 and along[5] == pytest.approx(math.pi / 2, abs=1e-12) and along[1] > 0.8
     start = [79e3, 0.0, 0.2, 7800.0, -0.017, 1.0]
-    end = integrated(lambda state: vehicle.rates(state, 0.3, 0.0), start, 800.0)
+    end = integrated(lambda state: SHUTTLE.rates(state, 0.3, 0.0, MASS), start, 800.0)
     assert end[2] > 0.4
     assert math.cos(end[2]) * math.sin(end[5]) == pytest.approx(math.cos(0.2) * math.sin(1.0), rel=1e-9)
 
 
 def test_gravity_is_newton_s_or_the_same_everywhere():
     at_sea_level = MU / R**2
-    assert float(vehicle.gravity(0.0, "newtonian")) == pytest.approx(at_sea_level, rel=1e-5)
-    assert float(vehicle.gravity(1e5, "newtonian")) == pytest.approx(MU / (R + 1e5) ** 2, rel=1e-5)
-    assert float(vehicle.gravity(1e5, "constant")) == pytest.approx(at_sea_level, rel=1e-5)
+    assert float(SHUTTLE.gravity(0.0, "newtonian")) == pytest.approx(at_sea_level, rel=1e-5)
+    assert float(SHUTTLE.gravity(1e5, "newtonian")) == pytest.approx(MU / (R + 1e5) ** 2, rel=1e-5)
+    assert float(SHUTTLE.gravity(1e5, "constant")) == pytest.approx(at_sea_level, rel=1e-5)
 
 
 def test_data_change_the_flight():
@@ -169,8 +170,8 @@ def test_data_change_the_flight():
     ends = dict(zip(STATES, exact.final, strict=True))
     assert ends["altitude"] == pytest.approx((24384.0, 24384.0)) and exact.tf.upper == 1900
     level = load("reentry_case1", gravity="constant").compile().phases[0]
-    g = vehicle.EARTH_MU / vehicle.EARTH_RADIUS**2
-    newton = vehicle.EARTH_MU / (vehicle.EARTH_RADIUS + x[0]) ** 2
+    g = SHUTTLE.mu / SHUTTLE.radius**2
+    newton = SHUTTLE.mu / (SHUTTLE.radius + x[0]) ** 2
     change = np.array(level.dynamics(x, u, 0, [0, 2000])).ravel()[3] - by_hand(x, u)[0][3]
     assert change == pytest.approx(-(g - newton) * math.sin(x[4]), abs=1e-4)
 
@@ -221,7 +222,7 @@ def flights() -> dict[str, list[Flight]]:
     """The guesses of all cases, and a heavier one's."""
     made = {}
     for case in CASES:
-        nlps = [DFET(10, 2).transcribe(load(case, mass=mass)) for mass in (vehicle.MASS, 1.05 * vehicle.MASS)]
+        nlps = [DFET(10, 2).transcribe(load(case, mass=mass)) for mass in (MASS, 1.05 * MASS)]
         made[case] = [Flight(nlp.unpack(nlp.first_guess(nlp.guess[None])[0])) for nlp in nlps]
     return made
 

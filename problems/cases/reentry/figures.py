@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..winged import STATES
 from .statement import ANGLES
-from .vehicle import STATES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,9 +23,9 @@ import numpy as np
 from ... import checks
 from ...phase import Phase
 from ...problem import Problem
-from . import vehicle
+from ..winged import FOOT, GRAVITIES, UNITS
 from .nominal import guess
-from .vehicle import FOOT
+from .vehicle import MASS, PRESSURE, SHUTTLE
 
 START = {
     "altitude": 260000 * FOOT,
@@ -58,10 +58,6 @@ SCALES = {state: abs(value) for state, value in END.items()}
 """What counts as one: for all that is limited its limit, so that a violation of 0.01 is 1 % of it."""
 
 
-UNITS = {"altitude": "m", "speed": "m/s"}
-"""The others are in rad."""
-
-
 ANGLES = ("angle of attack", "bank angle")
 
 
@@ -88,7 +84,7 @@ def reentry(
     limits: Limits,
     zones: Sequence[Zone] = (),
     *,
-    mass: float = vehicle.MASS,
+    mass: float = MASS,
     gravity: str = "newtonian",
     lag_gain: float = 0.1,
     final_time: float = 2000.0,
@@ -123,8 +119,8 @@ def reentry(
     ValueError
         For data that make no sense, by their names.
     """
-    if gravity not in vehicle.GRAVITIES:
-        raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, vehicle.GRAVITIES))}, not {gravity!r}")
+    if gravity not in GRAVITIES:
+        raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, GRAVITIES))}, not {gravity!r}")
     mass, lag_gain, final_time = (
         checks.positive(value, f"{name}: {word}") for word, value in (("mass", mass), ("lag_gain", lag_gain), ("final_time", final_time))
     )
@@ -139,15 +135,15 @@ def reentry(
     states = declare(phase, START, {state: END[state] for state, tolerance in given.items() if tolerance == 0})
     for angle in ANGLES:
         phase.control(f"{angle} command", bounds=BOUNDS[angle], unit="rad")
-    rates = vehicle.rates(states, states["angle of attack"], states["bank angle"], mass, gravity)
+    rates = SHUTTLE.rates(states, states["angle of attack"], states["bank angle"], mass, model=gravity)
     turning = rates["flight-path angle"]
     rates |= {angle: lag_gain * (phase[f"{angle} command"] - phase[angle]) for angle in ANGLES}
     phase.dynamics(**rates)
 
     altitude, speed, attack = phase["altitude"], phase["speed"], phase["angle of attack"]
-    heating = vehicle.heating_rate(altitude, speed, attack)
-    load = vehicle.load_factor(altitude, speed, attack, mass, gravity)
-    limited = heating, vehicle.dynamic_pressure(altitude, speed), load
+    heating = SHUTTLE.heating_rate(altitude, speed, attack)
+    load = SHUTTLE.load_factor(altitude, speed, attack, mass, gravity)
+    limited = heating, SHUTTLE.dynamic_pressure(altitude, speed) / PRESSURE, load
     for (word, limit), value in zip(vars(limits).items(), limited, strict=True):
         phase.path(word.replace("_", " "), value, upper=limit, scale=limit)
     for number, zone in enumerate(zones, 1):
