@@ -1,4 +1,5 @@
 """Benchmarks: ratios against the alternatives, measured side by side in one run. Inner levels in `inner`, on the batches of `cases`;
+meshes by a density in `density`;
 populations simulated in one call in `population`; searches in `search`, batches of them in `study`; published optima in `standard`; one
 optimum beside other programs in `peers`."""
 

@@ -7,10 +7,18 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import inner, peers, population, search, standard, study
+from . import density, inner, peers, population, search, standard, study
 from .measured import Row, save
 
-BENCHMARKS = {"inner": inner, "peers": peers, "population": population, "search": search, "standard": standard, "study": study}
+BENCHMARKS = {
+    "density": density,
+    "inner": inner,
+    "peers": peers,
+    "population": population,
+    "search": search,
+    "standard": standard,
+    "study": study,
+}
 KINDS = tuple(BENCHMARKS)
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
@@ -36,6 +44,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
+        "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
