@@ -137,8 +137,8 @@ def report(rows: Sequence[Row]) -> str:
     better = int((ratios > 1.0).sum())
     lines = [
         "DENSITY MESHES: multiple shooting by one step of rk4 (more where the word says so) on equal intervals, and on as many",
-        f"that follow the density of the trajectory, after at most {MESHES} meshes. Defect: of the simulation at the ends of steps, in units",
-        "of what states do. Error: of the objective on the mesh, relative to the true one. Turns: how often controls go back by",
+        f"that follow the density of the trajectory, after at most {MESHES} meshes. Defect: of the simulation at the ends of steps, in",
+        "units of what states do. Error: of the objective on the mesh, relative to the true one. Turns: how often controls go back by",
         f"{TURN:g} of their range.",
         "",
         table(rows, COLUMNS),
