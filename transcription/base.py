@@ -173,13 +173,8 @@ class Meshed(Transcription):
         """The method on the next meshes for a trajectory that it made, by a rule of its own; None where elements are cut and merged, and
         their order raised, by their errors alone.
 
-        Parameters
-        ----------
-        problem : CompiledProblem
-        trajectory : Trajectory
-        errors, of_controls : mappings of arrays (N,)
-            For each phase the errors of the trajectory's elements, in units of what they may be: of states, limits and integrals, and of
-            controls that are described poorly. Where none is more than 1, a finer mesh is to confirm it.
+        `errors` and `of_controls`, phase -> (N,), are those of the trajectory's elements in units of what they may be: of states, limits
+        and integrals, and of controls that are described poorly. Where none is more than 1, a finer mesh is to confirm it.
         """
         return None
 
