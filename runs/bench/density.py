@@ -63,7 +63,7 @@ CASES = (
     Flight(STANDARD + "batch_reactor", on(20, 40, 80)),
     Flight(STANDARD + "rocket", on(20, 40, 80)),
     Flight(STANDARD + "robot_arm", on(20, 40)),
-    Flight("goddard", on(20, 40), "horizontal speed", -float(goddard.reference(2)[-1, 1])),
+    Flight("goddard", on(20, 40), "horizontal speed", float(goddard.reference(2)[-1, 1])),
     Flight("goddard", on(20, 40), "flight time", goddard.shortest_time()),
 )
 QUICK = (Flight(STANDARD + "van_der_pol", on(20)), Flight(STANDARD + "hypersensitive", on(20, steps=7)))

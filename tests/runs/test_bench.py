@@ -122,6 +122,9 @@ def test_intervals_by_density_beside_equal_ones():
     assert equal.of("error") == pytest.approx(equal.of("objective") / 1.330806904943 - 1, rel=1e-9)
     assert equal.of("defect") == equal.of("defect of run.x") and density.worst(equal) == "run.x"
     assert "smaller defect by the density: 1 of 1" in density.report(rows)
+    truths = {case.name: case.true() for case in density.CASES}
+    assert truths["goddard, horizontal speed"] == pytest.approx(0.903889755358877) and truths["van_der_pol"] == pytest.approx(2.8672610452)
+    assert truths["goddard, flight time"] == pytest.approx(109.10894511799619) and not np.isnan(list(truths.values())).any()
     assert all(len(line) <= 150 for line in density.report(rows).splitlines())
 
 
