@@ -17,6 +17,8 @@ SOLVERS: dict[str, str] = {
     "moead": "macs.baselines.moead:MOEAD",
     "mopso": "macs.baselines.mopso:MOPSO",
     "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
+    "payoff": "macs.gradient_solvers:Payoff",
+    "sweep": "macs.gradient_solvers:Sweep",
 }
 """Module and class of each solver, imported only when needed."""
 

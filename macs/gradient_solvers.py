@@ -1,0 +1,146 @@
+"""Gradient tools as solvers, so that studies and the command line can name them beside searches."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+
+from problems.checks import check_choice, check_count
+from problems.compiled import CompiledProblem
+from problems.problem import Problem
+from transcription.base import Transcription
+
+from .evaluation.evaluator import Evaluator
+from .front import Front
+from .fronts.verified import VERIFY
+from .gradient_tools import payoff, sweep
+from .gradients.targets import METHODS, check_points
+from .solvers.run import ENDED
+from .solvers.solver import Solver
+from .solvers.start import check_run, drawing
+
+MESHES = ("fixed", "mended", "adaptive", "density")
+
+
+@dataclass(frozen=True)
+class GradientSolver(Solver):
+    """A gradient tool with the calls and the contract of a solver; see `Payoff` and `Sweep`.
+
+    It evaluates no candidates: `evaluations` and `inner` are not used, and its cost is in `gradient_solves` and `inner_iterations`. No
+    checkpoint keeps a run of it: it begins again.
+
+    Parameters
+    ----------
+    starts : int
+        Number of starts of each solve.
+    mesh : "fixed", "mended", "adaptive" or "density"
+        What follows on a transcription that is given: nothing; points that a simulation does not confirm are solved again
+        (`Front.mended`); each point gets a mesh of its own (`Front.refine_mesh`); or as many elements, where trajectories need them
+        (`Front.refine_mesh(more=False)`).
+
+    Raises
+    ------
+    ValueError
+        Where a setting is out of its range.
+    """
+
+    starts: int = 1
+    mesh: str = "fixed"
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        check_count(f"{name}: starts", self.starts, 1)
+        check_choice(f"{name}: mesh", self.mesh, MESHES)
+
+    @abstractmethod
+    def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
+        """The front of the gradient tool; `terms` are arguments that all of these have."""
+
+    def solve(
+        self,
+        problem: Problem | CompiledProblem,
+        transcription: Transcription | None = None,
+        *,
+        evaluations: int | None = None,
+        seed: int | None = None,
+        inner: Any = "auto",
+        tolerance: float = 1e-6,
+        start: Any = None,
+        verify: float | None = VERIFY,
+        time_limit: float | None = None,
+        progress: bool | None = None,
+        callback: Any = None,
+        checkpoint: Any = None,
+    ) -> Front:
+        """See `Solver.solve` and the class. `start` holds vectors that are known; words for random first candidates are not used."""
+        check_run(evaluations or 1, seed, tolerance, time_limit, callback, checkpoint)
+        known = start if drawing(start) is None else None
+        terms = {"start": known, "starts": self.starts, "seed": seed, "tolerance": tolerance, "verify": verify}
+        front = self.find(problem, transcription, **terms, time_limit=time_limit, progress=progress)
+        if "stopped" not in front.stats and transcription is not None and self.mesh != "fixed" and len(front):
+            front = self._on_other_meshes(front, verify, progress)
+        return front.replace(stats={"stopped": ENDED[0], "inner": "gradients"} | front.stats)
+
+    def _on_other_meshes(self, front: Front, verify: float | None, progress: bool | None) -> Front:
+        if self.mesh == "mended":
+            return front.mended(progress=progress)
+        refined = front.refine_mesh(more=self.mesh == "adaptive", progress=progress)
+        return refined if verify is None else refined.verify(verify)
+
+    @property
+    def certifies(self) -> bool:
+        """See `SearchMethod.certifies`."""
+        return True
+
+    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """Not possible: there are no derivatives of a plain function. Raises ValueError."""
+        self._refuse()
+
+    def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
+        """See `begin`."""
+        self._refuse()
+
+    def _refuse(self) -> NoReturn:
+        raise ValueError(f"{type(self).__name__} needs derivatives: it solves problems with dynamics, not plain functions")
+
+
+@dataclass(frozen=True)
+class Payoff(GradientSolver):
+    """The ends of a front by gradients: `macs.payoff` as a solver."""
+
+    def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
+        """See `payoff`."""
+        return payoff(problem, transcription, **terms)
+
+
+@dataclass(frozen=True)
+class Sweep(GradientSolver):
+    """A front by gradients, point after point: `macs.sweep` as a solver.
+
+    Parameters
+    ----------
+    points : int
+    method : str
+        See `macs.sweep`.
+    starts, mesh
+        See `GradientSolver`.
+    """
+
+    points: int = 10
+    method: str = "pascoletti-serafini"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_count("Sweep: points", self.points, 2)
+        check_choice("Sweep: method", self.method, METHODS)
+
+    def check_objectives(self, m: int) -> None:
+        """See `SearchMethod.check_objectives`."""
+        check_points(self.points, m)
+
+    def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
+        """See `sweep`."""
+        return sweep(problem, transcription, points=self.points, method=self.method, **terms)

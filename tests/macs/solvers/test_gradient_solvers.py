@@ -1,0 +1,73 @@
+"""Gradient tools as solvers: the same points as the tools, and what studies need of a solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import payoff, sweep
+from macs.solvers.catalogue import solver
+from macs.solvers.checkpoint import keeps
+from macs.solvers.run import ENDED
+from problems import load
+from runs.cli import main
+from transcription import parse
+
+METHOD = parse("dfet:4x4")
+
+
+@pytest.fixture(scope="module")
+def goddard():
+    return load("goddard")
+
+
+def test_they_find_what_the_tools_find(goddard):
+    for own, tool in ((solver("payoff"), payoff(goddard, METHOD)), (solver("sweep", points=4), sweep(goddard, METHOD, points=4))):
+        front = own.solve(goddard, METHOD, evaluations=10, seed=0)
+        np.testing.assert_array_equal(front.objectives, tool.objectives)
+        assert front.stats["stopped"] in ENDED and front.stats["evaluations"] == 0
+        assert front.stats["gradient_solves"] == tool.stats["gradient_solves"] > 0
+
+
+def test_meshes_follow_on_request(goddard):
+    method = parse("multiple-shooting:8:linear")
+    fixed, dense = (solver("payoff", mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
+    mended = solver("payoff", mesh="mended").solve(goddard, METHOD, seed=0)
+    assert not fixed.verified[0] and mended.verified.all()
+    meshes = [one.trajectory["ascent"].state.edges for one in (fixed[0], dense[0])]
+    assert len(meshes[0]) == len(meshes[1]) and np.ptp(np.diff(meshes[1])) > 1.0 > np.ptp(np.diff(meshes[0]))
+
+
+def test_a_start_is_used(goddard):
+    known = solver("payoff").solve(goddard, METHOD, seed=0)
+    again = solver("payoff").solve(goddard, METHOD, seed=0, start=known)
+    assert again.stats["inner_iterations"] < known.stats["inner_iterations"]
+    np.testing.assert_allclose(again.objectives, known.objectives, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "words"),
+    [
+        ("payoff", {"starts": 0}, "Payoff: starts"),
+        ("payoff", {"mesh": "fine"}, "Payoff: mesh"),
+        ("sweep", {"points": 1}, "Sweep: points"),
+        ("sweep", {"method": "weights"}, "Sweep: method"),
+    ],
+)
+def test_settings_out_of_range_are_refused(name, settings, words):
+    with pytest.raises(ValueError, match=words):
+        solver(name, **settings)
+
+
+def test_plain_functions_are_refused():
+    with pytest.raises(ValueError, match="needs derivatives"):
+        solver("payoff").minimize(lambda X: X, [(0, 1), (0, 1)], evaluations=5)
+
+
+def test_no_checkpoint_keeps_them():
+    assert not keeps(solver("payoff"))
+
+
+def test_on_the_command_line(tmp_path, capsys):
+    assert main(["solve", "goddard", "--solver", "payoff", "--seed", "1", "--out", str(tmp_path / "ends.nc")]) == 0
+    assert "2 points" in capsys.readouterr().out
