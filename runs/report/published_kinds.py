@@ -35,6 +35,10 @@ ROW, STATISTIC = ("problem", "by"), "statistic"
 """Keys of a row that are no figures."""
 
 
+BEST, EQUAL = "best ", 5
+"""Beginning of the statistic of a payoff table; digits, of the range of an objective, in which equal values agree."""
+
+
 def figures_of(row: Mapping[str, Any]) -> list[str]:
     """The keys of a row's figures."""
     return [key for key in row if key not in (*ROW, STATISTIC)]
@@ -54,7 +58,7 @@ class Published(Section, tag_field="of", kw_only=True):
     differs : str
         What differs in ours.
     statistics : bool
-        Whether each row is one of `STATISTICS`.
+        Whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`.
     population : bool
         Whether ours are of solvers with a population alone.
     """
@@ -93,12 +97,16 @@ class Published(Section, tag_field="of", kw_only=True):
                     raise ValueError(f"it is of the same as row {seen.index(name) + 1}: {', '.join(name)}")
                 seen.append(name)
 
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or given not in STATISTICS:
+            raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {given!r}")
+
     def _check_row(self, row: Mapping[str, Any]) -> None:
         if not all(isinstance(row.get(key), str) for key in ROW):
             raise ValueError(f"it must be a table with problem and by, not {row!r}")
-        if self.statistics and (not isinstance(row.get(STATISTIC), str) or row[STATISTIC] not in STATISTICS):
-            raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {row.get(STATISTIC)!r}")
-        if STATISTIC in row and not self.statistics:
+        if self.statistics:
+            self._check_statistic(row.get(STATISTIC))
+        elif STATISTIC in row:
             raise ValueError(f"{STATISTIC}: this kind of table has none")
         keys = figures_of(row)
         if self.columns is not None:
@@ -265,7 +273,44 @@ class Feasibility(Published, tag="feasibility"):
         return "generations from 1, the first population; means of the runs that got there; points are means of a run."
 
 
-KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility
+class PayoffTable(Published, tag="payoff"):
+    """The ends of the front: for each objective, the point of all runs that is best in it, and then in the others in their order. The
+    `statistic` of a row is "best" and the name of an objective."""
+
+    statistics: ClassVar[bool] = True
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        goals, rows = comparison.known.goals, dict[str, list[Figures]]()
+        for solver, fronts in comparison.fronts.items():
+            found = [front for front in fronts if len(front)]
+            if not found:
+                continue
+            F, objectives = (np.vstack([getattr(front, name) for front in found]) for name in ("F", "objectives"))
+            ranges = np.where(np.ptp(F, axis=0) > 0, np.ptp(F, axis=0), 1.0)
+            rows[solver] = []
+            for i, goal in enumerate(goals):
+                order = [i, *(k for k in range(len(goals)) if k != i)]
+                # Solves agree to some digits only.
+                keys = np.round((F - F.min(axis=0)) / ranges, EQUAL)[:, order[::-1]].T
+                best = objectives[np.lexsort(keys)[0]]
+                rows[solver].append(
+                    {STATISTIC: BEST + goal.name, **{one.name: float(value) for one, value in zip(goals, best, strict=True)}}
+                )
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        return "for each objective, the point of all runs that is best in it, and then in the others in their order."
+
+    def check_problem(self, problem: CompiledProblem) -> None:
+        names = {BEST + goal.name: goal.name for goal in problem.goals}
+        check_known(STATISTIC, [row[STATISTIC] for row in self.rows], names)
+
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or not given.startswith(BEST):
+            raise ValueError(f"{STATISTIC} must be '{BEST}' and the name of an objective, not {given!r}")
+
+
+KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
