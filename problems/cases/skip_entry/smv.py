@@ -1,0 +1,78 @@
+"""A space manoeuvre vehicle's skip over a turning planet: flight time, heat load, terminal speed and terminal mass.
+
+Chai, Savvaris, Tsourdos and Xia, "An interactive fuzzy physical programming for solving multiobjective skip entry problem", IEEE
+Transactions on Aerospace and Electronic Systems 53(5), 2017, eqs. (2)-(13) and Table I: ten states, since angle of attack, bank angle and
+thrust follow their commands with a lag.
+
+Three terms of the turning planet in eq. (2) are misprinted and are as derived here (`winged`): the rate of the speed has the sine of the
+latitude in place of that of the heading, those of the flight-path angle and of the heading are over the speed (without, the former is 2
+degrees a second). The sign of the exponent of the density in eq. (3) is a slip.
+
+Beginning, end and bounds are in a reference that is not at hand; they are those of the same authors' other skip entry (`skip`), with the
+speed at most the initial one. The lowest altitude is chosen as 50 km: there the limit of the dynamic pressure allows 4642 m/s, and a flight
+without fuel leaves the air again with about the speed to which the paper aspires, 4016 m/s; from 51.88 km it has 4783. Chosen as well: the
+gravitational parameter, the scale height, the constant of the heating rate (Betts'; the coefficients of Table I are his, for radians), a
+specific impulse of 300 s, and 0.2 1/s for the gains of all three lags.
+"""
+
+from __future__ import annotations
+
+from math import degrees
+
+from ...problem import Problem
+from ..reentry.vehicle import SHUTTLE
+from ..winged import FOOT, SLUG, Winged
+from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
+
+HEATING = 200.0
+"""Btu/ft2/s."""
+LOWEST, IMPULSE, GAIN = 50e3, 300.0, 0.2
+TURNING = 7.2921151e-5
+TABLE = (1.067, -1.101, 0.6988, -0.1903)
+"""Of Table I, for powers of the angle of attack in rad."""
+VEHICLE = Winged(
+    radius=6378135.0,
+    mu=3.986004418e14,
+    density=0.002378 * SLUG / FOOT**3,
+    scale_height=7254.24,
+    area=2690.0 * FOOT**2,
+    lift=(-0.2070, 1.676),
+    drag=(0.07854, -0.3529, 2.040),
+    heating=tuple(value / degrees(1.0) ** power for power, value in enumerate(TABLE)),
+    heating_constant=SHUTTLE.heating_constant,
+    turning=TURNING,
+)
+
+
+def problem(
+    *,
+    impulse: float = IMPULSE,
+    lag_gain: float = GAIN,
+    lowest: float = LOWEST,
+    fastest: float = START["speed"],
+    mass: float = START["mass"],
+) -> Problem:
+    """The case.
+
+    Parameters
+    ----------
+    impulse : float
+        Specific impulse, s.
+    lag_gain : float
+        Of the lags of angle of attack, bank angle and thrust, 1/s.
+    lowest : float
+        Altitude at which the descent ends, m.
+    fastest : float
+        Bound of the speed, m/s.
+    mass : float
+        At the beginning, kg.
+    """
+    lags = dict.fromkeys(COMMANDED, lag_gain)
+    problem, heating = skip_entry("smv", Mission(VEHICLE, lowest, HEATING, impulse, lags, fastest, mass))
+    descent, ascent = problem.phases[DESCENT], problem.phases[ASCENT]
+    problem.minimize("flight time", ascent.tf, unit="s")
+    load = descent.integral(heating[DESCENT]) + ascent.integral(heating[ASCENT])
+    problem.minimize("heat load", 1e-3 * load, unit="kBtu/ft2")
+    problem.maximize("terminal speed", ascent.final(ascent["speed"]), unit="m/s")
+    problem.maximize("terminal mass", ascent.final(ascent["mass"]), unit="kg")
+    return problem
