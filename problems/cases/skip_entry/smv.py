@@ -19,7 +19,10 @@ from __future__ import annotations
 
 from math import degrees
 
+import numpy as np
+
 from ...problem import Problem
+from ..reentry.nominal import guess
 from ..reentry.vehicle import SHUTTLE
 from ..winged import FOOT, SLUG, Winged
 from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
@@ -42,6 +45,19 @@ VEHICLE = Winged(
     heating_constant=SHUTTLE.heating_constant,
     turning=TURNING,
 )
+NOMINAL = {
+    DESCENT: (
+        440.0,
+        np.radians([7, -8, -10, -10, -10, 0, 30, 30, 29, 28, -6, -7, 7, 30, 30, 29, 29, 30, 30, 29, 30, 30, 28, 27, 25]),
+        np.radians(
+            [-13, -10, -8, -11, -20, -39, -67, -79, -80, -68, -39, -43, -72, -80, -79, -80, -80, -79, -80, -79, -79, -79, -77, -62, -51]
+        ),
+        [0.0, 0.0],
+    ),
+    ASCENT: (70.0, np.radians([27, 30, 30, 30]), np.radians([0, 0]), [1e6, 1e6]),
+}
+"""Duration, s, and commands at equal steps of it, rad and N: down without lift, a turn to the left within all limits, level, and up with half
+the thrust."""
 
 
 def problem(
@@ -75,4 +91,11 @@ def problem(
     problem.minimize("heat load", 1e-3 * load, unit="kBtu/ft2")
     problem.maximize("terminal speed", ascent.final(ascent["speed"]), unit="m/s")
     problem.maximize("terminal mass", ascent.final(ascent["mass"]), unit="kg")
+
+    state, begin = START | COMMANDED | {"mass": mass}, 0.0
+    for phase in (descent, ascent):
+        duration, *laws = NOMINAL[phase.name]
+        state = guess(phase, state, begin + duration, dict(zip([f"{control} command" for control in COMMANDED], laws, strict=True)), begin)
+        begin += duration
+        phase.guess(tf=begin)
     return problem
