@@ -25,7 +25,10 @@ from ...problem import Problem
 from ..reentry.nominal import guess
 from ..reentry.vehicle import SHUTTLE
 from ..winged import FOOT, SLUG, Winged
+from .figures import plot, track
 from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
+
+__all__ = ["plot", "problem", "track"]
 
 HEATING = 200.0
 """Btu/ft2/s."""
@@ -56,8 +59,8 @@ NOMINAL = {
     ),
     ASCENT: (70.0, np.radians([27, 30, 30, 30]), np.radians([0, 0]), [1e6, 1e6]),
 }
-"""Duration, s, and commands at equal steps of it, rad and N: down without lift, a turn to the left within all limits, level, and up with half
-the thrust."""
+"""Duration, s, and commands at equal steps of it, rad and N: down without lift, a turn to the left within all limits, level, and up with
+half the thrust."""
 
 
 def problem(
