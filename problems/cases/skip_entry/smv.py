@@ -101,4 +101,9 @@ def problem(
         state = guess(phase, state, begin + duration, dict(zip([f"{control} command" for control in COMMANDED], laws, strict=True)), begin)
         begin += duration
         phase.guess(tf=begin)
+    # Elements of some 12 s on the way down, half of which the commands take to be followed: on fewer, optima are a tenth off, since the angle
+    # of attack is to be switched within seconds. A candidate is propagated only, as it takes seconds to make one feasible.
+    problem.default_transcription = "dfet:32x3:bernstein:1"
+    problem.default_evaluations = 700
+    problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem
