@@ -3,7 +3,7 @@
 from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
 from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
-from .fronts.points import Point
+from .fronts.point import Point
 from .gradient_tools import optimize, payoff, sweep
 from .search.macs import MACS
 from .solvers.progress import Progress

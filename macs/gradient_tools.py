@@ -27,8 +27,9 @@ from transcription.stopping import Stopped
 
 from .evaluation.evaluator import CONVERGED
 from .front import Front
-from .fronts.builders import certificates, nearest_violation, no_points, vectors_points
-from .fronts.points import Point, Points
+from .fronts.builders import certified, nearest_violation, no_points, vectors_points
+from .fronts.point import Point
+from .fronts.points import Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
@@ -251,6 +252,7 @@ class _Job:
         self._rng = np.random.default_rng(self._seed)
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
+        self._sole: np.ndarray | None = None
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
         if transcription is not None:
@@ -287,6 +289,7 @@ class _Job:
     def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
         """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is
         found for it."""
+        self._sole = reference < np.inf
         if self.fixed:
             return self.run(lambda: self.front([self.solver.solve(reference, weights)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
@@ -314,7 +317,7 @@ class _Job:
                 self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
                 status=[found.status],
                 notes=[found.note],
-                optimality=certificates(found.nlp, found.z[None], None),
+                **certified(found.nlp, found.z[None], None, self._sole),
             )
             return Front.of(points).verify(verify)
 
@@ -331,7 +334,7 @@ class _Job:
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
-        return [self.solver.lexicographic(i) for i in range(len(self.nlp.problem.goals))]
+        return self.solver.ends()
 
     def along(self, tasks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Solved]:
         """The results of all tasks (reference, weights), in their order.
@@ -388,11 +391,12 @@ class _Job:
         return self.front(chosen, ranges, message=message and f"of {len(found)} points left out: {message}")
 
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
-        """The results as a front, with their optimality; objectives are scaled by `ranges` (m,)."""
+        """The results as a front, with their optimality and costates; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
-        optimal = certificates(self.nlp, Z, ranges)
         status = [solved.status for solved in found]
-        return Front.of(vectors_points(self.nlp, Z, self._about, self._stats(), status=status, optimality=optimal, **more))
+        return Front.of(
+            vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
+        )
 
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts

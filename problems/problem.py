@@ -31,7 +31,8 @@ class Problem:
     Attributes
     ----------
     default_transcription, default_evaluations, default_inner, default_start, default_verify : str or None, int, str, str or None, float
-        What is used by default; a transcription of None: DFET on a mesh that is found. A case may set its own.
+        What is used by default; a transcription of None: DFET on a mesh that is found. A case may set its own; a transcription, too, as a
+        table of its method and settings, where phases have meshes of their own.
 
     Examples
     --------
@@ -48,7 +49,7 @@ class Problem:
         self.name = name
         self.address = ""
         self.data: Mapping[str, Any] = {}
-        self.default_transcription: str | None = None
+        self.default_transcription: str | Mapping[str, Any] | None = None
         self.default_evaluations = DEFAULT_EVALUATIONS
         self.default_inner = "auto"
         self.default_start: str | None = None

@@ -64,8 +64,8 @@ class Study:
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
-        {label of a solver: terms of its own}: any of transcription (one), evaluations, inner and start. Reports
-        compare it with the others on each of their transcriptions.
+        {label of a solver: terms of its own}: any of transcription (one, or {label of a problem: one}), evaluations, inner and start.
+        Reports compare it with the others on each of their transcriptions.
     evaluations : int, or mapping, optional
         Budget of each run, or {label of a problem: budget}. Default: the problem's own.
     runs : int

@@ -1,7 +1,8 @@
 """Floor 2: from a continuous problem to an NLP and back: transcriptions, the inner level, trajectories, their simulation."""
 
 from .base import NLP, Meshed, Transcription
-from .catalogue import from_dict, parse, word
+from .catalogue import from_dict, parse, stated, word
+from .collocation.method import Collocation
 from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
 from .shooting.method import MultipleShooting, SingleShooting
@@ -12,6 +13,7 @@ from .trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Traje
 __all__ = [
     "DFET",
     "NLP",
+    "Collocation",
     "InnerResult",
     "InnerSolver",
     "Meshed",
@@ -25,5 +27,6 @@ __all__ = [
     "Transcription",
     "from_dict",
     "parse",
+    "stated",
     "word",
 ]

@@ -16,6 +16,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from .base import NLP, Profile, Transcription
 from .numerics.batched import Batched, expanded
+from .phases.adjoint import Adjoint, PhaseMultipliers
 from .phases.guess import along
 from .phases.layout import Layout
 from .phases.pointwise import Parts, Pointwise
@@ -25,6 +26,8 @@ from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
+TRUSTED = 1e-3
+"""Largest error of costates by the adjoint equation that are preferred to those of a method."""
 
 WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 
@@ -87,13 +90,16 @@ class Assembly:
             g_scale=np.concatenate(rows.scale),
             g_labels=tuple(rows.labels),
             guess=self.guess(),
-            profiles=self.profiles(),
+            profiles=self.profiles(self.layout.free),
             guessed=self.guessed,
             reduce=lambda: self._reduced(function, rows, largest_peaks, scores),
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
             costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
+            widen=self.widened,
+            measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
+            adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
@@ -116,19 +122,38 @@ class Assembly:
             found |= writer.guess_controls(*times)
         return np.array([found.get(slot, np.nan) for slot in self.layout.free])
 
-    def profiles(self) -> tuple[Profile, ...]:
-        """See `NLP.profiles`."""
-        column = {slot: i for i, slot in enumerate(self.layout.free)}
+    def widened(self, nlp: NLP) -> NLP:
+        """See `NLP.widen`; what the user guessed of the states, or the line that stands for it, is a guess like others."""
+        free = np.flatnonzero(np.isfinite(nlp.lower) & np.isfinite(nlp.upper))
+        known = np.where(np.isfinite(nlp.guess), nlp.guess, 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free]))
+        guess = self.guessed(known[None])[0]
+        guess[nlp.free] = nlp.guess
+
+        def guessed(candidates: np.ndarray) -> np.ndarray:
+            Z = np.zeros((len(candidates), len(nlp.variables)))
+            Z[:, free] = candidates
+            return Z
+
+        return replace(nlp, free=free, guess=guess[free], guessed=guessed, profiles=self.profiles(free.tolist(), states=True))
+
+    def profiles(self, free: Sequence[int], *, states: bool = False) -> tuple[Profile, ...]:
+        """See `NLP.profiles`, where these variables are `free`; with `states`, those of the states, too."""
+        column = {slot: i for i, slot in enumerate(free)}
         found = []
         for writer in self._declared:
-            slots, places = writer.control_nodes()
-            for control, own in zip(writer.phase.controls, slots.T, strict=True):
-                # A control whose bounds coincide is no variable, and one that is constant for a while only one.
-                free = np.sort(np.unique(own, return_index=True)[1])
-                free = free[own[free] >= 0]
-                if free.size:
-                    columns = np.array([column[int(slot)] for slot in own[free]])
-                    found.append(Profile(f"{writer.phase.name}.{control.name}", columns, places[free]))
+            tables = [(writer.phase.controls, *writer.control_nodes())]
+            if states:
+                slots, places = writer.state_nodes()
+                in_time = np.argsort(places, kind="stable")
+                tables.append((writer.phase.states, slots[in_time], places[in_time]))
+            for variables, slots, places in tables:
+                for variable, own in zip(variables, slots.T, strict=True):
+                    # A control whose bounds coincide is no variable, and one that is constant for a while only one.
+                    rows = np.sort(np.unique(own, return_index=True)[1])
+                    rows = rows[np.isin(own[rows], free)]
+                    if rows.size:
+                        columns = np.array([column[int(slot)] for slot in own[rows]])
+                        found.append(Profile(f"{writer.phase.name}.{variable.name}", columns, places[rows]))
         return tuple(found)
 
     def guessed(self, candidates: np.ndarray) -> np.ndarray:
@@ -186,6 +211,24 @@ class Assembly:
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
         return {name: costates for name, costates in found.items() if costates is not None}
+
+    def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
+        """See `NLP.adjoint`; multipliers by phase."""
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        return {name: _adjoint(writer, extended, multipliers[name], swept) for name, writer in ((w.phase.name, w) for w in self._declared)}
+
+    def _split(
+        self, rows: Rows, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]
+    ) -> dict[str, PhaseMultipliers]:
+        """Multipliers of rows (r,) and of bounds (n,), and the weights of integrals, by phase."""
+
+        def of(phase: str, kind: str) -> list[np.ndarray]:
+            return [of_rows[one] for one in rows.samples.get((phase, kind), ())]
+
+        return {
+            name: PhaseMultipliers(of_rows[own], of(name, "path"), of(name, "peak"), of(name, "state"), weights[name], of_bounds)
+            for name, own in rows.dynamics.items()
+        }
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
         """See `NLP.interpolate`."""
@@ -254,7 +297,7 @@ class Assembly:
         for k in range(len(peaks)):
             samples = written.peak_samples[k, :]
             scale = self.layout.variables[peaks[k]].scale
-            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
+            rows.add_samples(phase.name, "peak", samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
         (initials,) = rows.at_points(phase.initials, first, written.first_control, s[0], s)
         (finals,) = rows.at_points(phase.finals, last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
@@ -280,6 +323,16 @@ class Assembly:
         for first, second, scale, label in self._joined:
             ends = self.layout.pick(extended, np.array([first, second]))
             rows.add(ends[0] - ends[1], 0, 0, scale, label)
+
+
+def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers, swept: bool) -> Adjoint:
+    """The costates of one phase. Polynomials of a method do not jump inside its elements, where multipliers of limits of states do: there,
+    those by the adjoint equation are better."""
+    known = None if swept else writer.costates(extended, multipliers.dynamics)
+    if known is not None and not writer.limited(multipliers):
+        return Adjoint(known)
+    found = writer.swept(extended, multipliers)
+    return found if known is None or (found.error or 0.0) <= TRUSTED else Adjoint(known)
 
 
 def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:

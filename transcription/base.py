@@ -17,6 +17,7 @@ from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
 
 from .numerics.batched import Batched
+from .phases.adjoint import Adjoint
 from .phases.mesh import PhaseMesh, as_meshes
 from .phases.pointwise import Parts
 from .phases.reduced import Reduced
@@ -35,15 +36,15 @@ class Transcription(ABC):
 
     Attributes
     ----------
-    word : str
-        What the method is called on the command line, in lower case.
+    word : str or tuple of str
+        What the method is called on the command line, in lower case; several words, where a setting has words of its own.
     examples : str
         How it is written there, for messages.
     registered : dict
         The methods that have a word, by name of the class.
     """
 
-    word: ClassVar[str] = ""
+    word: ClassVar[str | tuple[str, ...]] = ""
     examples: ClassVar[str] = ""
     registered: ClassVar[dict[str, type[Transcription]]] = {}
 
@@ -70,7 +71,8 @@ class Transcription(ABC):
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
         """A method as it is written on the command line, after its word: dfet:4x6:bernstein has numbers (4, 6) and options ("bernstein",).
 
-        By default the numbers are the settings that have no default value, and there are no options.
+        By default the numbers are the settings that have no default value, and there are no options. A method of several words has the one
+        that was written as its first option.
 
         Raises
         ------
@@ -87,6 +89,11 @@ class Transcription(ABC):
         By default the settings that have no default value.
         """
         return f"{self.word}:{'x'.join(str(getattr(self, name)) for name in self._needed())}"
+
+    @classmethod
+    def words(cls) -> tuple[str, ...]:
+        """All words by which it is found."""
+        return cls.word if isinstance(cls.word, tuple) else (cls.word,)
 
     @classmethod
     def _needed(cls) -> list[str]:
@@ -154,6 +161,10 @@ class Meshed(Transcription):
     def mesh_of(self, phase: str) -> PhaseMesh:
         """The mesh of a phase, by its name."""
         return self.meshes.get(phase) or PhaseMesh.uniform(self.elements, self.order)
+
+    def most_control_order(self, order: int) -> int:
+        """The highest degree that controls may have where the states have degree `order`: what mesh refinement does not exceed."""
+        return order
 
     def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> Self:
         """The same method on other meshes of some phases; `bounded`: with controls that stay within their bounds between nodes, too, where
@@ -247,6 +258,14 @@ class NLP(Deriving):
     costates : callable
         A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
         multipliers say nothing between their places.
+    widen : callable
+        NLP -> the same one with all variables free that have bounds; see `whole`.
+    adjoint : callable
+        A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
+        -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, or
+        limits of states have multipliers; if `swept` (a keyword), everywhere.
+    measure : callable
+        () -> `quantities`.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
@@ -268,6 +287,9 @@ class NLP(Deriving):
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
+    widen: Callable[[NLP], NLP]
+    adjoint: Callable[..., dict[str, Adjoint]]
+    measure: Callable[[], ca.Function]
     parts: Parts | None = None
 
     def __repr__(self) -> str:
@@ -278,6 +300,17 @@ class NLP(Deriving):
     def reduced(self) -> Reduced:
         """What propagation leaves to satisfy: made where something is propagated, which gradient solves need not do."""
         return self.reduce()
+
+    @cached_property
+    def whole(self) -> NLP:
+        """The same NLP for a search over whole vectors: states are free, too, and among its profiles. Only what has no bounds (peaks,
+        absolute values) follows from the rest."""
+        return self.widen(self)
+
+    @cached_property
+    def quantities(self) -> ca.Function:
+        """z -> what objectives and constraints see of each phase: t0, tf, initials, finals, integrals, peaks; a column a phase."""
+        return self.measure()
 
     @cached_property
     def lower(self) -> np.ndarray:

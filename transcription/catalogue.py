@@ -11,15 +11,21 @@ from .base import Transcription
 def parse(text: str) -> Transcription:
     """A transcription from one word, as on the command line. Raises ValueError that shows how it is written."""
     name, mesh, *options = (*text.split(":"), "")[: max(2, text.count(":") + 1)]
-    method = next((one for one in Transcription.registered.values() if one.word == name.lower()), None)
+    method = next((one for one in Transcription.registered.values() if name.lower() in one.words()), None)
     numbers = mesh.split("x")
     if method is None or not all(number.isdecimal() for number in numbers):
         known = [method] if method else Transcription.registered.values()
         raise ValueError(f"unknown transcription '{text}'; write it as {', '.join(one.examples for one in known)}")
+    chosen = [name.lower()] if len(method.words()) > 1 else []
     try:
-        return method.from_word(tuple(map(int, numbers)), tuple(option for option in options if option))
+        return method.from_word(tuple(map(int, numbers)), (*chosen, *(option for option in options if option)))
     except ValueError as error:
         raise ValueError(f"transcription '{text}': {error}") from None
+
+
+def stated(given: str | Mapping[str, Any]) -> Transcription:
+    """A transcription as a case or a study file states it: in one word, or as a table that `from_dict` takes."""
+    return parse(given) if isinstance(given, str) else from_dict(given)
 
 
 def word(method: Transcription) -> str | None:

@@ -10,14 +10,21 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.base import NLP
-from transcription.nlp.optimality import optimality
+from transcription.nlp.costates import costates
+from transcription.nlp.optimality import Conditions
+from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped, check_stopping
+from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
 from ..pareto.archive import Archive
-from .points import Point, Points
+from .point import Point
+from .points import Points
+
+OPTIMAL = 1e-3
+"""Largest `optimality`, and largest violation, of points whose multipliers are costates."""
 
 
 def trajectory_points(
@@ -27,12 +34,13 @@ def trajectory_points(
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
     *,
-    certified: bool,
+    certify: bool,
 ) -> Points:
-    """Points with the trajectories of an archive; if `certified`, with their optimality, for objectives in ranges of the archive."""
+    """Points with the trajectories of an archive; if `certify`, with their optimality and costates, for objectives in ranges of the
+    archive."""
     if len(archive):
-        found = certificates(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certified else None
-        return vectors_points(nlp, archive.Z, solver, stats, optimality=found)
+        found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
+        return vectors_points(nlp, archive.Z, solver, stats, **found)
     nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
 
@@ -52,14 +60,26 @@ def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solve
     )
 
 
-def certificates(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None) -> list[float | None]:
-    """Optimality of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left when the work is to end."""
-    found: list[float | None] = [None] * len(Z)
+def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None = None) -> dict[str, list[Any]]:
+    """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
+    when the work is to end.
+
+    Only what is `OPTIMAL` has costates: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
+    may do as well at an end of a front.
+    """
+    optimality: list[float | None] = [None] * len(Z)
+    found: list[Costates | None] = [None] * len(Z)
     with suppress(Stopped):
         for k, z in enumerate(Z):
             check_stopping()
-            found[k] = optimality(nlp, z, ranges)
-    return found
+            conditions = Conditions.of(nlp, z, ranges)
+            optimality[k] = float("inf") if conditions is None else conditions.residual
+            some = None if sole is None else Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
+            feasible = nlp.evaluate(z[None])[1][0] <= OPTIMAL
+            best = next((one for one in (some, conditions) if feasible and one is not None and one.residual <= OPTIMAL), None)
+            multipliers = None if best is None else best.multipliers()
+            found[k] = None if multipliers is None else costates(nlp, z, multipliers)
+    return {"optimality": optimality, "costates": found}
 
 
 def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:

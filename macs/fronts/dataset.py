@@ -21,8 +21,7 @@ from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 from transcription.numerics.polynomials import BASES
 
-from ..io.netcdf import Group, Labelled, words
-from .labelled import (
+from ..io.labelled import (
     COUNT,
     NUMBER,
     TEXT,
@@ -43,10 +42,14 @@ from .labelled import (
     variable_columns,
     variable_table,
 )
+from ..io.netcdf import Group, Labelled, words
+from .columns import padded
+from .costate_arrays import MEANING, costate_columns, costate_names, costate_table, of_phase, read_costates, whole
 from .points import Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes
 
 if TYPE_CHECKING:
+    from transcription.trajectories.costates import PhaseCostates
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
 FORMAT = "MACS front"
@@ -70,6 +73,13 @@ ROOT: dict[str, Column] = {
     ),
     "simulated_objectives": Column(
         ("point", "objective"), NUMBER, "objectives as simulated, in the user's senses", "see objective_unit", optional=True
+    ),
+    "weights": Column(
+        ("point", "objective"),
+        NUMBER,
+        "weights of the objectives, all minimised, in the sum to which costates belong, NaN without costates",
+        "see objective_unit",
+        optional=True,
     ),
     "verified": Column(("point",), COUNT, "1 if the simulation agrees with the point, else 0", rows="verified", optional=True),
     "transcription": Column(("point",), TEXT, "transcription of the point, as JSON"),
@@ -141,6 +151,11 @@ def quantity_names(names: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
     return found
 
 
+def _taken(names: Mapping[str, Iterable[str]]) -> set[str]:
+    """The names of the arrays of a phase, but for those of its costates."""
+    return {*phase_table(""), *DIMENSIONS, *(array for arrays in quantity_names(names).values() for array in arrays)}
+
+
 def _quantity_table(names: Mapping[str, Sequence[str]], units: Mapping[str, Sequence[str]]) -> dict[str, Column]:
     arrays = quantity_names(names)
     return {
@@ -176,6 +191,9 @@ def root_dataset(front: Points) -> Labelled:
         **named_columns(front.excursions, "excursions", "quantity"),
         **variable_columns(front.variables, "variable"),
     }
+    if any(one is not None for one in front.costates):
+        none = np.full(len(front.goals), np.nan)
+        arrays["weights"] = np.array([none if one is None else one.weights for one in front.costates])
     for name, column in ROOT.items():
         if column.rows:
             arrays[name] = CONVERSIONS[column.kind](getattr(front, column.rows))
@@ -194,12 +212,12 @@ def phase_dataset(front: Points, name: str) -> Labelled:
     if first is None:
         raise KeyError(f"no point has a phase '{name}'")
     rows = [None if phase is None else _arrays(phase) for phase in phases]
-    padded = {array: _padded([None if row is None else row[array] for row in rows], like.shape) for array, like in _arrays(first).items()}
+    tables = {array: padded([None if row is None else row[array] for row in rows], like.shape) for array, like in _arrays(first).items()}
     variables: dict[str, tuple[Any, ...]]
     variables = {"state": first.state_variables, "control": first.control_variables, "path": first.path_limits}
     names = {kind: [v.name for v in those] for kind, those in variables.items()}
     units = {kind: [getattr(v, "unit", "not stated") for v in those] for kind, those in variables.items()}
-    arrays = split(padded, names)
+    arrays = split(tables, names)
     arrays |= {f"{dimension}_count": _counts(rows, dimension) for dimension in LENGTHS}
     arrays |= {
         "state_basis": words(["" if phase is None else phase.state.basis for phase in phases]),
@@ -209,7 +227,11 @@ def phase_dataset(front: Points, name: str) -> Labelled:
         **variable_columns(first.path_limits, "path", limits=True),
     }
     table = phase_table(first.time_unit) | _quantity_table(names, units)
-    return labelled(table, arrays, {"phase": name, "time_unit": first.time_unit})
+    taken = _taken(names)
+    table |= costate_table(names["state"], units["state"], first.time_unit, taken)
+    costates = costate_columns(of_phase(front.costates, name), arrays["time"].shape[1], costate_names(names["state"], taken))
+    about = {"costates": MEANING} if costates else {}
+    return labelled(table, arrays | costates, {"phase": name, "time_unit": first.time_unit, **about})
 
 
 def split(arrays: Mapping[str, np.ndarray], names: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
@@ -231,16 +253,6 @@ def _whole(values: np.ndarray) -> np.ndarray:
 
 CONVERSIONS: dict[str, Callable[[Any], np.ndarray]] = {TEXT: words, NUMBER: _numbers, COUNT: _whole}
 """From columns of `Points` to arrays of a file, by their kind."""
-
-
-def _padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
-    """Arrays of the same rank in one, NaN where they end; `like` is the shape to take where there is none."""
-    shapes = [row.shape for row in rows if row is not None] or [like]
-    padded = np.full((len(rows), *np.max(shapes, axis=0)), np.nan)
-    for i, row in enumerate(rows):
-        if row is not None:
-            padded[i][tuple(slice(length) for length in row.shape)] = row
-    return padded
 
 
 def _counts(rows: Sequence[Mapping[str, np.ndarray] | None], dimension: str) -> np.ndarray:
@@ -335,13 +347,13 @@ def _own_columns(places: np.ndarray) -> np.ndarray:
     return columns
 
 
-def read_trajectories(root: Labelled, phases: Mapping[str, Group]) -> list[Trajectory | None] | None:
-    """The points' trajectories from the root and the groups of its phases, by their names; None if there are no phases."""
+def read_flights(root: Labelled, phases: Mapping[str, Group]) -> dict[str, Any]:
+    """The points' trajectories and costates from the root and the groups of its phases, by their names; nothing if there are no phases."""
     from transcription.trajectories.trajectory import Trajectory
 
     if not phases:
-        return None
-    columns = [_read_phase(name, group, root.sizes["point"]) for name, group in phases.items()]
+        return {}
+    columns, adjoints = zip(*(_read_phase(name, group, root.sizes["point"]) for name, group in phases.items()), strict=True)
     names = root["parameter"].tolist()
     distinct(names, "parameters")
     found: list[Trajectory | None] = []
@@ -350,10 +362,14 @@ def read_trajectories(root: Labelled, phases: Mapping[str, Group]) -> list[Traje
         if known and len(known) < len(several):
             raise ValueError("a point has a trajectory in some phases only")
         found.append(Trajectory(known, dict(zip(names, parameters, strict=True))) if known else None)
-    return found
+    weights = root["weights"] if "weights" in root.arrays else np.full((len(found), len(root["objective"])), np.nan)
+    costates = [
+        whole(row, dict(zip(phases, several, strict=True))) for row, several in zip(weights, zip(*adjoints, strict=True), strict=True)
+    ]
+    return {"trajectories": found, "costates": costates}
 
 
-def _read_phase(name: str, group: Group, points: int) -> list[PhaseTrajectory | None]:
+def _read_phase(name: str, group: Group, points: int) -> tuple[list[PhaseTrajectory | None], list[PhaseCostates | None]]:
     from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 
     time_unit = read_attribute(group.attrs, "time_unit", str)
@@ -364,11 +380,13 @@ def _read_phase(name: str, group: Group, points: int) -> list[PhaseTrajectory | 
             raise ValueError(f"'{kind}' has numbers, not texts")
         distinct(those, f"entries of '{kind}' in phase '{name}'")
     table = phase_table(time_unit) | _quantity_table(names, {kind: [""] * len(those) for kind, those in names.items()})
+    taken = _taken(names)
+    table |= costate_table(names["state"], [""] * len(names["state"]), time_unit, taken)
     data = checked(table, group)
     if data.sizes["point"] != points:
         raise ValueError(f"phase '{name}' has {data.sizes['point']} points, the front has {points}")
-    padded = {array: data[array] for array in ARRAYS if array not in SPLIT}
-    padded |= {array: _joined(data, entries) for array, entries in zip(SPLIT, quantity_names(names).values(), strict=True)}
+    tables = {array: data[array] for array in ARRAYS if array not in SPLIT}
+    tables |= {array: _joined(data, entries) for array, entries in zip(SPLIT, quantity_names(names).values(), strict=True)}
     states, controls = read_variables(data, "state"), read_variables(data, "control")
     limits = read_limits(data, "path")
     found: list[PhaseTrajectory | None] = []
@@ -377,7 +395,7 @@ def _read_phase(name: str, group: Group, points: int) -> list[PhaseTrajectory | 
             found.append(None)
             continue
         array = {
-            key: padded[key][i][tuple(slice(lengths.get(dimension)) for dimension in dimensions)].copy()
+            key: tables[key][i][tuple(slice(lengths.get(dimension)) for dimension in dimensions)].copy()
             for key, dimensions in ARRAYS.items()
         }
         phase = PhaseTrajectory(
@@ -394,7 +412,8 @@ def _read_phase(name: str, group: Group, points: int) -> list[PhaseTrajectory | 
             path_limits=limits,
         )
         found.append(phase)
-    return found
+    nodes = [0 if one is None else len(one.time) for one in found]
+    return found, read_costates(data, name, names["state"], costate_names(names["state"], taken), nodes)
 
 
 def _joined(data: Labelled, entries: Sequence[str]) -> np.ndarray:

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..io import netcdf
 from ..io.atomic import check_target, read_whole, sealed, unsealed, write_whole
+from ..io.labelled import checked, document, read_attribute, read_document, variable_columns
 from ..io.netcdf import Group, Labelled, words
 from .dataset import (
     CLOSEST,
@@ -33,12 +34,11 @@ from .dataset import (
     group_names,
     phase_dataset,
     phase_names,
-    read_trajectories,
+    read_flights,
     root_columns,
     root_dataset,
     split,
 )
-from .labelled import checked, document, read_attribute, read_document, variable_columns
 from .points import Points
 from .provenance import STATS, stats_attributes
 
@@ -173,7 +173,7 @@ def _read_front(root: Group, version: int, closest: Points | None = None) -> Poi
         raise ValueError(f"the closest point is one, not {len(closest)}")
     root, phases = upgrade(root, {name: root.groups[place] for name, place in places.items()}, version)
     data = checked(ROOT, root)
-    return Points(**root_columns(data), trajectories=read_trajectories(data, phases), closest=None if closest is None else closest[0])
+    return Points(**root_columns(data), **read_flights(data, phases), closest=None if closest is None else closest[0])
 
 
 def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group, dict[str, Group]]:

@@ -14,7 +14,7 @@ from problems.compiled import Objective
 from ..evaluation.evaluator import CONVERGED
 from ..io.atomic import write_whole
 from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
-from .points import Point
+from .point import Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

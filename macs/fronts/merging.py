@@ -10,7 +10,8 @@ import numpy as np
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.dominance import nondominated
 from .builders import nearest_violation
-from .points import Point, Points
+from .point import Point
+from .points import Points
 from .provenance import merged_stats
 
 

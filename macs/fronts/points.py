@@ -1,4 +1,4 @@
-"""Points of a front as columns, and one point as a view of a row; independent of files, tables, figures and solvers."""
+"""Points of a front as columns; independent of files, tables, figures and solvers."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any, Self, overload
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
-from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.costates import Costates
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.text import counted
-from .columns import by_first, column, frozen, number, shared
-from .decision_table import Decisions
+from .columns import Decisions, by_first, column, frozen, number, shared
+from .point import Point
 from .provenance import STATS, Source, versions
 
 
@@ -38,6 +38,8 @@ class Points:
         None for black boxes, and for a point without a trajectory.
     excursions, optimality : n dicts or None, n floats or None, optional
         Excess, scaled, of quantities that leave their bounds between nodes; scaled residual of the conditions of Pareto optimality.
+    costates : n Costates or None, optional
+        Of points that are optimal.
     notes : n str, optional
         Remarks, for example why a mesh could not be refined enough.
     defect, simulated_violation, simulated_F, verified : (n,), (n,), (n, m), (n,), optional
@@ -59,7 +61,7 @@ class Points:
     Attributes
     ----------
     F, violation, status, defect, simulated_violation, simulated_F, verified : read-only arrays
-    violations, trajectories, excursions, optimality, notes, transcriptions : tuples of n
+    violations, trajectories, excursions, optimality, costates, notes, transcriptions : tuples of n
         Points on one mesh share one dict of `transcriptions`.
     source : Source or None
         Identity of the problem, None for a black box.
@@ -70,8 +72,8 @@ class Points:
     """
 
     ROWS = (
-        *("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "notes", "transcriptions"),
-        *("defect", "simulated_violation", "simulated_F", "verified"),
+        *("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "costates", "notes"),
+        *("transcriptions", "defect", "simulated_violation", "simulated_F", "verified"),
     )
     """Columns with one entry for each point, besides the decision vectors."""
 
@@ -88,6 +90,7 @@ class Points:
         trajectories: Sequence[Trajectory | None] | None = None,
         excursions: Sequence[Mapping[str, float] | None] | None = None,
         optimality: Sequence[float | None] | None = None,
+        costates: Sequence[Costates | None] | None = None,
         notes: Sequence[str | None] | None = None,
         transcriptions: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
         defect: Any = None,
@@ -132,6 +135,7 @@ class Points:
         self.trajectories: tuple[Trajectory | None, ...] = tuple(ordered(trajectories, "trajectories"))
         self.excursions: tuple[Mapping[str, float] | None, ...] = tuple(ordered(excursions, "excursions"))
         self.optimality = tuple(number(value) for value in ordered(optimality, "optimality"))
+        self.costates: tuple[Costates | None, ...] = tuple(ordered(costates, "costates"))
         self.notes = tuple(note or "" for note in ordered(notes, "notes"))
         self.defect = numbers(defect, "defect")
         self.simulated_violation = numbers(simulated_violation, "simulated_violation")
@@ -292,158 +296,3 @@ class Points:
         copy.__dict__.update(self.__dict__)
         copy.stats = dict(self.stats)
         return copy
-
-
-class Point:
-    """One point of a front: a trajectory, or one input of a black box. It refers to the data of its front."""
-
-    __slots__ = ("_points", "index")
-
-    def __init__(self, points: Points, index: int):
-        self._points = points
-        self.index = index
-
-    def alone(self) -> Points:
-        """A set of this point alone."""
-        return self._points.take([self.index])
-
-    @property
-    def goals(self) -> tuple[Objective, ...]:
-        """The objectives as the user stated them."""
-        return self._points.goals
-
-    @property
-    def objectives(self) -> dict[str, float]:
-        """Objectives by name, in the user's units and senses."""
-        return dict(zip(self._points.names, self._points.objectives[self.index].tolist(), strict=True))
-
-    @property
-    def F(self) -> np.ndarray:
-        """Objectives (m,), all minimised."""
-        return self._points.F[self.index]
-
-    @property
-    def violation(self) -> float:
-        """Largest scaled residual of any constraint."""
-        return float(self._points.violation[self.index])
-
-    @property
-    def violations(self) -> dict[str, float]:
-        """Scaled residual by constraint; empty if none was recorded."""
-        return dict(self._points.violations[self.index] or {})
-
-    @property
-    def status(self) -> str:
-        """ "converged", "infeasible", "failed" or "timeout"."""
-        return str(self._points.status[self.index])
-
-    @property
-    def verified(self) -> bool | None:
-        """Whether a simulation agrees with this point within `stats["verify"]` of its front; None if it was not simulated."""
-        return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
-
-    @property
-    def defect(self) -> float | None:
-        """Largest difference between simulated states and those of the transcription, in spans of their bounds; None: not simulated."""
-        return number(self._points.defect[self.index])
-
-    @property
-    def simulated(self) -> dict[str, float] | None:
-        """Objectives by name as simulated, in the user's units and senses; None: not simulated."""
-        if not self._points.was_simulated[self.index]:
-            return None
-        values = self._points.simulated_F[self.index] * self._points.signs
-        return dict(zip(self._points.names, values.tolist(), strict=True))
-
-    @property
-    def simulated_violation(self) -> float | None:
-        """Largest scaled residual of any constraint of the simulated trajectory; None: not simulated."""
-        return number(self._points.simulated_violation[self.index])
-
-    @property
-    def decision(self) -> np.ndarray:
-        """Decision vector, in the user's units; `variables` are its entries."""
-        return self._points._decisions.row(self.index)
-
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        """Variables of the decision vector, in its order."""
-        return self._points._decisions.variables_of(self.index)
-
-    @property
-    def transcription(self) -> dict[str, Any] | None:
-        """Transcription of this point, as `Transcription.to_dict` gives it; None for a black box."""
-        return self._points.transcriptions[self.index]
-
-    @property
-    def note(self) -> str:
-        """Remark on the point; usually empty."""
-        return self._points.notes[self.index]
-
-    @property
-    def source(self) -> Source | None:
-        """Identity of the problem; None for a black box."""
-        return self._points.source
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Static decision variables by name; for a black box, all its variables."""
-        if self._points.source is None:
-            return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
-        return {} if self.trajectory is None else dict(self.trajectory.parameters)
-
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """The trajectory; None for a black box."""
-        return self._points.trajectories[self.index]
-
-    @property
-    def optimality(self) -> float | None:
-        """Scaled residual of the conditions of Pareto optimality; None if it was not computed, for example after Ctrl-C or a time limit."""
-        return self._points.optimality[self.index]
-
-    @property
-    def excursions(self) -> dict[str, float] | None:
-        """Excess, scaled, of controls, path constraints and states that leave their bounds *between* nodes, by name; None if unknown."""
-        found = self._points.excursions[self.index]
-        return None if found is None else dict(found)
-
-    def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation:
-        """Simulation of this point: its dynamics under its controls, by an integrator that is independent of the transcription.
-
-        Parameters
-        ----------
-        rtol, atol, method
-            Of `scipy.integrate.solve_ivp`; `atol` is relative to the scales of the states.
-
-        Returns
-        -------
-        Simulation
-            `defect[phase][state]`, `max_defect`, `violation`, `violations`, `objectives`, `trajectory`.
-
-        Raises
-        ------
-        ValueError
-            For a black box, a point without a trajectory, and a saved front whose problem cannot be found.
-        """
-        problem = self._points.compiled()
-        if self.trajectory is None:
-            raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
-        return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
-
-    def plot(self, figure: Any = None) -> np.ndarray:
-        """Axes with the states, controls and path constraints over time, one for each of them."""
-        from .pictures.flight_plot import draw_flight
-
-        if self.trajectory is None:
-            raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
-        return draw_flight(self.trajectory, self.title, figure)
-
-    @property
-    def title(self) -> str:
-        """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
-        named = zip(self.goals, self.objectives.values(), strict=True)
-        return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
-
-    def __repr__(self) -> str:
-        return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"

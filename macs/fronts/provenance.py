@@ -18,7 +18,7 @@ from problems.compiled import CompiledProblem
 from problems.problem import Problem
 
 from ..evaluation.evaluator import Counts
-from .labelled import document, read_attribute, read_document
+from ..io.labelled import document, read_attribute, read_document
 
 
 @dataclass(frozen=True)

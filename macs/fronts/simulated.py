@@ -46,6 +46,7 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
         status=np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE),
         trajectories=[one.trajectory for one in found],
         optimality=[None] * len(front),
+        costates=[None] * len(front),
         problem=compiled,
         stats={**plain.stats, "tolerance": float(tolerance)},
     )

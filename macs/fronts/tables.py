@@ -12,7 +12,8 @@ from ..io.text import call, counted, duration, numbers, text_table
 from .verified import MISSES, objective_scales
 
 if TYPE_CHECKING:
-    from .points import Point, Points
+    from .point import Point
+    from .points import Points
 
 
 def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:

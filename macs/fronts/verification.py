@@ -21,7 +21,8 @@ from transcription.trajectories.simulate import simulate, worst_violation
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
-from .points import Point, Points
+from .point import Point
+from .points import Points
 from .verified import missed, objective_scales
 
 EQUAL = 1e-9

@@ -23,9 +23,10 @@ from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certificates, vectors_points
+from ..fronts.builders import certified, vectors_points
 from ..fronts.merging import merge
-from ..fronts.points import Point, Points
+from ..fronts.point import Point
+from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.simulated import simulated
 from ..fronts.verified import unmarked
@@ -85,13 +86,13 @@ def polished(
             Z, moved = Z[feasible], moved[feasible]
             known, unseen = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
         show(f"polish: optimality of {len(Z)} points")
-        certified = iter(certificates(nlp, Z[~moved], ranges(archive.F)))
         # A point that was moved inside its limits is no optimum of the problem as stated: it has no certificate.
-        optimality = [None if inside else next(certified) for inside in moved]
+        columns = {name: iter(values) for name, values in certified(nlp, Z[~moved], ranges(archive.F)).items()}
+        found_of = {name: [None if inside else next(values) for inside in moved] for name, values in columns.items()}
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
-    found = merge([vectors_points(nlp, Z, front.solver, stats, optimality=optimality, notes=notes), known])
+    found = merge([vectors_points(nlp, Z, front.solver, stats, **found_of, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
     message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
     message = f"{stopped}: {unseen} points of the front before were not simulated" if unseen else message

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,6 +24,10 @@ LIMIT, BETTER = 1e-8, 1e-7
 
 WIDE = 0.3
 """Spread of smooth random controls, in spans of their bounds: they are to lead to other optima."""
+
+
+LOOSE = 1e-2
+"""An objective that falls by more than this part of its range while those before keep their least values was not determined by these."""
 
 
 MOST_ITERATIONS = 500
@@ -138,24 +142,34 @@ class MultistartSolver:
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
         return solved
 
-    def lexicographic(self, i: int, start: np.ndarray | None = None) -> Solved:
-        """The lexicographic optimum: least objective i, then the others in their order, each without a loss in those before.
+    def single(self, i: int) -> Solved:
+        """The optimum of objective i alone."""
+        return self.solve(*_alone(i, len(self.nlp.problem.goals)))
 
-        It begins at `start` (n,), if that is given.
-        """
+    def ends(self, singles: Sequence[Solved] | None = None) -> list[Solved]:
+        """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
+        those before. It begins at the `singles`, the optima of each objective alone, which by default are found first."""
         m = len(self.nlp.problem.goals)
-        ceiling = np.full(m, np.inf)
-        best = None
-        for j in [i, *(k for k in range(m) if k != i)]:
-            reference, weights = np.where(np.arange(m) == j, 0.0, np.inf), np.eye(m)[j]
-            solved = self.solve(reference, weights, None if best is None else ceiling, start if best is None else best.z)
-            if best is None or solved.status == CONVERGED:
-                best = solved
+        singles = [self.single(i) for i in range(m)] if singles is None else singles
+        return [self._lexicographic(i, singles) for i in range(m)]
+
+    def _lexicographic(self, i: int, singles: Sequence[Solved]) -> Solved:
+        m = len(self.nlp.problem.goals)
+        best, ceiling = singles[i], np.full(m, np.inf)
+        for j in (k for k in range(m) if k != i):
             if best.status != CONVERGED:
                 break
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+            ceiling[i] = best.F[i]
+            reference, weights = _alone(j, m)
+            found = [self.solve(reference, weights, ceiling, best.z)]
+            gained = best.F[j] - found[0].F[j] if found[0].status == CONVERGED else np.inf
+            if singles[j].status == CONVERGED and gained > LOOSE * abs(best.F[j] - singles[j].F[j]):
+                # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
+                found.append(self.from_vector(singles[j].z, reference, weights, ceiling))
+            solved = self.better(found, reference, weights)
+            best = solved if solved.status == CONVERGED else best
             ceiling[j] = best.F[j]
-        assert best is not None
         return best
 
     def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
@@ -211,6 +225,11 @@ class MultistartSolver:
             if found[-1].status == CONVERGED:
                 break
         return self.better(found, reference, weights)
+
+
+def _alone(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
+    """Reference and weights (m,) of objective i alone; see `scalarize`."""
+    return np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i]
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:

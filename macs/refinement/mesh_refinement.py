@@ -17,8 +17,9 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import vectors_points
-from ..fronts.points import Point, Points
+from ..fronts.builders import certified, vectors_points
+from ..fronts.point import Point
+from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..gradients.multistart import MOST_ITERATIONS, GradientSolves
 from ..gradients.targets import moved_along
@@ -244,6 +245,6 @@ class FrontRefinement:
         if np.array_equal(best.z, front[i].decision):
             return front[[i]].replace(notes=[note or front[i].note])
         nlp = self.loop.programs(best.method)
-        certified = optimality(nlp, best.z, self.units) if best.by_gradients else None
-        about: dict[str, Any] = {"optimality": [certified], "notes": [note], "trajectories": [best.trajectory]}
+        found = certified(nlp, best.z[None], self.units) if best.by_gradients else {}
+        about: dict[str, Any] = {**found, "notes": [note], "trajectories": [best.trajectory]}
         return vectors_points(nlp, best.z[None], front.solver, front.stats, **about)

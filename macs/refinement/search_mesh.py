@@ -10,13 +10,13 @@ import numpy as np
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Meshed, Transcription
-from transcription.catalogue import parse
+from transcription.catalogue import stated
 from transcription.dfet.method import DFET
 from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certificates, vectors_points
+from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
@@ -39,8 +39,8 @@ NEAR = 0.25
 
 def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
     """The problem's own default, or a coarse mesh."""
-    word = problem.default_transcription if isinstance(problem, Problem) else None
-    return COARSE if word is None else parse(word)
+    own = problem.default_transcription if isinstance(problem, Problem) else None
+    return COARSE if own is None else stated(own)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def search_transcription(
 ) -> Chosen:
     """The problem's own default transcription, or what `found_mesh` finds."""
     if isinstance(problem, Problem) and problem.default_transcription is not None:
-        return Chosen(parse(problem.default_transcription), None, Counts())
+        return Chosen(stated(problem.default_transcription), None, Counts())
     return found_mesh(compiled, verify, tolerance, show)
 
 
@@ -103,11 +103,10 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
     first, solver = (MultistartSolver(nlp, guessed_start(nlp), starts, rng, solves) for starts in (STARTS, 1))
     show("ends of the front on a coarse mesh")
-    best = [first.solve(np.where(one, 0.0, np.inf), one.astype(float)) for one in np.eye(m, dtype=bool)]
-    solved = [solver.lexicographic(k, best[k].z) for k in range(m)]
+    solved = solver.ends([first.single(k) for k in range(m)])
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, optimality=certificates(nlp, Z, None))
+    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)

@@ -19,9 +19,9 @@ from typing import Any, cast, get_type_hints
 import numpy as np
 
 from ..evaluation.evaluator import Counts
-from ..fronts.labelled import document
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
+from ..io.labelled import document
 from . import checkpoint_file
 from .method import SearchMethod
 from .packing import pack, unpack

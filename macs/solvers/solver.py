@@ -68,8 +68,9 @@ class Solver(SearchMethod):
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver
-            How candidates are made feasible: "auto" (fast, and IPOPT if that fails), "propagate" (not at all), "ipopt" (the nearest
-            feasible point), "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own.
+            How candidates are made feasible: "auto" (fast, and IPOPT if that fails), "propagate" (not at all), "none" (not at all, and
+            states are not propagated, but searched, too, with the dynamics as constraints), "ipopt" (the nearest feasible point),
+            "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own.
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
@@ -165,7 +166,7 @@ class Solver(SearchMethod):
         start: Any,
     ) -> SearchRun:
         """The run of a search on an optimal control problem, ready to go."""
-        nlp = transcription.nlp(problem)
+        nlp = inner.program(transcription.nlp(problem))
         self.check_transcription(transcription, problem)
         check_freedom(nlp)
         self.check_objectives(len(problem.goals))
@@ -176,7 +177,7 @@ class Solver(SearchMethod):
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
             if state is None:
                 return Front.of(no_points(problem.goals, problem, about, stats | level))
-            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certified=certified))
+            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certify=certified))
 
         return SearchRun(
             self,

@@ -13,7 +13,8 @@ from problems.compiled import Variable
 from transcription.base import NLP
 from transcription.smooth import Smooth
 
-from ..fronts.points import Point, Points
+from ..fronts.point import Point
+from ..fronts.points import Points
 from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
 

@@ -19,7 +19,7 @@ from macs.solvers.solver import Solver
 from problems import Problem, load
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
-from transcription import Transcription, parse, word
+from transcription import Transcription, stated, word
 
 from ..data.schema import errors_begin_with, plain
 from ..execution.task import Payload
@@ -45,8 +45,12 @@ def combine(
     schemes = _schemes(transcriptions, stated)
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
-    own_budgets = {}
+    own_budgets, own_schemes = {}, {}
     for label, given in terms.items():
+        if "transcription" in given:
+            with errors_begin_with(f"terms of '{label}'"):
+                own = _by_problem("transcription", given["transcription"], stated, lambda problem: problem.default_transcription)
+                own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in own.items()}
         if "evaluations" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
@@ -63,7 +67,7 @@ def combine(
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         for one in methods:
             if one not in common:
-                offered += [(name, scheme, [one]) for name, scheme in _named_schemes(terms[one]["transcription"]).items()]
+                offered += [(name, scheme, [one]) for name, scheme in own_schemes[one][label].items()]
         for scheme_label, scheme, method_labels in offered:
             stated_so = _pickled(f"{label}, {scheme_label}", problem, scheme)
             for method_label in method_labels:
@@ -123,10 +127,13 @@ def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> d
     """Transcriptions by label, for each problem."""
     if isinstance(given, Mapping) and not set(given) & set(problems):
         return dict.fromkeys(problems, _named_schemes(given))
-    by_problem = _by_problem(
-        "transcriptions", given, problems, lambda problem: problem.default_transcription or default_transcription(problem)
-    )
+    by_problem = _by_problem("transcriptions", given, problems, _own_scheme)
     return {label: _named_schemes(one) for label, one in by_problem.items()}
+
+
+def _own_scheme(problem: Problem) -> Any:
+    method = default_transcription(problem)
+    return method if word(method) else {OWN: method}
 
 
 def _named_schemes(given: Any) -> dict[str, Transcription]:
@@ -134,11 +141,14 @@ def _named_schemes(given: Any) -> dict[str, Transcription]:
 
 
 def _scheme(label: str, given: Any) -> Transcription:
-    if isinstance(given, str):
+    if isinstance(given, str | Mapping):
         with errors_begin_with("transcriptions"):
-            return parse(given)
+            return stated(given)
     if not isinstance(given, Transcription):
-        raise ValueError(f"transcriptions: '{label}' must be a word such as dfet:4x6 or a Transcription, not {given!r}")
+        raise ValueError(
+            f"transcriptions: '{label}' must be a word such as dfet:4x6, a table with its method and settings, or a Transcription, "
+            f"not {given!r}"
+        )
     return given
 
 
@@ -191,6 +201,8 @@ def _pickled(place: str, *parts: Any) -> bytes:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error
 
 
+OWN = "the problem's own mesh"
+"""Label of a default transcription that cannot be written in a word."""
 LONGEST = 80
 """Characters of a folder's name."""
 

@@ -38,8 +38,9 @@ def check_terms(terms: Any, solvers: Collection[str]) -> None:
             checked(own, Terms)
             if not own:
                 raise ValueError(f"it must be a table with {', '.join(Terms.__struct_fields__)}, not {own!r}")
-            if isinstance(own.get("transcription"), list | tuple | Mapping):
-                raise ValueError(f"transcription must be one, not {own['transcription']!r}")
+            given = own.get("transcription")
+            if any(isinstance(one, list | tuple | Mapping) for one in (given.values() if isinstance(given, Mapping) else [given])):
+                raise ValueError(f"transcription must be one, or one for each problem, not {given!r}")
             if "inner" in own:
                 check_inner(own["inner"])
             sampling(own.get("start"))

@@ -7,16 +7,27 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import inner, peers, population, search, standard, study
+from . import inner, methods, peers, population, search, standard, study
 from .measured import Row, save
 
-BENCHMARKS = {"inner": inner, "peers": peers, "population": population, "search": search, "standard": standard, "study": study}
+BENCHMARKS = {
+    "inner": inner,
+    "methods": methods,
+    "peers": peers,
+    "population": population,
+    "search": search,
+    "standard": standard,
+    "study": study,
+}
 KINDS = tuple(BENCHMARKS)
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
-def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
-    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one."""
+def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
+    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
+
+    Returns whether no two verified optima of one problem disagree: what no noise explains.
+    """
     measured: list[tuple[str, Row]] = []
     for kind in kinds:
         rows: list[Row] = []
@@ -30,6 +41,7 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> None:
     if path:
         save(path, measured)
         print(f"values in {path}")
+    return not methods.disagreements([row for kind, row in measured if kind == "methods"])
 
 
 def _run(kind: str, rows: list[Row], quick: bool) -> bool:
@@ -37,6 +49,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
+        "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),

@@ -4,13 +4,9 @@ simulated."""
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 from macs import optimize
@@ -19,14 +15,13 @@ from problems import load
 from problems.cases.standard import SHARE, Published, cases, published
 from problems.catalogue import STANDARD
 
-from ..execution.child import THREADS
+from .apart import CRASHED, LATE, lines_apart
 from .measured import Column, Row, short, table
 
-RIGHT, WRONG, UNVERIFIED, FAILED, LATE, CRASHED = "right", "WRONG", "not verified", "FAILED", "TOO LATE", "CRASHED"
+RIGHT, WRONG, UNVERIFIED, FAILED = "right", "WRONG", "not verified", "FAILED"
 QUICK = ("linear_tangent", "breakwell", "moon_landing", "schwartz")
 MEMORY = 1500.0
 """Target: megabytes of each process."""
-POLL = 0.1
 
 
 @dataclass(frozen=True)
@@ -77,35 +72,9 @@ def solved(name: str, i: int) -> dict[str, float | str]:
 
 
 def apart(name: str, i: int, limit: float, steps: Steps) -> dict[str, float | str]:
-    """`solved` in a process of its own, so that its memory is its own and its end can be forced."""
-    places = os.pathsep.join(place or os.curdir for place in sys.path)
-    began = time.perf_counter()
-    process = subprocess.Popen(
-        [sys.executable, "-m", __name__, name, str(i)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": places},
-        start_new_session=True,
-    )
-    try:
-        while True:
-            try:
-                out, words = process.communicate(timeout=POLL)
-                break
-            except subprocess.TimeoutExpired:
-                steps.check()
-                if time.perf_counter() - began > limit:
-                    return {"status": LATE, "seconds": limit}
-    finally:
-        # It leads a group of its own: also a compiler that it may just be calling ends.
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-    if process.returncode:
-        print(f"{name}: {words.strip().splitlines()[-1] if words.strip() else process.returncode}", file=sys.stderr)
-        return {"status": CRASHED}
-    return json.loads(out.splitlines()[-1])
+    """`solved` in a process of its own."""
+    lines, ended = lines_apart(__name__, (name, str(i)), limit, steps)
+    return {"status": ended, "seconds": limit} if ended else json.loads(lines[-1])
 
 
 def compared(case: str, record: Published, found: dict[str, float | str]) -> Row:

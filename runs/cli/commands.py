@@ -14,7 +14,7 @@ import transcription
 from macs.front import Front
 from macs.fronts.front_plot import save_picture
 from macs.fronts.pictures.style import label
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
@@ -162,8 +162,7 @@ def bench(arguments: Namespace) -> int:
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)
-    benchmarks.bench(kinds, arguments.quick, arguments.csv)
-    return DONE
+    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv) else FAILED
 
 
 # Arguments
@@ -254,6 +253,9 @@ def describe(front: Front, point: Point) -> str:
         "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,
+        "costates are those of the sum of objectives, minimised, times": {
+            name: f"{one:.6g}" for name, one in (point.weights or {}).items()
+        },
     }
     lines = [front.table().splitlines()[0], ""]
     for title, values in groups.items():

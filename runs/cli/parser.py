@@ -37,6 +37,7 @@ BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
@@ -44,8 +45,9 @@ standard    every published problem with defaults, each in a process of its own:
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
-machine proves little. Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being
-compiled; where there is a C compiler, the whole inner benchmark and that of populations show both."""
+machine proves little; but it is 1 where methods find different optima, both verified. Ctrl-C prints the values measured so far.
+MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner benchmark and that of populations show
+both."""
 
 
 STUDY = """\
@@ -232,7 +234,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|peers|population|search|standard|study", nargs="?", help="which one (default: all)")
+    bench.add_argument("what", metavar="inner|methods|peers|population|search|standard|study", nargs="?", help="which one (default: all)")
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )

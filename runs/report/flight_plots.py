@@ -13,7 +13,7 @@ from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
 from macs.fronts.pictures.style import COLORS, label
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.pareto.archive import spread
 
 from ..measures.indicators import normalised

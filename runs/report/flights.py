@@ -13,7 +13,7 @@ from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along
 from macs.fronts.pictures.style import label
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.gradient_tools import payoff
 from macs.refinement.search_mesh import default_transcription
 from problems import load

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
 from macs.front import Front
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.fronts.provenance import Source
 from macs.io.text import duration, numbers
 from macs.pareto.dominance import nondominated

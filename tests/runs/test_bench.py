@@ -18,7 +18,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, inner, population, search, standard, study
+from runs.bench import command, inner, methods, population, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -45,6 +45,7 @@ def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
+    monkeypatch.setattr(command.methods, "QUICK", ("linear_tangent",))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
@@ -133,6 +134,33 @@ def test_what_does_not_end_or_crashes_is_told(capfd):
     assert "measured 0 of 2, MISSED" in standard.report(rows)
 
 
+def test_methods_agree_on_published_problems():
+    rows: list[Row] = []
+    methods.bench_methods(rows, methods.Effort(("zermelo",)))
+    (row,) = rows
+    assert row.who == methods.AGREED and methods.disagreements(rows) == 0
+    for word in methods.METHODS:
+        assert row.of(f"{word} verified") == 1.0 and row.of(word) == pytest.approx(row.of("published"), rel=1e-4)
+    text = methods.report(rows)
+    assert "agree: 1 of 1; ended early: 0; verified, but different: asked none, measured 0" in text
+    assert all(len(line) <= 150 for line in text.splitlines())
+
+
+def test_verified_optima_that_differ_are_told(monkeypatch, capsys):
+    def found(*values, verified=1.0):
+        words = zip(methods.METHODS, values, strict=False)
+        return [{"method": word, "value": value, "verified": verified, "again": 0.0} for word, value in words]
+
+    same, other = (1.4203, 1.4204), (1.4203, 1.4203, 1.4303)
+    row = methods.compared("moon_landing", found(*other), "")
+    assert row.who == methods.DISAGREED and methods.compared("moon_landing", found(*same), "").who == methods.AGREED
+    assert methods.compared("moon_landing", found(*other, verified=0.0), methods.LATE).who == f"-, {methods.LATE}"
+    fixed = [*found(1.4203, 1.4203), {"method": methods.METHODS[-1], "value": 1.4303, "verified": 1.0, "again": 1.0}]
+    assert methods.compared("moon_landing", fixed, "").who == methods.AGREED, "linear controls on nodes are somewhat worse"
+    monkeypatch.setattr(command.methods, "bench_methods", lambda rows, effort: rows.append(row))
+    assert main(["bench", "methods"]) == 1 and "verified, but different: asked none, measured 1" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("change", "verdict"),
     [
@@ -153,7 +181,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    titles = ("INNER LEVELS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
+    titles = ("INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
     places = [said.out.index(words) for words in (*titles, f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
@@ -161,7 +189,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "peers", "population", "search", "standard", "study"}
+    assert {row["benchmark"] for row in table} == {"inner", "methods", "peers", "population", "search", "standard", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -196,7 +224,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, peers, population, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "inner, methods, peers, population, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

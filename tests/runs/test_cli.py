@@ -164,6 +164,20 @@ def test_shooting_is_solved_shown_and_verified(capsys, method, exceeded):
     assert f"simulated, it violates '{exceeded}'" in out if exceeded else "FAILS" not in out
 
 
+@pytest.mark.parametrize("method", ["radau:2x3", "gauss:1x6", "lobatto:2x2:1", "chebyshev:1x6:bernstein"])
+def test_collocation_is_solved_shown_and_verified(capsys, method):
+    call = ["solve", "glide.py:build", "--transcription", method, "--seed", "1", "--out", "collocated.nc"]
+    assert main(call) == 0
+    assert main(["show", "collocated.nc", "--point", "0"]) == 0 and "Collocation(" in capsys.readouterr().out
+    assert main(["verify", "collocated.nc", "--trust", "--tolerance", "1e-6"]) == 0
+
+
+def test_an_unknown_method_shows_how_all_are_written(capsys):
+    assert main(["solve", "glide.py:build", "--transcription", "radeau:2x3"]) == 2
+    said = capsys.readouterr().err
+    assert "unknown transcription 'radeau:2x3'" in said and "radau:10x4" in said and "dfet:4x6" in said and len(said.splitlines()) == 1
+
+
 def test_a_search_on_shooting_is_polished_on_dfet(capsys):
     call = ["solve", "glide.py:build", "--transcription", "shooting:6", "--polish-on", "dfet:4x3", "--seed", "1", "--out", "polished.nc"]
     assert main(call) == 0 and "DFET" in capsys.readouterr().out

@@ -17,7 +17,7 @@ from runs.batch.display import StudyDisplay
 from runs.batch.store import Store
 from runs.cli import main
 from runs.execution.task import Outcome
-from transcription import SingleShooting, parse
+from transcription import DFET, Collocation, SingleShooting, parse
 
 GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")
 TOML = """
@@ -164,7 +164,8 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
     studies = {name: Study.load(f"reentry-{name}") for name in ("nodes", "discretisations", "uncertainty")}
     for name, study in studies.items():
         assert f"reentry-{name}" in said and (study.inner, study.start, study.verify) == ("propagate", "smooth", 0.01)
-        beside = {("MACS", 10_000)} if name == "uncertainty" else set()
+        collocated = {(f"NSGA-III, {method}", 60_000) for method in ("DC", "GP", "MCP")}
+        beside = {"uncertainty": {("MACS", 10_000)}, "discretisations": collocated}.get(name, set())
         assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)} | beside
         assert Study.load(f"reentry-{name}").quick().cells[0].evaluations <= 500
     assert [cell.transcription for cell in studies["nodes"].cells] == [f"shooting:{nodes}" for nodes in (100, 150, 200, 250)]
@@ -175,8 +176,19 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
     # As many values of each control on all transcriptions of a node count.
     for cell in studies["discretisations"].cells:
         method = parse(cell.transcription)
-        values = method.nodes if isinstance(method, SingleShooting) else method.elements * (method.order + 1)
+        assert isinstance(method, SingleShooting | DFET | Collocation)
+        if isinstance(method, SingleShooting):
+            values = method.nodes
+        else:
+            values = method.elements * (
+                1 + (method.most_control_order(method.order) if method.control_order is None else method.control_order)
+            )
         assert cell.problem == f"{values} nodes"
+        # On collocation the states are searched, too, and the dynamics are constraints; elsewhere they are propagated.
+        searched = isinstance(method, Collocation)
+        assert (
+            studies["discretisations"].inner_of(cell) == ("none" if searched else "propagate") and (cell.solver != "NSGA-III") is searched
+        )
     uncertain = studies["uncertainty"]
     assert uncertain.nominal == uncertain.cells[0].problem == "nominal"
     data = [cell.details["problem"]["data"] for cell in uncertain.cells if cell.solver == "NSGA-III"]

@@ -66,6 +66,14 @@ def test_all_may_work_apart(tmp_path):
     assert comparison.transcription == EACH and set(comparison.fronts) == {"macs", "nsga2"}
 
 
+def test_a_solver_may_have_a_transcription_for_each_problem():
+    two = {"slow": glide(), "fast": glide()}
+    own = {"slow": "radau:1x3", "fast": "chebyshev:1x4"}
+    made = study(problems=two, terms={"macs": {"transcription": own, "inner": "none"}})
+    found = {cell.problem: cell.transcription for cell in made.cells if cell.solver == "macs"}
+    assert found == own and all(made.inner_of(cell) == "none" for cell in made.cells if cell.solver == "macs")
+
+
 def test_quick_studies_keep_the_terms():
     quick = study(terms={"macs": {**APART["macs"], "evaluations": 9000}}, evaluations=60_000).quick()
     assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 75, "nsga2": 500}
@@ -89,6 +97,9 @@ def test_quick_studies_keep_the_terms():
         ({"macs": {"start": 3}}, "terms of 'macs': start must be 'uniform', 'smooth'"),
         ({"macs": {"start": {"spread": 2.0}}}, "spread must be in"),
         ({"macs": {"transcription": ["dfet:2x2"]}}, "terms of 'macs': transcription must be one"),
+        ({"macs": {"transcription": {"glide": ["dfet:2x2"]}}}, "terms of 'macs': transcription must be one, or one for each problem"),
+        ({"macs": {"transcription": {"glyde": "dfet:2x2"}}}, "terms of 'macs': transcription: there is no problem 'glyde'"),
+        ({"macs": {"transcription": {"glide": "dfet"}}}, "terms of 'macs': transcriptions: unknown transcription 'dfet'"),
         ({"macs": {"transcription": "dfet:2"}}, "dfet"),
     ],
 )

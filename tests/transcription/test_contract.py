@@ -13,8 +13,8 @@ from euler import Euler, EulerPhase
 from macs import MACS, payoff, sweep
 from problems import Problem, load
 from problems.cases.goddard import reference
-from transcription import DFET, from_dict, parse, word
-from transcription.dfet.phase import DFETPhase
+from transcription import DFET, Collocation, from_dict, parse, word
+from transcription.elements.phase import ElementsPhase
 from transcription.inner import inner_solver
 from transcription.phases.writer import PhaseWriter
 from transcription.trajectories.simulate import simulate
@@ -87,7 +87,16 @@ def jump() -> Problem:
     return problem
 
 
-@pytest.mark.parametrize("method", [DFET(3, 2), DFET(2, 3, basis="bernstein")])
+@pytest.mark.parametrize(
+    "method",
+    [
+        DFET(3, 2),
+        DFET(2, 3, basis="bernstein"),
+        Collocation(3, 3),
+        Collocation(2, 3, control="bernstein", control_order=1),
+        *(Collocation(2, 3, points=points) for points in ("gauss", "lobatto", "chebyshev")),
+    ],
+)
 def test_default_propagation_and_derivatives_are_those_of_the_method_itself(method, monkeypatch):
     problem = jump().compile()
     own = method.transcribe(problem)
@@ -96,8 +105,8 @@ def test_default_propagation_and_derivatives_are_those_of_the_method_itself(meth
     found = own.reduced.propagate(Z)
     derivatives = own.reduced.derivatives(found, rows)
     for name in ("propagate", "sensitivity"):
-        monkeypatch.setattr(DFETPhase, name, getattr(PhaseWriter, name))
-    monkeypatch.setattr(DFETPhase, "compilable", False)
+        monkeypatch.setattr(ElementsPhase, name, getattr(PhaseWriter, name))
+    monkeypatch.setattr(ElementsPhase, "compilable", False)
     plain = method.transcribe(problem)
     again = plain.reduced.propagate(plain.first_guess(Z[:, plain.free]))
     assert np.abs(again.Z - Z).max() < 1e-11 and np.abs(again.values - found.values).max() < 1e-11

@@ -12,7 +12,7 @@ from test_contract import jump
 from macs import MACS, Front, optimize
 from problems import Problem
 from transcription import DFET, Smooth, from_dict
-from transcription.dfet.phase import DFETPhase
+from transcription.elements.phase import ElementsPhase
 from transcription.phases.mesh import PhaseMesh
 from transcription.phases.writer import PhaseWriter
 from transcription.trajectories.simulate import simulate
@@ -59,7 +59,7 @@ def test_where_the_edges_are_the_equations_are_those_of_a_mesh_with_these_edges(
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_derivatives_by_the_edges_are_those_of_differences(basis, written_out, monkeypatch):
     if not written_out:
-        monkeypatch.setattr("transcription.dfet.propagation.SMALL", 0)
+        monkeypatch.setattr("transcription.elements.propagation.SMALL", 0)
     nlp = moving(basis).transcribe(oscillator())
     (z,) = propagated(nlp, k=1)
     rows = np.arange(len(nlp.reduced.scale))
@@ -81,8 +81,8 @@ def test_derivatives_are_those_of_the_equations_in_linked_phases_with_imposed_en
     rows = np.arange(len(own.reduced.scale))
     derivatives = own.reduced.derivatives(own.reduced.propagate(Z), rows)
     for name in ("propagate", "sensitivity"):
-        monkeypatch.setattr(DFETPhase, name, getattr(PhaseWriter, name))
-    monkeypatch.setattr(DFETPhase, "compilable", False)
+        monkeypatch.setattr(ElementsPhase, name, getattr(PhaseWriter, name))
+    monkeypatch.setattr(ElementsPhase, "compilable", False)
     plain = method.transcribe(problem)
     again = plain.reduced.propagate(plain.first_guess(Z[:, plain.free]))
     assert np.abs(again.Z - Z).max() < 1e-11

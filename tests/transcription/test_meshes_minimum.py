@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from problems import Problem
-from transcription import DFET
+from transcription import DFET, Collocation, Meshed
 from transcription.meshes.adaptation import where_controls_gain
 from transcription.meshes.minimum import Optimum, gains
 from transcription.meshes.verdict import Wanted, judge
@@ -16,7 +16,7 @@ from transcription.nlp.scalarized import scalarize
 WANTED = Wanted(1e-6, 1e-6)
 
 
-def optimum(problem: Problem, method: DFET, goal: int = 0):
+def optimum(problem: Problem, method: Meshed, goal: int = 0):
     """An optimum of one objective: NLP, trajectory, costates with multipliers, verdict; all in units of the objectives."""
     nlp = method.nlp(problem.compile())
     m = len(nlp.problem.goals)
@@ -41,11 +41,20 @@ def rest_to_rest(scale: float = 1.0) -> Problem:
     return problem
 
 
-@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+METHODS = [
+    DFET(3, 3),
+    DFET(3, 3, basis="bernstein"),
+    Collocation(3, 4, points="gauss"),
+    Collocation(3, 4),
+    Collocation(3, 4, control="bernstein"),
+]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
 @pytest.mark.parametrize("scale", [1.0, 250.0])
-def test_costates_are_those_of_the_closed_form(basis, scale):
+def test_costates_are_those_of_the_closed_form(method, scale):
     """H = u^2 / 2 + p v + q u: p is constant, q' = -p, u = -q; so p = -12 and q = 12 t - 6, times what multiplies the objective."""
-    _, _, found, verdict = optimum(rest_to_rest(scale), DFET(3, 3, basis=basis))
+    _, _, found, verdict = optimum(rest_to_rest(scale), method)
     times = np.linspace(0, 1, 21)
     costates = found.costates["run"](times) / found.of_objectives[0]
     assert costates[:, 0] == pytest.approx(np.full(21, -12.0 * scale), rel=1e-6)
@@ -53,11 +62,12 @@ def test_costates_are_those_of_the_closed_form(basis, scale):
     assert 0 <= verdict.gain < 1e-8 * scale
 
 
+@pytest.mark.parametrize("method", [DFET(3, 3), Collocation(3, 4, points="gauss"), Collocation(3, 4)], ids=str)
 @pytest.mark.parametrize("fraction", [0.02, 0.3])
-def test_a_control_that_is_not_the_best_shows_by_what_it_loses(fraction):
+def test_a_control_that_is_not_the_best_shows_by_what_it_loses(fraction, method):
     """With costates of the optimum, u + d has a Hamiltonian larger by d^2 / 2 everywhere: here the gain is exact, up to the values that are
     compared."""
-    nlp, trajectory, found, _ = optimum(rest_to_rest(), DFET(3, 3))
+    nlp, trajectory, found, _ = optimum(rest_to_rest(), method)
     z = nlp.interpolate(trajectory)
     controls = [i for i, v in enumerate(nlp.variables) if v.name.startswith("run.u")]
     z[controls] += 40 * fraction
@@ -102,7 +112,8 @@ def test_where_a_limit_is_reached_nothing_is_said():
     assert (verdict.gains["run"].amounts[np.abs(speed - 1.2) < 1e-4] == 0.0).all() and (np.abs(speed - 1.2) < 1e-4).sum() >= 4
 
 
-def test_a_constraint_on_an_integral_has_its_share_in_the_hamiltonian():
+@pytest.mark.parametrize("method", [DFET(4, 3), Collocation(4, 4, points="gauss"), Collocation(4, 4)], ids=str)
+def test_a_constraint_on_an_integral_has_its_share_in_the_hamiltonian(method):
     """Furthest in one second from rest with a given effort: x'' = u, integral u^2 = 3; u = 3 (1 - t), final x = 1."""
     problem = Problem("furthest")
     run = problem.phase("run", t0=0, tf=1)
@@ -112,7 +123,7 @@ def test_a_constraint_on_an_integral_has_its_share_in_the_hamiltonian():
     run.dynamics(x=v, v=u)
     problem.constraint("effort", run.integral(u**2), upper=3.0)
     problem.maximize("way", run.final(x))
-    _, trajectory, _, verdict = optimum(problem, DFET(4, 3))
+    _, trajectory, _, verdict = optimum(problem, method)
     assert trajectory["run"].edge_states[-1, 0] == pytest.approx(1.0, rel=1e-6)
     assert 0 <= verdict.gain < 1e-6
 

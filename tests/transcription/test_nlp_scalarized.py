@@ -12,9 +12,10 @@ from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells,
 
 from problems import load
 from problems.cases.goddard import reference
-from transcription import DFET, NLP
+from transcription import DFET, NLP, Collocation, MultipleShooting
 from transcription.inner import inner_solver
 from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scaling import nlp_scales
 
 INF = np.inf
 RANGES = np.array([141.0, 0.9])
@@ -254,3 +255,15 @@ def test_without_persistence_the_first_way_has_all_iterations() -> None:
 def test_calls_that_make_no_sense(reference: list[float], weights: list[float], more: dict) -> None:
     with pytest.raises(ValueError, match="scalarize"):
         solve(nlp_of(two_wells()), reference, weights, **more)
+
+
+def test_an_objective_is_not_lost_in_the_scale_of_an_explosion_elsewhere():
+    """Shooting into states where exp(25 x) grows without limit: the slopes of the cost over the box have a median of 1e100 or more."""
+    problem = load("standard/stirred_tank").compile()
+    known = Collocation(16, 4, points="gauss").nlp(problem)
+    optimum = scalarize(known, known.first_guess(np.full((1, len(known.free)), 1.0))[0], reference=np.zeros(1), weights=np.ones(1))
+    nlp = MultipleShooting(120, steps=2, control="linear").nlp(problem)
+    start = nlp.interpolate(known.unpack(optimum.z))
+    assert nlp_scales(nlp)[0] > 1e50
+    solved = scalarize(nlp, start, reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status == "converged" and solved.F[0] == pytest.approx(0.1330957, rel=1e-5)

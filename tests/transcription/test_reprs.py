@@ -7,7 +7,7 @@ import pytest
 from cases import oscillator
 
 from problems import load
-from transcription import DFET, MultipleShooting, SingleShooting, Smooth, Trajectory
+from transcription import DFET, Collocation, MultipleShooting, SingleShooting, Smooth, Trajectory
 from transcription.inner import Auto, Ipopt, Newton, inner_solver
 from transcription.nlp.scalarized import scalarize
 from transcription.phases.mesh import PhaseMesh
@@ -19,6 +19,8 @@ from transcription.trajectories.simulate import simulate
     [
         (DFET(4, 6), "DFET(elements=4, order=6)"),
         (DFET(4, 6, basis="bernstein", control_order=0), "DFET(elements=4, order=6, control_order=0, basis='bernstein')"),
+        (Collocation(10, 4), "Collocation(intervals=10, degree=4)"),
+        (Collocation(1, 9, points="gauss", control_order=2), "Collocation(intervals=1, degree=9, points='gauss', control_order=2)"),
         (SingleShooting(9, steps=2), "SingleShooting(nodes=9, steps=2)"),
         (MultipleShooting(3), "MultipleShooting(intervals=3)"),
         (Smooth(spread=0.3), "Smooth(spread=0.3)"),

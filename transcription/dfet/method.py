@@ -22,11 +22,13 @@ from problems.problem import Problem
 
 from ..assembly import Assembly
 from ..base import NLP, Meshed
+from ..elements.phase import ElementsPhase
+from ..elements.points import need_derivatives
+from ..elements.tables import Tables
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends
-from .element import Tables
-from .phase import DFETPhase
+from .tables import dfet_tables
 
 BASES = ("lobatto", "bernstein")
 
@@ -115,24 +117,14 @@ class DFET(Meshed):
         compiled = problem.compile()
         self.check_phases(compiled)
         for phase in compiled.phases:
-            _need_derivatives(phase)
+            need_derivatives(phase, "DFET")
 
         @cache
         def tables(order: int, control_order: int) -> Tables:
-            return Tables(order, control_order, self.basis)
+            return dfet_tables(order, control_order, self.basis)
 
-        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> DFETPhase:
+        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ElementsPhase:
             mesh = self.mesh_of(phase.name)
-            return DFETPhase(mesh, tables(mesh.order, self.degree_of_controls(mesh.order, mesh.control_order)), phase, layout, ends)
+            return ElementsPhase(mesh, tables(mesh.order, self.degree_of_controls(mesh.order, mesh.control_order)), phase, layout, ends)
 
         return Assembly(compiled, writer).nlp(self)
-
-
-def _need_derivatives(phase: CompiledPhase) -> None:
-    """Raise ValueError if the dynamics have no derivatives: implicit equations cannot be solved without."""
-    try:
-        phase.dynamics.jacobian()
-    except RuntimeError:
-        raise ValueError(
-            f"DFET: phase '{phase.name}': the dynamics have no derivatives; give their Callback a Jacobian, or its option 'enable_fd': True"
-        ) from None

@@ -68,6 +68,10 @@ class InnerSolver(ABC):
         super().__init_subclass__()
         cls.__repr__ = short_repr  # type: ignore[method-assign]
 
+    def program(self, nlp: NLP) -> NLP:
+        """The NLP whose free variables are to be searched with this inner level: as it is, unless candidates have more."""
+        return nlp
+
     @abstractmethod
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """Find feasible points near candidates.

@@ -1,4 +1,4 @@
-"""The inner levels by name, and those two that need no file of their own: the default, and propagation alone."""
+"""The inner levels by name, and those that need no file of their own: the default, propagation alone, and none."""
 
 from __future__ import annotations
 
@@ -47,9 +47,27 @@ class Propagate(InnerSolver):
         return replace(found, light=k)
 
 
+@dataclass(frozen=True)
+class Whole(InnerSolver):
+    """No inner level: a candidate is the whole vector of the NLP, states and all, and is scored as it is. The dynamics are constraints like
+    others, which the search itself has to satisfy, as population searches on collocation do in the literature."""
+
+    def program(self, nlp: NLP) -> NLP:
+        """See `InnerSolver.program`."""
+        return nlp.whole
+
+    def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
+        """See `InnerSolver.solve`."""
+        start = nlp.tighten(started(nlp, candidates, warm))
+        k = len(start)
+        found = scored(nlp, (start, *nlp.residuals(start)), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
+        return replace(found, light=k)
+
+
 NAMED: dict[str, InnerSolver] = {
     "auto": Auto(),
     "propagate": Propagate(),
+    "none": Whole(),
     "ipopt": Ipopt(),
     "ipopt-feasibility": Ipopt(objective="constant"),
 }

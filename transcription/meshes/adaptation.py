@@ -47,7 +47,7 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
     """The next mesh of one phase."""
     most = max(method.most_elements, 2 * method.elements)
     degree = trajectory.control.coefficients.shape[1] - 1
-    apart = method.orders_controls and degree < old.order and bool(trajectory.control_variables)
+    apart = method.orders_controls and degree < method.most_control_order(old.order) and bool(trajectory.control_variables)
     # Controls whose degree is that of the states get a higher one with them.
     rate = errors.rate if apart else np.minimum(errors.rate, errors.control_rate)
     rate = np.where(scores.sums > scores.states, np.minimum(rate, errors.integrand_rate), rate)
@@ -71,7 +71,7 @@ def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: 
     control_order = old.control_order
     if apart and (poor & smooth).any():
         more = max(degrees(e, r) for e, r in zip(scores.controls[poor & smooth], errors.control_rate[poor & smooth], strict=True))
-        raised = int(min(order, max(degree + min(more, order), LEAST_CONTROL_ORDER)))
+        raised = int(min(method.most_control_order(order), max(degree + min(more, order), LEAST_CONTROL_ORDER)))
         control_order = raised if raised > degree else control_order
     return old.with_elements(edges.tolist(), order, control_order)
 

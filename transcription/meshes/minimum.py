@@ -12,13 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
-from problems.derived import remembered
 
 from ..base import NLP
+from ..nlp.hamiltonian import hamiltonian, integral_weights
 from ..numerics.polynomials import gauss_legendre
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -91,26 +90,14 @@ def gains(
     if not total > 0:
         return {}
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    slopes = _slopes(problem).call([*quantities, parameters, optimum.of_objectives / total, optimum.of_constraints / total])
+    weights = integral_weights(problem, quantities, parameters, optimum.of_objectives / total, optimum.of_constraints / total)
     found = {}
-    for phase, slope in zip(problem.phases, slopes, strict=True):
+    for phase in problem.phases:
         costates, flown = optimum.costates.get(phase.name), trajectory[phase.name]
         if costates is not None and phase.controls and flown.tf > flown.t0:
-            first = 2 + phase.initials.size1_out(0) + phase.finals.size1_out(0)
-            weights = np.array(slope).ravel()[first : first + phase.integrands.size1_out(0)]
             scaled = replace(costates, coefficients=costates.coefficients / total)
-            found[phase.name] = _gain(phase, flown, scaled, weights, parameters)
+            found[phase.name] = _gain(phase, flown, scaled, weights[phase.name], parameters)
     return found
-
-
-@remembered
-def _slopes(problem: CompiledProblem) -> ca.Function:
-    """(q of each phase, parameters, multipliers of objectives and of constraints) -> gradient of their sum by each q."""
-    inputs = problem.objectives.mx_in()
-    of_objectives, of_constraints = ca.MX.sym("f", len(problem.goals)), ca.MX.sym("c", len(problem.limits))
-    total = ca.dot(problem.objectives(*inputs), of_objectives) + ca.dot(problem.constraints(*inputs), of_constraints)
-    outputs = [ca.densify(ca.gradient(total, q)) for q in inputs[:-1]]
-    return ca.Function("slopes", [*inputs, of_objectives, of_constraints], outputs)
 
 
 def _gain(
@@ -125,17 +112,15 @@ def _gain(
     s = np.array([trajectory.t0, trajectory.tf, *parameters])
     t = times.ravel()
 
-    def hamiltonian(controls: np.ndarray) -> np.ndarray:
-        inputs = x.T, controls.T, t[None], s
-        rates, integrands = (np.array(function(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
-        return np.einsum("ki,ik->k", adjoint, rates) + weights @ integrands
+    def under(controls: np.ndarray) -> np.ndarray:
+        return hamiltonian(phase, adjoint, weights, x, controls, t, s)
 
-    own, (paths, peaks) = hamiltonian(u), paths_and_peaks(phase, x, u, t, s)
+    own, (paths, peaks) = under(u), paths_and_peaks(phase, x, u, t, s)
     highest = peaks.max(axis=0)
     clear = _clear(phase, x, paths, peaks, highest)
     best, least = np.zeros(len(t)), u.copy()
     for controls in _others(phase, u):
-        values, (limited, raised) = hamiltonian(controls), paths_and_peaks(phase, x, controls, t, s)
+        values, (limited, raised) = under(controls), paths_and_peaks(phase, x, controls, t, s)
         allowed = _within(phase, limited) & (raised <= highest).all(axis=1)
         better = allowed & (own - values > best)
         best[better], least[better] = (own - values)[better], controls[better]

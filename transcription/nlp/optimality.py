@@ -1,6 +1,9 @@
-"""Residual of the first-order conditions of Pareto optimality at a feasible vector."""
+"""Residual of the first-order conditions of Pareto optimality at a feasible vector, and the multipliers that leave least of them."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
@@ -17,8 +20,29 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
+SMALL = 1e-6
+"""What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
+that the residual asks for, far more than round-off."""
 REFINEMENTS, EXACT = 3, 1e-12
 """As many at most, until what is left of the right-hand sides is this part of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of a vector of an NLP, in the user's units: up to the residual of its `optimality`, the derivatives of the sum of
+    objectives, rows and variables, each times its own, vanish.
+
+    Attributes
+    ----------
+    of_objectives : array (m,)
+        Not negative; in the scales of the objectives they sum to 1.
+    of_rows, of_bounds : arrays (r,), (n,)
+        Of the rows and of the variables' bounds, positive at upper limits.
+    """
+
+    of_objectives: np.ndarray
+    of_rows: np.ndarray
+    of_bounds: np.ndarray
 
 
 def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> float:
@@ -52,21 +76,85 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         Not negative; infinite where a derivative is no number, where the equations do not determine the states, and where no multipliers
         are found.
     """
-    z = np.asarray(z, dtype=float)
-    found = gradients(nlp)(z)
-    dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
-    if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
-        return float("inf")
-    natural = nlp_scales(nlp)
-    scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
-    unit = _units(nlp)
-    dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
-    dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
-    sides, slack = _inequalities(nlp, z, g, dg)
-    try:
-        return _least(_reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides])), slack)
-    except (RuntimeError, np.linalg.LinAlgError):
-        return float("inf")
+    conditions = Conditions.of(nlp, z, F_scales)
+    return float("inf") if conditions is None else conditions.residual
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others.
+
+    Attributes
+    ----------
+    nlp : NLP
+    scales : array (m,)
+        Of the objectives; infinite for those left out.
+    near : list of arrays
+        Masks of the bounds and limits that may have a multiplier: lower and upper bounds (n,), lower and upper limits of rows (r,).
+    reduced, adjoints : arrays (d, k), (equations, k)
+        Reduced gradients of the objectives and of these inequalities, and the multipliers of the equations that belong to them.
+    slack : array
+        Of the inequalities.
+    """
+
+    nlp: NLP
+    scales: np.ndarray
+    near: list[np.ndarray]
+    reduced: np.ndarray
+    adjoints: np.ndarray
+    slack: np.ndarray
+
+    @classmethod
+    def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Conditions | None:
+        """Those at z, see `optimality`; None where they cannot be formed."""
+        z = np.asarray(z, dtype=float)
+        found = gradients(nlp)(z)
+        dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
+        if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
+            return None
+        natural = nlp_scales(nlp)
+        scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
+        unit = _units(nlp)
+        dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
+        dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
+        near, sides, slack = _inequalities(nlp, z, g, dg)
+        try:
+            reduced, adjoints = _reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides]))
+        except RuntimeError:
+            return None
+        return cls(nlp, scales, near, reduced, adjoints, slack)
+
+    @cached_property
+    def residual(self) -> float:
+        """See `optimality`."""
+        try:
+            return _least(self.reduced, self.slack)[0]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return float("inf")
+
+    def multipliers(self) -> Multipliers | None:
+        """Those that leave the least residual; None where none are found.
+
+        Where limits depend on each other, as do those of a state along an arc on one, or of a mass and of the thrust while it is off, they
+        are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others.
+        """
+        try:
+            x = _least(self.reduced, self.slack, SMALL * np.concatenate(self._others()))[1]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return None
+        nlp, used = self.nlp, np.isfinite(self.scales)
+        of_objectives, of_rows, of_bounds = np.zeros(len(used)), np.zeros(len(nlp.g_scale)), np.zeros(len(nlp.variables))
+        of_objectives[used], rest = np.split(x, [np.count_nonzero(used)])
+        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ x
+        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in self.near])[:-1])
+        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), self.near, (-1, 1, -1, 1), each, strict=True):
+            target[which] += side * values
+        return Multipliers(of_objectives / self.scales, of_rows / nlp.g_scale, of_bounds / _units(nlp))
+
+    def _others(self) -> list[np.ndarray]:
+        """Masks of the inequalities, group by group, that are no bounds of free variables."""
+        kept = np.setdiff1d(np.arange(len(self.nlp.variables)), self.nlp.free)
+        return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.near)]
 
 
 def _units(nlp: NLP) -> np.ndarray:
@@ -74,8 +162,9 @@ def _units(nlp: NLP) -> np.ndarray:
     return np.where(np.isfinite(nlp.span), nlp.span, nlp.scale)
 
 
-def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled gradients (k, n) and slacks (k,) of the inequalities c >= 0 that may have a multiplier, bounds first."""
+def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """Masks of the lower and upper bounds (n,) and of the lower and upper limits of rows (r,) that may have a multiplier; scaled gradients
+    (k, n) and slacks (k,) of these inequalities c >= 0, in that order."""
     bounded, one_way = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper
     slacks = (
         (z - nlp.lower) / _units(nlp),
@@ -86,11 +175,12 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
     near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
     bounds = [side * (np.arange(len(z)) == np.flatnonzero(one)[:, None]) for side, one in zip((1.0, -1.0), near[:2], strict=True)]
     rows = [*bounds, dg[near[2]].toarray(), -dg[near[3]].toarray()]
-    return np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
+    return near, np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
 
 
-def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarray:
-    """Reduced gradients (d, k) of k functions with gradients (k, n): what is left of each after the best multipliers of the equations.
+def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reduced gradients (d, k) of k functions with gradients (k, n), what is left of each after the best multipliers of the equations; and
+    these multipliers (equations, k).
 
     Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
     for the others. Where there are as many equations as others, these follow from the free ones, and it is the total derivative by these.
@@ -101,12 +191,13 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> np.ndarr
     if r + np.count_nonzero(measured) == n:
         by_states = csc_matrix(equations[:, ~measured].T)
         adjoints = _solved(splu(by_states), by_states, gradients[:, ~measured].T)
-        return gradients[:, measured].T - equations[:, measured].T @ adjoints
+        return gradients[:, measured].T - equations[:, measured].T @ adjoints, adjoints
     weights = np.where(measured, 1.0, DEPENDENT)
     e, every = equations.tocoo(), np.arange(n + r)
     i, j = np.r_[e.col, e.row + n, every], np.r_[e.row + n, e.col, every]
     exact, regular = (csc_matrix((np.r_[e.data, e.data, weights, np.full(r, -last)], (i, j))) for last in (0.0, REGULAR))
-    return _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))[:n][measured]
+    found = _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))
+    return found[:n][measured], found[n:]
 
 
 def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
@@ -129,14 +220,14 @@ def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
     return solution
 
 
-def _least(A: np.ndarray, slack: np.ndarray) -> float:
-    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1.
+def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) -> tuple[float, np.ndarray]:
+    """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x; with nu times `small` among the residuals, too.
 
     Without that last condition, but with (sum mu - 1) among the residuals, the answer is the same up to a factor: the residual of the
     direction of x only shrinks with its length, and the length that is best is a growing function of how small it is.
     """
     k, m = len(slack), A.shape[1] - len(slack)
-    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(slack)])])
+    M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(np.hypot(slack, small))])])
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
     x = nnls(full, right, maxiter=10 * full.shape[1])[0]
@@ -145,4 +236,5 @@ def _least(A: np.ndarray, slack: np.ndarray) -> float:
     polished = np.zeros_like(x)
     polished[passive] = np.linalg.lstsq(full[:, passive], right, rcond=None)[0]
     candidates = [x, np.maximum(polished, 0.0)]
-    return float(min(np.linalg.norm(M @ c) / c[:m].sum() for c in candidates if c[:m].sum() > 0))
+    found = ((float(np.linalg.norm(M @ c) / c[:m].sum()), c / c[:m].sum()) for c in candidates if c[:m].sum() > 0)
+    return min(found, key=lambda one: one[0])

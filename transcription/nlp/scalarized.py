@@ -34,6 +34,9 @@ USEFUL = 1e-4
 objective's own size, how much of it could be gained over a whole span of the variables."""
 LITTLE = 1e-4
 """Part of what an objective could change by that counts as one unit of it at least, where it is near zero."""
+ABSURD = 1e12
+"""Multiple of what counts as one unit of an objective at the start, and of 1, from which on its usual scale is that of an explosion
+somewhere in the box: in it the objective would be nothing."""
 AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -276,6 +279,9 @@ def _task(
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
     scale = nlp_scales(nlp)
+    if (scale > ABSURD).any():
+        own = _own_scales(nlp, start, F)
+        scale = np.where(scale > ABSURD * np.maximum(own, 1.0), own, scale)
     slope = np.where(moving, weights, 0.0) / scale
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))

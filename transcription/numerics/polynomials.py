@@ -1,4 +1,4 @@
-"""Polynomial bases on [-1, 1]: Gauss nodes and weights, Lagrange and Bernstein functions and their derivatives.
+"""Polynomial bases on [-1, 1]: their nodes, quadrature on these, Lagrange and Bernstein functions, derivatives and integrals.
 
 Pure functions: arrays in, arrays out. Lagrange functions are evaluated by the barycentric formula (Berrut and Trefethen, "Barycentric
 Lagrange Interpolation", SIAM Review 46(3), 2004), Bernstein functions from their definition (Farouki, "The Bernstein polynomial basis: a
@@ -11,9 +11,9 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import comb
+from scipy.special import comb, roots_jacobi
 
-BASES = ("lobatto", "legendre", "closed-legendre", "bernstein")
+BASES = ("lobatto", "legendre", "closed-legendre", "radau", "closed-radau", "chebyshev", "bernstein")
 
 
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -30,12 +30,25 @@ def lobatto_nodes(n: int) -> np.ndarray:
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
+def radau_nodes(n: int) -> np.ndarray:
+    """The n Gauss-Radau nodes on [-1, 1] with -1 among them, and not 1: the roots of P_{n-1}(t) + P_n(t)."""
+    return np.append(-1.0, roots_jacobi(n - 1, 0.0, 1.0)[0]) if n > 1 else np.array([-1.0])
+
+
+def chebyshev_nodes(n: int) -> np.ndarray:
+    """The n Chebyshev-Gauss-Lobatto nodes on [-1, 1], -cos(pi k / (n - 1)), both ends among them. For n = 1, the midpoint."""
+    if n == 1:
+        return np.zeros(1)
+    # As sines, which are symmetric to the last bit.
+    return np.sin(np.pi * (2.0 * np.arange(n) - (n - 1)) / (2.0 * (n - 1)))
+
+
 @cache
 def nodes(basis: str, degree: int) -> np.ndarray:
     """The places of a basis' coefficients on [-1, 1], shape (degree + 1,).
 
-    Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends), those of Bernstein's the equally spaced
-    abscissae of the control points. Raises ValueError for an unknown basis.
+    Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends; "closed-radau": Gauss-Radau nodes and
+    1), those of Bernstein's the equally spaced abscissae of the control points. Raises ValueError for an unknown basis.
     """
     if basis == "lobatto":
         points = lobatto_nodes(degree + 1)
@@ -43,6 +56,12 @@ def nodes(basis: str, degree: int) -> np.ndarray:
         points = gauss_legendre(degree + 1)[0]
     elif basis == "closed-legendre":
         points = np.array([-1.0, *gauss_legendre(degree - 1)[0], 1.0])
+    elif basis == "radau":
+        points = radau_nodes(degree + 1)
+    elif basis == "closed-radau":
+        points = np.append(radau_nodes(degree), 1.0)
+    elif basis == "chebyshev":
+        points = chebyshev_nodes(degree + 1)
     elif basis == "bernstein":
         points = np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1)
     else:
@@ -71,15 +90,42 @@ def basis_matrix(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     """Values of a basis at `tau` (n,), shape (n, degree + 1). Raises ValueError for an unknown basis."""
     if basis == "bernstein":
         return bernstein_matrix(degree, tau)
-    points, weights = nodes(basis, degree), _barycentric_weights(basis, degree)
+    return _lagrange(nodes(basis, degree), _barycentric_weights(basis, degree), tau)
+
+
+def lagrange_matrix(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Values of the Lagrange functions of any points (k,) at `tau` (n,), shape (n, k)."""
+    return _lagrange(points, _weights(points), tau)
+
+
+def lagrange_derivative(points: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Derivatives of the Lagrange functions of any points (k,) at `tau` (n,), shape (n, k)."""
+    return lagrange_matrix(points, tau) @ _differentiation(points, _weights(points))
+
+
+def lagrange_integrals(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Integrals of the Lagrange functions of any points (k,) from -1 to `ends` (n,), shape (n, k).
+
+    Those up to 1 are the weights of the quadrature that interpolates: Gauss's, Radau's and Lobatto's at their nodes, and Clenshaw's and
+    Curtis's at Chebyshev-Gauss-Lobatto nodes.
+    """
+    tau, weights = gauss_legendre(len(points))
+    half = 0.5 * (1.0 + np.asarray(ends, dtype=float))
+    inside = half[:, None] * (1.0 + tau) - 1.0
+    return half[:, None] * (weights @ lagrange_matrix(points, inside.ravel()).reshape(*inside.shape, len(points)))
+
+
+def _lagrange(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.ndarray:
     difference = np.asarray(tau, dtype=float)[:, None] - points
     hit = np.abs(difference) < 1e-15
-    at_points = hit.any()
-    if at_points:
-        difference[hit] = 1.0
+    if not hit.any():
+        values = weights / difference
+        return values / values.sum(axis=1, keepdims=True)
+    on = hit.any(axis=1, keepdims=True)
+    difference[hit] = 1.0
     values = weights / difference
-    values /= values.sum(axis=1, keepdims=True)
-    return np.where(hit.any(axis=1, keepdims=True), hit, values) if at_points else values
+    # What stands there at a point may sum to zero, and is not used.
+    return np.where(on, hit, values / np.where(on, 1.0, values.sum(axis=1, keepdims=True)))
 
 
 @cache
@@ -99,16 +145,25 @@ def basis_derivative(basis: str, degree: int, tau: np.ndarray) -> np.ndarray:
     if basis == "bernstein":
         return bernstein_derivative(degree, tau)
     points, weights = nodes(basis, degree), _barycentric_weights(basis, degree)
+    return basis_matrix(basis, degree, tau) @ _differentiation(points, weights)
+
+
+def _differentiation(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Derivatives of Lagrange functions at their own points, (k, k)."""
     at_points = (weights / weights[:, None]) / (points[:, None] - points + np.eye(len(points)))
     np.fill_diagonal(at_points, 0.0)
     np.fill_diagonal(at_points, -at_points.sum(axis=1))
-    return basis_matrix(basis, degree, tau) @ at_points
+    return at_points
 
 
 @cache
 def _barycentric_weights(basis: str, degree: int) -> np.ndarray:
-    points = nodes(basis, degree)
-    return 1.0 / np.prod(points[:, None] - points + np.eye(degree + 1), axis=1)
+    return _weights(nodes(basis, degree))
+
+
+def _weights(points: np.ndarray) -> np.ndarray:
+    """Barycentric weights (k,) up to a common factor: products of distances fall like 2^-k, doubled ones do not."""
+    return 1.0 / np.prod(2.0 * (points[:, None] - points) + np.eye(len(points)), axis=1)
 
 
 def legendre_coefficients(values: np.ndarray) -> np.ndarray:

@@ -15,10 +15,14 @@ from problems.compiled import CompiledPhase
 from ..numerics.periodic import wrapped
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from .adjoint import Adjoint, Ending, PhaseMultipliers, swept
 from .guess import along, state_along
 from .layout import Layout
 from .pointwise import Pointwise
 from .state_equations import StateEquations
+
+NEGLIGIBLE = 1e-8
+"""Multipliers of limits that are smaller than this part of the costates are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,9 @@ class Rows:
     propagated: list[bool] = field(default_factory=list)
     dynamics: dict[str, slice] = field(default_factory=dict)
     """Where the rows of dynamics of each phase are."""
+    samples: dict[tuple[str, str], list[slice]] = field(default_factory=dict)
+    """Where the rows of each of its path constraints ("path"), peaks ("peak") and bounded hidden states ("state") are, by its name and
+    that word."""
 
     def add(
         self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
@@ -67,6 +74,13 @@ class Rows:
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
+
+    def add_samples(
+        self, phase: str, kind: str, expression: ca.MX, lower: object, upper: object, scale: object, label: str, *, propagated: bool = False
+    ) -> None:
+        """Rows that are samples of one quantity of a phase, so that their multipliers are found again; see `add` and `samples`."""
+        self.samples.setdefault((phase, kind), []).append(slice(self.count, self.count + expression.numel()))
+        self.add(expression, lower, upper, scale, label, propagated=propagated)
 
     def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
         """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
@@ -168,6 +182,67 @@ class PhaseWriter(ABC):
         """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
         None: what these say between their places is not known."""
         return None
+
+    def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
+        """The costates of the phase by the adjoint equation, integrated backward along one extended vector that is optimal.
+
+        At tf they are the derivatives of the Lagrangian by the final states, as far as these belong to the phase's dynamics and integrals:
+        whatever else the method or the problem makes of them follows tf. Limits of states, path constraints on states alone and peaks make
+        them jump, at the nodes of the states in which these are written; what other path constraints do there is spread between the nodes.
+        """
+        dynamics, limits, mixed = (np.array(one).ravel() for one in self._by_states(extended, *self._columns(multipliers)))
+        mine = multipliers.variables
+        limits = limits + np.concatenate([mine, np.zeros(len(limits) - len(mine))])
+        slots, places = self.state_nodes()
+        inside = (slots != self.ends.final).any(axis=1)
+        index = self.layout.index
+        ending = Ending(
+            final=-dynamics[index(self.ends.final)],
+            initial=dynamics[index(self.ends.initial)],
+            places=places[inside],
+            jumps=limits[index(slots)].reshape(slots.shape)[inside],
+            spread=mixed[index(slots)].reshape(slots.shape)[inside],
+        )
+        s = extended[index(self.ends.statics)]
+        return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
+
+    def limited(self, multipliers: PhaseMultipliers) -> bool:
+        """Whether limits that make costates jump have a multiplier before tf that counts for something beside costates, both in the scales
+        of what they belong to: limits of states, path constraints on states alone, and peaks."""
+        phase, slots = self.phase, self.state_nodes()[0]
+        scales = np.array([v.scale for v in phase.states])
+        between = (slots >= 0) & (slots != self.ends.final)
+        of_states = np.where(between, multipliers.variables[np.where(between, slots, 0)], 0.0) * scales
+        jumping = zip(phase.paths, multipliers.paths, self._mixed, strict=True)
+        of_paths = [limit.scale * one for limit, one, mixed in jumping if not mixed]
+        least = NEGLIGIBLE * np.abs(multipliers.dynamics.reshape(-1, len(scales)) * scales).max(initial=0.0)
+        return any(np.abs(one).max(initial=0.0) > least for one in (of_states, *of_paths, *multipliers.peaks))
+
+    @cached_property
+    def _mixed(self) -> list[bool]:
+        """Which of the path constraints depend on controls: their multipliers are densities."""
+        rows, _ = self.phase.path.jac_sparsity(0, 1).get_triplet()
+        return [k in rows for k in range(len(self.phase.paths))]
+
+    def _columns(self, multipliers: PhaseMultipliers) -> tuple[np.ndarray, ...]:
+        """Multipliers as inputs of `_by_states`."""
+        paths, peaks = (np.concatenate([np.empty(0), *several]) for several in (multipliers.paths, multipliers.peaks))
+        mixed = np.concatenate([np.empty(0), *(np.full(len(one), of_u) for one, of_u in zip(multipliers.paths, self._mixed, strict=True))])
+        return multipliers.dynamics, np.where(mixed, 0.0, paths), np.where(mixed, paths, 0.0), peaks, multipliers.integrals
+
+    @cached_property
+    def _by_states(self) -> ca.Function:
+        """(extended vector, multipliers of dynamics, path constraints on states alone, others, peaks and integrals) -> derivatives by the
+        extended vector of the Lagrangian's terms of dynamics and integrals, of those that make costates jump, and of the others."""
+        extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
+        written = self.write(self.fill(extended), rows)
+        g, name = ca.vertcat(*rows.expressions), self.phase.name
+        paths = ca.vertcat(ca.MX(0, 1), *(g[one] for one in rows.samples.get((name, "path"), ())))
+        columns = [g[rows.dynamics[name]], paths, paths, ca.vec(written.peak_samples.T), written.integrals]
+        symbols = [ca.MX.sym(f"of_{k}", one.numel()) for k, one in enumerate(columns)]
+        dynamics, of_states, mixed, of_peaks, integrals = (ca.dot(*one) for one in zip(columns, symbols, strict=True))
+        outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_states + of_peaks, mixed)]
+        return ca.Function("by_states", [extended, *symbols], outputs)
 
     def fill(self, extended: ca.MX) -> ca.MX:
         """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
@@ -273,7 +348,8 @@ class PhaseWriter(ABC):
     def add_paths(self, rows: Rows, values: ca.MX | list[ca.MX]) -> None:
         """Add the path constraints, of which `values` (npath, k) are samples; or one row of samples for each, of any lengths."""
         for limit, samples in zip(self.phase.paths, ca.vertsplit(values) if isinstance(values, ca.MX) else values, strict=True):
-            rows.add(samples, limit.lower, limit.upper, limit.scale, f"path '{limit.name}' of '{self.phase.name}'")
+            label = f"path '{limit.name}' of '{self.phase.name}'"
+            rows.add_samples(self.phase.name, "path", samples, limit.lower, limit.upper, limit.scale, label)
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

@@ -13,9 +13,11 @@ from problems.compiled import CompiledPhase
 
 from ..numerics.batched import CHAIN, Batched, widened, work
 from ..numerics.polynomials import lobatto_nodes
+from ..phases.adjoint import Adjoint, PhaseMultipliers, slopes
 from ..phases.layout import Layout
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from .adjoint import Steps, backward, cubics
 from .control_law import ControlLaw
 from .step import Step, StepMesh
 
@@ -63,7 +65,7 @@ class ShootingPhase(PhaseWriter):
         self.add_dynamics(rows, pick(extended, self.R) - pick(extended, self._arrivals))
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
-            rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
+            rows.add_samples(phase.name, "state", at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
         seen = pick(extended, self.W)
         self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
@@ -124,6 +126,47 @@ class ShootingPhase(PhaseWriter):
         state = PiecewisePolynomial(edges, table, "lobatto")
         inside = 2.0 * np.array([place for place in self.step.points if place < 1.0]) - 1.0
         return self.trajectory(extended, inside, state, control)
+
+    def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
+        """See `PhaseWriter.swept`: by the adjoint of the steps themselves, and cubic inside of each."""
+        phase, flown, nx, nq, n = self.phase, self.unpack(extended), len(self.phase.states), len(self.Q), self.mesh.steps
+        rows, points = self.step.rows, len(self.step.points)
+        D, at_end = (np.array(one) for one in self._linearised(extended))
+        D = D.reshape(-1, n, self.step.inputs).swapaxes(0, 1)[:, :, :nx]
+        steps = Steps(
+            D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx), at_end.reshape(-1, self.step.inputs)[:, :nx]
+        )
+        seen = np.array([*multipliers.paths, *multipliers.peaks]).reshape(self.W.shape[::-1]).T
+        inside = self.mesh.ends[1:-1]
+        falls = np.zeros((n, nx))
+        if self.apart:
+            slots = self.B[1:-1]
+            falls[inside] = np.where(slots >= 0, multipliers.variables[slots], 0.0)
+        elif len(self.Y):
+            falls[inside] = np.array(multipliers.states).T
+        of_samples, of_end = seen[: n * points].reshape(n, points, rows), seen[n * points :].ravel()
+        final = multipliers.dynamics.reshape(-1, nx)[-1]
+        begin, end = backward(steps, final, multipliers.integrals, of_samples, of_end, falls)
+        s = extended[self.layout.index(self.ends.statics)]
+        ends = []
+        for tau, costates in ((-1.0, begin), (1.0, end)):
+            x, u = (piece(np.array([tau]))[:, 0] for piece in (flown.state.on_elements, flown.controls_on_elements))
+            by_x, own = slopes(phase, x, u, flown.state.times(np.array([tau]))[:, 0], s, multipliers.integrals)
+            ends.append(-(np.einsum("kij,kj->ki", by_x, costates) + own))
+        return Adjoint(cubics(flown.state.edges, begin, end, *ends))
+
+    @cached_property
+    def _linearised(self) -> ca.Function:
+        """Extended vector -> derivatives (results, N inputs) of all steps side by side, and (rows, inputs) of samples at their end, by all
+        inputs of a step; without rows where none are sampled there."""
+        extended, n = ca.MX.sym("extended", self.layout.total), self.mesh.steps
+        inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
+        shots = [states for states, *_ in self._propagated_shots(extended)]
+        before = ca.horzcat(*(part for j, states in enumerate(shots) for part in (left[:, j], states[:, :-1])))
+        D, at_end = self.step.gradient(samples=True).map(n)(before, *inputs), ca.MX(0, self.step.inputs)
+        if len(self.W) > n * len(self.step.points):
+            at_end = self.step.end_gradient(shots[-1][:, -1], *self._inputs(extended, n - 1))
+        return ca.Function("linearised", [extended], [ca.densify(D), ca.densify(at_end)])
 
     @property
     def _arrivals(self) -> np.ndarray:

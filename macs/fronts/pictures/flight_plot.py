@@ -1,4 +1,4 @@
-"""Figure of one trajectory: states, controls and path constraints over time."""
+"""Figure of one trajectory: states, controls and path constraints over time, then costates and the Hamiltonian."""
 
 from __future__ import annotations
 
@@ -13,17 +13,24 @@ from problems.compiled import Limit, Variable
 from .style import COLORS, GREY, STYLE, label, new_figure
 
 if TYPE_CHECKING:
+    from transcription.trajectories.costates import Costates, PhaseCostates
     from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
 DENSE = np.linspace(-1.0, 1.0, 41)
 """Points in [-1, 1] of each element at which its polynomials are drawn."""
 
 
-def draw_flight(trajectory: Trajectory, title: str, figure: Any = None) -> np.ndarray:
-    """Axes, one for each panel: a panel for each state, control and path constraint, with all phases on one time axis.
+FLAT = 0.02
+"""Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
+
+
+def draw_flight(trajectory: Trajectory, title: str, figure: Any = None, costates: Costates | None = None) -> np.ndarray:
+    """Axes, one for each panel, with all phases on one time axis: a panel for each state, control and path constraint; from a new row on,
+    if there are any, one for each costate and one for the Hamiltonian.
 
     Lines are the polynomials of the transcription on each element, so that jumps are visible; dots are its nodes. Dashed lines are bounds,
-    if they are not too far from the values; the text above each panel always gives them.
+    if they are not too far from the values; the text above each panel always gives them. Above the Hamiltonian are the weights of the
+    objectives.
 
     Parameters
     ----------
@@ -32,13 +39,17 @@ def draw_flight(trajectory: Trajectory, title: str, figure: Any = None) -> np.nd
         Text above the panels.
     figure : matplotlib Figure, optional
         Empty figure to draw into. Default: a new one.
+    costates : Costates, optional
+        Of the trajectory.
     """
     import matplotlib
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         panels = quantities(trajectory)
+        states = [] if costates is None else [name for name, kind in panels if kind == "state"]
         columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
-        rows = -(-len(panels) // columns)
+        above = -(-len(panels) // columns)
+        rows = above if costates is None else above - (-(len(states) + 1) // columns)
         if figure is None:
             figure = new_figure(3.6 * columns + 0.4, 1.75 * rows + 0.6)
         else:
@@ -46,10 +57,50 @@ def draw_flight(trajectory: Trajectory, title: str, figure: Any = None) -> np.nd
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for ax, (name, kind) in zip(grid, panels, strict=False):
             _draw_panel(ax, trajectory, name, kind)
-        for ax in grid[len(panels) :]:
+        used = list(range(len(panels)))
+        if costates is not None:
+            used += range(above * columns, above * columns + len(states) + 1)
+            draw_costates(grid[used[len(panels) :]], trajectory, costates, states)
+        for ax in np.delete(grid, used):
             ax.remove()
-        _finish(figure, grid[: len(panels)], columns, trajectory, title)
-    return grid[: len(panels)]
+        _finish(figure, grid, used, columns, trajectory, title)
+    return grid[used]
+
+
+def draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
+    """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one."""
+    worth = max(_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    for ax, name in zip(axes, [*states, None], strict=True):
+        everything: list[np.ndarray] = []
+        ranges: list[np.ndarray] = []
+        for k, phase in enumerate(trajectory.phases):
+            own, color = costates[phase.name], COLORS[k % len(COLORS)]
+            if name is None:
+                values = own.hamiltonian
+                ranges.append(phase.time)
+                ax.plot(phase.time, values, color=color, lw=1.0)
+            elif name in own:
+                values = own[name]
+                ranges.append(phase[name])
+                times, line = _dense(own.polynomial.edges, own.polynomial.on_element, own.names.index(name), None)
+                ax.plot(times, line, color=color, lw=1.3)
+                everything.append(line[np.isfinite(line)])
+            else:
+                continue
+            ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
+            everything.append(values)
+        drawn, unit = np.concatenate(everything), float(np.ptp(np.concatenate(ranges)))
+        least = FLAT * worth / unit if unit > 0 else 0.0
+        middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least, 1e-12)
+        ax.set_ylim(middle - 1.12 * half, middle + 1.12 * half)
+        ax.set_ylabel("Hamiltonian" if name is None else f"costate of {name}")
+    weights = ", ".join(f"{weight:.3g}" for weight in costates.weights)
+    axes[-1].set_title(f"weights {weights}", loc="right", fontsize=7, color=GREY, pad=2)
+
+
+def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
+    """How much the largest costate of each state is worth over the range of the state, all states together."""
+    return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 
 
 def quantities(trajectory: Trajectory) -> list[tuple[str, str]]:
@@ -140,15 +191,15 @@ def _range(limit: Variable | Limit) -> str:
     return f"= {low}" if limit.lower == limit.upper else f"in [{low}, {high}]"
 
 
-def _finish(figure: Any, axes: np.ndarray, columns: int, trajectory: Trajectory, title: str) -> None:
-    """Draw the time axis, the boundaries and names of the phases, and the title."""
+def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, trajectory: Trajectory, title: str) -> None:
+    """Draw the time axis below each column, the boundaries and names of the phases, and the title."""
     unit = " | ".join(dict.fromkeys(phase.time_unit for phase in trajectory.phases))
-    for i, ax in enumerate(axes):
+    for i, ax in ((i, grid[i]) for i in used):
         for phase in trajectory.phases[1:]:
             ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
-        ax.tick_params(labelbottom=i >= len(axes) - columns)
+        ax.tick_params(labelbottom=i + columns not in used)
     figure.supxlabel(label("time", unit), fontsize=9)
-    ax = axes[0]
+    ax = grid[0]
     first, last = trajectory.phases[0].t0, max(phase.tf for phase in trajectory.phases)
     ax.set_xlim(first - 0.015 * (last - first), last + 0.015 * (last - first))
     if len(trajectory) > 1:

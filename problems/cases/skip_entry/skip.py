@@ -9,10 +9,12 @@ flight is level at its lowest point. Thrust follows without lag.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...problem import Problem
 from ..reentry.vehicle import SHUTTLE
 from ..winged import FOOT, Winged
-from .statement import ASCENT, START, Mission, skip_entry
+from .statement import ASCENT, DESCENT, START, TOP, Mission, skip_entry
 
 BTU = 1054.350264488889
 """One thermochemical Btu in J."""
@@ -30,6 +32,27 @@ VEHICLE = Winged(
     heating=SHUTTLE.heating,
     heating_constant=SHUTTLE.heating_constant * BTU / FOOT**2 * 1e-3,
 )
+
+DOWN = {
+    "share": (0.0, 0.15, 0.85, 1.0),
+    "altitude": (TOP, 66e3, 60e3, LOWEST),
+    "speed": (START["speed"], 7700.0, 5700.0, 5280.0),
+    "flight-path angle": (START["flight-path angle"], -0.005, -0.005, 0.0),
+}
+UP = {
+    "share": (0.0, 0.25, 0.5, 1.0),
+    "altitude": (LOWEST, 58e3, 67e3, TOP),
+    "speed": (5280.0, 5000.0, 4880.0, 4800.0),
+    "flight-path angle": (0.0, 0.075, 0.06, 0.0),
+}
+"""A flight to begin with, at these shares of its phases: a glide, then up without much thrust."""
+DURATIONS = {DESCENT: 900.0, ASCENT: 130.0}
+"""Of that flight, s."""
+MESHES = {
+    DESCENT: {"edges": [*np.linspace(0.0, 0.5, 7), *np.linspace(0.5, 0.85, 9)[1:], *np.linspace(0.85, 1.0, 15)[1:]], "order": 5},
+    ASCENT: {"edges": [*np.linspace(0.0, 0.4, 17), *np.linspace(0.4, 1.0, 11)[1:]], "order": 5, "control_order": 1},
+}
+"""Shorter elements before and after the lowest point, where two limits are reached and the engine burns for a moment."""
 
 
 def problem(
@@ -60,4 +83,20 @@ def problem(
     ascent = problem.phases[ASCENT]
     problem.maximize("terminal mass", ascent.final(ascent["mass"]), unit="kg")
     problem.maximize("terminal speed", ascent.final(ascent["speed"]), unit="m/s")
+    _guess(problem, lowest, mass)
+    problem.default_transcription = {
+        "method": "DFET",
+        "settings": {"elements": 12, "order": 5, "control_order": 2, "basis": "bernstein", "mesh": MESHES},
+    }
     return problem
+
+
+def _guess(problem: Problem, lowest: float, mass: float) -> None:
+    begin = 0.0
+    for (name, duration), states, attack, bank in zip(DURATIONS.items(), (DOWN, UP), (0.35, 0.5), (-1.0, 0.0), strict=True):
+        times = begin + duration * np.array(states["share"])
+        lines = {state: (times, np.array(values)) for state, values in states.items() if state != "share"}
+        lines["altitude"] = times, np.maximum(states["altitude"], lowest)
+        held = {"latitude": 0.0, "heading": START["heading"], "mass": mass, "angle of attack": attack, "bank angle": bank}
+        problem.phases[name].guess(tf=begin + duration, **lines, **held, thrust=0.0)
+        begin += duration

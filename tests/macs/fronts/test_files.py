@@ -23,10 +23,10 @@ from macs import MACS
 from macs.front import Front
 from macs.fronts import files
 from macs.fronts.dataset import ARRAYS, VERSION, _arrays, group_names
-from macs.fronts.labelled import legal_names
-from macs.fronts.points import Point
+from macs.fronts.point import Point
 from macs.fronts.provenance import Source
 from macs.io.atomic import sealed, unsealed
+from macs.io.labelled import legal_names
 from problems.compiled import Variable
 from transcription import DFET
 

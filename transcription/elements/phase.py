@@ -1,4 +1,4 @@
-"""One phase as finite elements in time: its variables, its rows, its propagation and its trajectory."""
+"""One phase on elements: its variables, its rows, its propagation and its trajectory."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends, PhaseWriter, Rows, Written
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .element import Tables, at_place, rates_and_integrands, times_half_length
+from .points import at_place, rates_and_integrands, times_half_length
 from .propagation import Propagation
+from .tables import Tables
 
 
-class DFETPhase(PhaseWriter):
-    """One phase on the N elements of its mesh.
+class ElementsPhase(PhaseWriter):
+    """One phase on the N elements of its mesh, by the method that `Tables` describe.
 
-    Slots: `X` (N, l + 1, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
+    Slots: `X` (N, k, nx) coefficients of the states, `U` (N, q + 1, nu) of the controls, `B` (N + 1, nx) states at the ends of the
     elements, which are unknowns of their own, `E` (m,) places of the edges that move, relative to the phase.
     """
 
@@ -38,7 +39,7 @@ class DFETPhase(PhaseWriter):
         places = [Variable(f"{prefix}edge[{j}]", low, high, "", high - low) for j, (low, high) in moving]
         self.E = np.array([layout.add(place, free=True) for place in places], dtype=int)
         self._begin = np.array(mesh.edges)[list(mesh.moving)]
-        self.X = layout.add_table(prefix, phase.states, elements, tables.order + 1)
+        self.X = layout.add_table(prefix, phase.states, elements, tables.coefficients)
         at_edges = [v.named(f"{v.name}[edge]") for v in phase.states]
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
@@ -80,27 +81,28 @@ class DFETPhase(PhaseWriter):
         X, B = pick(extended, self.X), pick(extended, self.B)
         left, right = B[:, :-1], B[:, 1:]
         place, share, s = self._inside(extended, tables.tau)
-        inside = self._spread(X, tables.state(tables.tau).T)
         rates, integrands, sizes = rows.at_points(
-            rates_and_integrands(phase), inside, self._controls_at(extended, tables.tau), place, share, s
+            rates_and_integrands(phase),
+            self._combined(left, X, right, tables.inside),
+            self._controls_at(extended, tables.tau),
+            place,
+            share,
+            s,
         )
-        tests = tables.order + 2
-        first, last = np.eye(1, tests), np.eye(1, tests, tests - 1)
+        first, last = tables.balance[:1], tables.balance[-1:]
         self.add_dynamics(
             rows,
-            self._spread(X, tables.mass) + self._spread(rates, tables.test) + self._spread(left, first) - self._spread(right, last),
+            self._spread(X, tables.balance[1:-1])
+            + self._spread(rates, tables.test)
+            + self._spread(left, first)
+            + self._spread(right, last),
         )
 
         def samples(function: ca.Function, chosen: list[int], tau: np.ndarray) -> ca.MX:
-            """Values of some rows of a Function of the phase at places of each element, of the collocation polynomial."""
+            """Values of some rows of a Function of the phase at places of each element."""
             if not chosen:
                 return ca.MX(0, self.n * len(tau))
-            basis = tables.collocation(tau).T
-            states = (
-                self._spread(left, basis[:1])
-                + self._spread(X, tables.state(tables.stages).T @ basis[1:-1])
-                + self._spread(right, basis[-1:])
-            )
+            states = self._combined(left, X, right, tables.at(tau))
             place, _, s = self._inside(extended, tau)
             (values,) = rows.at_points(at_place(function, chosen, phase), states, self._controls_at(extended, tau), place, s)
             return values
@@ -120,6 +122,10 @@ class DFETPhase(PhaseWriter):
     def _spread(self, values: ca.DM | ca.MX, matrix: np.ndarray) -> ca.MX:
         """Columns that stand side by side for each element, times the same matrix for each element."""
         return ca.MX(values) @ ca.kron(ca.DM.eye(self.n), ca.sparsify(ca.DM(matrix)))
+
+    def _combined(self, left: ca.MX, X: ca.MX, right: ca.MX, matrix: np.ndarray) -> ca.MX:
+        """[left X right] of each element, times the same matrix (k + 2, n) for each element."""
+        return self._spread(left, matrix[:1]) + self._spread(X, matrix[1:-1]) + self._spread(right, matrix[-1:])
 
     def _inside(self, extended: ca.MX, tau: np.ndarray) -> tuple[ca.MX, ca.MX, ca.MX]:
         """Where points at `tau` of each element lie, and the length of their elements, both relative to the phase; and s."""
@@ -150,8 +156,8 @@ class DFETPhase(PhaseWriter):
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.state_nodes`."""
-        inside = self.mesh.inside(self.tables.state_nodes).ravel()
-        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), -1)])
+        inside = self.mesh.inside(self.tables.nodes).ravel()
+        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), self.B.shape[1])])
         return slots, np.concatenate([self.mesh.edges[1:], inside])
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -169,8 +175,9 @@ class DFETPhase(PhaseWriter):
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """See `PhaseWriter.sensitivity`."""
         n, nx, pick = self.n, len(self.phase.states), self.layout.pick
-        left, X = pick(extended, self.B[:-1]), pick(extended, self.X)
-        blocks = ca.horzsplit(self._propagation.derivatives(interior)(X, left, *self._inputs(extended)), self._propagation.inputs)
+        left, X, inputs = pick(extended, self.B[:-1]), pick(extended, self.X), self._inputs(extended)
+        right = self._propagated_right(extended, left[:, -1], inputs)
+        blocks = ca.horzsplit(self._propagation.derivatives(interior)(X, right, left, *inputs), self._propagation.inputs)
         edges, inside = [S[(self.ends.initial % S.shape[0]).tolist(), :]], []
         for D, outer in zip(blocks, self._outer(extended), strict=True):
             out = D[:, :nx] @ edges[-1] + D[:, nx:] @ outer
@@ -180,6 +187,15 @@ class DFETPhase(PhaseWriter):
         if interior:
             slots, values = [*slots, self.X.ravel()], [*values, *inside]
         return self.layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
+
+    def _propagated_right(self, extended: ca.MX, left: ca.MX, inputs: tuple[ca.MX, ...]) -> ca.MX:
+        """States (nx, N) at the right ends; the last one propagated anew, from its left end, where dynamics are evaluated there and values
+        are imposed: an extended vector has these, not those that propagation gives."""
+        right = self.layout.pick(extended, self.B[1:])
+        if not self.tables.needs_right or (self.ends.final >= 0).all():
+            return right
+        own = [part[:, -part.shape[1] // self.n :] for part in inputs]
+        return ca.horzcat(right[:, :-1], self._propagation.step(False)(left, *own)[0])
 
     def _inputs(self, extended: ca.MX) -> tuple[ca.MX, ...]:
         """The other inputs of the elements, side by side: controls, starts, lengths, and s."""
@@ -222,13 +238,13 @@ class DFETPhase(PhaseWriter):
         phase, tables, t0, length = self.phase, self.tables, trajectory.t0, trajectory.tf - trajectory.t0
         mesh = self.mesh.found_in(trajectory.state.edges)
         # Between the ends of this mesh's elements, where a control may jump: Gauss-Legendre nodes never meet them.
-        nodes_of_states, nodes_of_controls = gauss_legendre(tables.order + 1)[0], gauss_legendre(tables.control_order + 1)[0]
-        states = trajectory.state(t0 + length * mesh.inside(nodes_of_states))
-        controls = unwrapped(trajectory.control(t0 + length * mesh.inside(nodes_of_controls)), phase.controls)
+        nodes = gauss_legendre(tables.control_order + 1)[0]
+        states = trajectory.state(t0 + length * mesh.inside(tables.stages))
+        controls = unwrapped(trajectory.control(t0 + length * mesh.inside(nodes)), phase.controls)
         at_edges = trajectory.state(t0 + length * np.array(mesh.edges[1:-1]))
         self.layout.write(extended, self.E, np.array(mesh.edges)[None, list(mesh.moving)])
-        self.layout.write(extended, self.X, np.linalg.solve(tables.state(nodes_of_states), states)[None])
-        U = wrapped(np.linalg.solve(tables.control(nodes_of_controls), controls), phase.controls)
+        self.layout.write(extended, self.X, np.linalg.solve(tables.at_stages, states)[None])
+        U = wrapped(np.linalg.solve(tables.control(nodes), controls), phase.controls)
         for name, arcs in self.mesh.constant:
             i = [v.name for v in phase.controls].index(name)
             for arc in arcs:
@@ -244,14 +260,17 @@ class DFETPhase(PhaseWriter):
             places = places + self.n * self.mesh.shares @ (extended[self.E] - self._begin)
         return t0 + (tf - t0) * places / self.n
 
-    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial:
-        """See `PhaseWriter.costates`: the multipliers of an element are the coefficients of its test functions."""
-        return PiecewisePolynomial(self._edges(extended), multipliers.reshape(self.n, self.tables.order + 2, -1), self.tables.state_basis)
+    def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
+        """See `PhaseWriter.costates`."""
+        if self.tables.costates is None:
+            return None
+        of_rows = multipliers.reshape(self.n, self.tables.rows, -1)
+        return PiecewisePolynomial(self._edges(extended), self.tables.costates @ of_rows, self.tables.costate_basis)
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """See `PhaseWriter.unpack`."""
         phase, tables, edges = self.phase, self.tables, self._edges(extended)
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
-        closed = np.concatenate([B[:-1, None], tables.state(tables.stages) @ extended[self.X], B[1:, None]], axis=1)
-        return self.trajectory(extended, tables.points[:-1], PiecewisePolynomial(edges, closed, "closed-legendre"), control)
+        closed = np.concatenate([B[:-1, None], tables.at_stages @ extended[self.X], B[1:, None]], axis=1)
+        return self.trajectory(extended, tables.points[:-1], PiecewisePolynomial(edges, closed, tables.closed), control)

@@ -1,8 +1,8 @@
 """The initial value problem of a phase, element after element, and its derivatives.
 
-On each element the first l + 1 tests give the states at the quadrature nodes, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that
-system is small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element;
-elsewhere, and where these five do not converge, a rootfinder iterates.
+On each element the equations give the states at its points, Y = left + h f(Y) A: an implicit Runge-Kutta step. Where that system is
+small, five Newton steps are written out symbolically, eliminations included, which costs a few microseconds an element; elsewhere, and
+where these five do not converge, a rootfinder iterates.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from problems.compiled import CompiledPhase
 from ..numerics.batched import expanded
 from ..numerics.elimination import eliminate
 from ..numerics.periodic import unwrapped_law, wrapped_controls
-from .element import Tables
+from .tables import Tables
 
 ITERATIONS = 30
 TOLERANCE = 1e-14
@@ -58,16 +58,20 @@ class Propagation:
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
     def elements(self, robust: bool) -> ca.Function:
-        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N (l + 1)), residuals (1, N));
-        inputs of elements stand side by side."""
-        step = self._step
-        if robust or step is None:
-            step = _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
-        return step.mapaccum("elements", self.n)
+        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N k), residuals (1, N)); inputs
+        of elements stand side by side."""
+        return self.step(robust).mapaccum("elements", self.n)
+
+    def step(self, robust: bool) -> ca.Function:
+        """The same for one element."""
+        if robust or self._step is None:
+            return _iterated(_equations(self.tables, self.phase, ca.MX), self.tables, self.phase)
+        return self._step
 
     def derivatives(self, interior: bool) -> ca.Function:
-        """(X, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls' coefficients
-        (nu fastest), the start, the length, and s; with `interior` also, below, of the coefficients of the states (l + 1, nx fastest)."""
+        """(X, right, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls'
+        coefficients (nu fastest), the start, the length, and s; with `interior` also, below, of the coefficients of the states (k, nx
+        fastest)."""
         return _gradient(self._equations, self.tables, self.phase, interior).map(self.n)
 
 
@@ -92,8 +96,9 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
     rates = ca.horzcat(
         *(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)),
     )
-    residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ ca.DM(tables.implicit))) / ca.repmat(scales, nq, 1)
-    X = ca.repmat(left, 1, tables.order + 1) + h * (rates @ ca.DM(tables.recover))
+    implicit, recover = (ca.sparsify(ca.DM(matrix)) for matrix in (tables.implicit, tables.recover))
+    residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ implicit)) / ca.repmat(scales, nq, 1)
+    X = ca.repmat(left, 1, tables.coefficients) + h * (rates @ recover)
     right = left + 0.5 * h * (rates @ ca.DM(tables.weights))
     return _Equations((y, left, U, start, h, s), residual, rates, right, X)
 
@@ -131,7 +136,8 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
 
 
 def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> ca.Function:
-    """(X, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the equations."""
+    """(X, right, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the
+    equations."""
     y, *inputs = element.symbols
     along = ca.veccat(*inputs)
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
@@ -147,6 +153,6 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
     else:
         total = direct - through @ solve(by_states, by_inputs)
     gradient = ca.Function("by_states", [y, *inputs], [ca.densify(total)])
-    X = type(y).sym("X", len(phase.states), tables.order + 1)
-    Y = X @ ca.DM(tables.state(tables.tau)).T
-    return ca.Function("gradient", [X, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})
+    X, right = type(y).sym("X", len(phase.states), tables.coefficients), type(y).sym("right", len(phase.states))
+    Y = ca.horzcat(inputs[0], X, right) @ ca.sparsify(ca.DM(tables.inside))
+    return ca.Function("gradient", [X, right, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})

@@ -12,7 +12,7 @@ import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from ..io.netcdf import Group, Labelled, Labels, words
+from .netcdf import Group, Labelled, Labels, words
 
 NUMBER, COUNT, TEXT = "f", "i", "O"
 """Kinds of a column: float64, whole numbers, str."""

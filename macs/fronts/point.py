@@ -1,0 +1,202 @@
+"""One point of a front as a view of a row of its columns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective, Variable
+from transcription.trajectories.costates import Costates
+from transcription.trajectories.simulate import Simulation, simulate
+from transcription.trajectories.trajectory import Trajectory
+
+from .columns import number
+from .provenance import Source
+
+
+class Point:
+    """One point of a front: a trajectory, or one input of a black box. It refers to the data of its front."""
+
+    __slots__ = ("_points", "index")
+
+    def __init__(self, points: Any, index: int):
+        self._points = points
+        self.index = index
+
+    def alone(self) -> Any:
+        """`Points` of this point alone."""
+        return self._points.take([self.index])
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """The objectives as the user stated them."""
+        return self._points.goals
+
+    @property
+    def objectives(self) -> dict[str, float]:
+        """Objectives by name, in the user's units and senses."""
+        return dict(zip(self._points.names, self._points.objectives[self.index].tolist(), strict=True))
+
+    @property
+    def F(self) -> np.ndarray:
+        """Objectives (m,), all minimised."""
+        return self._points.F[self.index]
+
+    @property
+    def violation(self) -> float:
+        """Largest scaled residual of any constraint."""
+        return float(self._points.violation[self.index])
+
+    @property
+    def violations(self) -> dict[str, float]:
+        """Scaled residual by constraint; empty if none was recorded."""
+        return dict(self._points.violations[self.index] or {})
+
+    @property
+    def status(self) -> str:
+        """ "converged", "infeasible", "failed" or "timeout"."""
+        return str(self._points.status[self.index])
+
+    @property
+    def verified(self) -> bool | None:
+        """Whether a simulation agrees with this point within `stats["verify"]` of its front; None if it was not simulated."""
+        return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
+
+    @property
+    def defect(self) -> float | None:
+        """Largest difference between simulated states and those of the transcription, in spans of their bounds; None: not simulated."""
+        return number(self._points.defect[self.index])
+
+    @property
+    def simulated(self) -> dict[str, float] | None:
+        """Objectives by name as simulated, in the user's units and senses; None: not simulated."""
+        if not self._points.was_simulated[self.index]:
+            return None
+        values = self._points.simulated_F[self.index] * self._points.signs
+        return dict(zip(self._points.names, values.tolist(), strict=True))
+
+    @property
+    def simulated_violation(self) -> float | None:
+        """Largest scaled residual of any constraint of the simulated trajectory; None: not simulated."""
+        return number(self._points.simulated_violation[self.index])
+
+    @property
+    def decision(self) -> np.ndarray:
+        """Decision vector, in the user's units; `variables` are its entries."""
+        return self._points._decisions.row(self.index)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Variables of the decision vector, in its order."""
+        return self._points._decisions.variables_of(self.index)
+
+    @property
+    def transcription(self) -> dict[str, Any] | None:
+        """Transcription of this point, as `Transcription.to_dict` gives it; None for a black box."""
+        return self._points.transcriptions[self.index]
+
+    @property
+    def note(self) -> str:
+        """Remark on the point; usually empty."""
+        return self._points.notes[self.index]
+
+    @property
+    def source(self) -> Source | None:
+        """Identity of the problem; None for a black box."""
+        return self._points.source
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Static decision variables by name; for a black box, all its variables."""
+        if self._points.source is None:
+            return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
+        return {} if self.trajectory is None else dict(self.trajectory.parameters)
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The trajectory; None for a black box."""
+        return self._points.trajectories[self.index]
+
+    @property
+    def optimality(self) -> float | None:
+        """Scaled residual of the conditions of Pareto optimality; None if it was not computed, for example after Ctrl-C or a time limit."""
+        return self._points.optimality[self.index]
+
+    @property
+    def costates(self) -> Costates | None:
+        """Costates by phase and state, arrays at the nodes of the trajectory: `point.costates["ascent"]["vx"]`.
+
+        They are multipliers of the point's own conditions of optimality, and belong to the sum of all objectives, each minimised, times
+        its weight (`weights`). Where they jump, as at limits of states, they are those just after; at the end of a phase those just
+        before. A costate is in units of that sum per unit of the state.
+
+        None where there is no trajectory, where `optimality` was not computed, and where it or the violation exceeds 1e-3: then the
+        multipliers are no costates.
+        """
+        return self._points.costates[self.index]
+
+    @property
+    def hamiltonian(self) -> dict[str, np.ndarray] | None:
+        """The Hamiltonian by phase at the nodes of the trajectory, costates' rates + weighted integrands, in units of the weighted sum per
+        unit of the phase's time; None where there are no `costates`.
+
+        Where nothing in a phase depends on time it is constant there, and it is 0 if its end is free and no objective depends on that.
+        """
+        return None if self.costates is None else {name: phase.hamiltonian for name, phase in self.costates.items()}
+
+    @property
+    def weights(self) -> dict[str, float] | None:
+        """The weights of the objectives in the sum to which `costates` belong, by name; None where there are none.
+
+        Not negative, and of sum 1 in the objectives' own units: a single objective has weight 1. Maximised objectives enter with the
+        opposite sign. Where a front of two is smooth, their ratio is its slope.
+        """
+        return None if self.costates is None else dict(zip(self._points.names, self.costates.weights.tolist(), strict=True))
+
+    @property
+    def excursions(self) -> dict[str, float] | None:
+        """Excess, scaled, of controls, path constraints and states that leave their bounds *between* nodes, by name; None if unknown."""
+        found = self._points.excursions[self.index]
+        return None if found is None else dict(found)
+
+    def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation:
+        """Simulation of this point: its dynamics under its controls, by an integrator that is independent of the transcription.
+
+        Parameters
+        ----------
+        rtol, atol, method
+            Of `scipy.integrate.solve_ivp`; `atol` is relative to the scales of the states.
+
+        Returns
+        -------
+        Simulation
+            `defect[phase][state]`, `max_defect`, `violation`, `violations`, `objectives`, `trajectory`.
+
+        Raises
+        ------
+        ValueError
+            For a black box, a point without a trajectory, and a saved front whose problem cannot be found.
+        """
+        problem = self._points.compiled()
+        if self.trajectory is None:
+            raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
+        return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
+
+    def plot(self, figure: Any = None) -> np.ndarray:
+        """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
+        there are any."""
+        from .pictures.flight_plot import draw_flight
+
+        if self.trajectory is None:
+            raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
+        return draw_flight(self.trajectory, self.title, figure, self.costates)
+
+    @property
+    def title(self) -> str:
+        """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
+        named = zip(self.goals, self.objectives.values(), strict=True)
+        return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+
+    def __repr__(self) -> str:
+        return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"

@@ -1,0 +1,253 @@
+"""Costates, the Hamiltonian and weights of points: along fronts, after refinement, in files and in pictures."""
+
+from __future__ import annotations
+
+import io
+from itertools import pairwise
+
+import casadi as ca
+import h5py
+import numpy as np
+import pytest
+from synthetic_fronts import black_box
+
+from macs import MACS, Front, optimize, sweep
+from macs.fronts import files
+from macs.fronts.dataset import phase_dataset, root_dataset
+from macs.io.atomic import sealed, unsealed
+from problems import Problem, load
+from problems.cases import goddard
+from runs.cli import main
+from transcription import parse
+
+
+@pytest.fixture(scope="module")
+def ascents() -> Front:
+    return sweep(load("goddard"), parse("dfet:6x6"), points=9)
+
+
+def test_weights_are_the_slope_of_the_front(ascents):
+    """Against the closed form of the front, by differences of its greatest speed."""
+    for point in ascents[1:]:
+        time = point.objectives["flight time"]
+        slope = (goddard._speed(time + 1e-3) - goddard._speed(time - 1e-3)) / 2e-3
+        assert point.weights["flight time"] / point.weights["horizontal speed"] == pytest.approx(slope, rel=1e-4)
+
+
+def test_weights_are_the_slope_between_neighbours(ascents):
+    """Of a front that is concave, the slope of a chord lies between those at its ends."""
+    for one, other in pairwise(list(ascents[1:])):
+        chord = np.divide(*(other.objectives[name] - one.objectives[name] for name in ("horizontal speed", "flight time")))
+        first, last = (point.weights["flight time"] / point.weights["horizontal speed"] for point in (one, other))
+        assert last < chord < first
+
+
+def test_they_are_not_negative_and_of_sum_one(ascents):
+    for point in ascents:
+        assert min(point.weights.values()) >= 0 and sum(point.weights.values()) == pytest.approx(1.0)
+        assert list(point.weights) == ["flight time", "horizontal speed"]
+
+
+def test_with_a_free_end_the_hamiltonian_is_minus_the_weight_of_the_time(ascents):
+    for point in ascents[2:]:
+        along = point.hamiltonian["ascent"]
+        assert along.shape == point.costates["ascent"]["vy"].shape == point.trajectory["ascent"].time.shape
+        assert along == pytest.approx(np.full(len(along), -point.weights["flight time"]), rel=1e-5)
+
+
+def test_the_optimum_of_one_objective_has_weight_one():
+    """Even at the quickest ascent, where each control is on a bound and other weights would do as well."""
+    point = optimize(load("goddard"), parse("dfet:6x4"))
+    assert point.weights == {"flight time": pytest.approx(1.0), "horizontal speed": 0.0}
+
+
+def test_points_of_a_search_have_them():
+    front = MACS(agents=5, archive=5, mesh="fixed").solve(load("goddard"), parse("dfet:4x6"), evaluations=600, seed=1)
+    assert all((point.costates is None) == (point.optimality > 1e-3) for point in front)
+    assert sum(point.costates is not None for point in front) >= 4
+
+
+def refined(name: str):
+    return Front.of(optimize(load(f"standard/{name}")).alone()).refine_mesh()[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("brachistochrone", -1.0),
+        ("car", -1.0),
+        pytest.param("hang_glider", 0.0, marks=pytest.mark.slow),
+        ("linear_tangent", -1.0),
+        ("moon_landing", 0.0),
+        ("robot_arm", -1.0),
+        ("zermelo", -1.0),
+    ],
+)
+def test_the_hamiltonian_is_constant_where_nothing_depends_on_time(name, value):
+    """Minus the slope of the objective in the free final time: 1 where this is the objective, else 0."""
+    point = refined(name)
+    (along,) = point.hamiltonian.values()
+    assert along == pytest.approx(np.full(len(along), value), abs=1e-5)
+
+
+@pytest.mark.slow
+def test_the_hamiltonian_of_a_launcher_is_constant_in_each_phase():
+    point = refined("delta_iii")
+    for H in point.hamiltonian.values():
+        assert np.ptp(H) <= 1e-5 * max(1.0, np.abs(H).max())
+    assert point.hamiltonian["second stage"] == pytest.approx(0.0, abs=1e-5), "only its end is free"
+    for first, second in (("six boosters", "three boosters"), ("three boosters", "first stage"), ("first stage", "second stage")):
+        for name in ("x", "y", "z", "vx", "vy", "vz"):
+            assert point.costates[first][name][-1] == pytest.approx(point.costates[second][name][0], rel=1e-5), "these go on"
+
+
+def switching(name: str, point) -> tuple[np.ndarray, np.ndarray]:
+    """dH/du and u along the one phase and the one control of a problem, both inside of the elements."""
+    (phase,) = load(f"standard/{name}").compile().phases
+    flown, costates = point.trajectory[phase.name], point.costates[phase.name]
+    inputs = [ca.MX.sym(one, phase.dynamics.size1_in(i)) for i, one in enumerate("xuts")]
+    p, w = ca.MX.sym("p", len(phase.states)), np.ones(phase.integrands.size1_out(0))
+    H = ca.dot(p, phase.dynamics(*inputs)) + ca.dot(ca.DM(w), phase.integrands(*inputs))
+    slope = ca.Function("slope", [*inputs, p], [ca.gradient(H, inputs[1])])
+    times = flown.state.times(np.array([-0.9, -0.5, 0.0, 0.5, 0.9])).ravel()
+    x, u, adjoint = flown.state(times), flown.control(times), costates.polynomial(times)
+    s = np.array([flown.t0, flown.tf])
+    return np.array(slope(x.T, u.T, times[None], s, adjoint.T)).ravel(), u.ravel()
+
+
+@pytest.mark.parametrize(("name", "switches"), [("car", 1), ("moon_landing", 1), ("f8", 3), ("fast_oscillator", 1)])
+def test_switching_functions_change_sign_where_controls_do(name, switches):
+    point = refined(name)
+    slope, u = switching(name, point)
+    high = u > 0.5 * (u.max() + u.min())
+    assert (slope[high] < 0).all() and (slope[~high] > 0).all()
+    assert np.count_nonzero(np.diff(high)) == switches
+
+
+# Where there are none.
+
+
+def test_points_that_are_not_optimal_have_none():
+    front = MACS(agents=5, archive=5, refine=False, mesh="fixed").solve(load("goddard"), parse("dfet:4x4"), evaluations=200, seed=1)
+    assert all(point.costates is point.hamiltonian is point.weights is None for point in front)
+
+
+def test_a_black_box_and_a_simulated_point_have_none(ascents):
+    assert black_box()[0].costates is black_box()[0].weights is None
+    assert all(point.costates is None for point in ascents[:2].simulate())
+
+
+def test_where_nothing_is_feasible_there_are_none():
+    problem = Problem("too far")
+    run = problem.phase("run", t0=0, tf=1)
+    x = run.state("x", bounds=(0, 9), initial=0, final=5)
+    u = run.control("u", bounds=(-1, 1))
+    run.dynamics(x=u + 0 * x)
+    problem.minimize("effort", run.integral(u**2))
+    point = optimize(problem, parse("dfet:4x3"))
+    assert point.status != "converged" and point.costates is None
+    assert point.plot().shape == (2,)
+
+
+# Files and pictures.
+
+
+def same(one, other) -> bool:
+    """Whether two points have the same costates, to the last bit."""
+    return one.weights == other.weights and all(
+        np.array_equal(one.hamiltonian[name], other.hamiltonian[name])
+        and one.costates[name].error == other.costates[name].error
+        and all(np.array_equal(phase[state], other.costates[name][state]) for state in phase)
+        and np.array_equal(
+            phase.polynomial(one.trajectory[name].time + 0.1), other.costates[name].polynomial(one.trajectory[name].time + 0.1)
+        )
+        for name, phase in one.costates.items()
+    )
+
+
+def test_a_file_has_them(ascents, tmp_path):
+    front = ascents.replace(costates=[None, *ascents.costates[1:]])
+    front.save(tmp_path / "front.nc")
+    loaded = Front.load(tmp_path / "front.nc")
+    assert loaded[0].costates is None and loaded[0].weights is None
+    assert all(same(*two) for two in zip(front[1:], loaded[1:], strict=True))
+    loaded[2:].save(tmp_path / "again.nc")
+    assert all(same(*two) for two in zip(front[2:], Front.load(tmp_path / "again.nc"), strict=True))
+    phase = loaded.to_xarray("ascent")
+    assert phase["costate_of_vy"].dims == phase["hamiltonian"].dims == ("point", "node")
+    assert phase["costate_of_vy"].attrs["long_name"] == "costate of vy" and "sum of weights" in phase.attrs["costates"]
+    assert loaded.to_xarray()["weights"].dims == ("point", "objective")
+
+
+def test_a_file_without_any_has_no_array_of_them(ascents):
+    plain = ascents.replace(costates=[None] * len(ascents))
+    arrays = {*root_dataset(plain).arrays, *phase_dataset(plain, "ascent").arrays}
+    assert not [name for name in arrays if "costate" in name or name in ("hamiltonian", "weights")]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "why"),
+    [
+        ("ascent/costate_edge_count", 3, "elements of its costates"),
+        ("ascent/costate_element_count", -1, "elements of its costates"),
+        ("ascent/costate_function_count", 99, "elements of its costates"),
+        ("ascent/costate_basis", "fourier", "no known basis"),
+        ("ascent/hamiltonian", None, "'hamiltonian' is missing"),
+        ("ascent/costate_of_y", None, "'costate_of_y' is missing"),
+        ("weights", np.nan, "without weights"),
+        ("weights", None, "without weights"),
+    ],
+)
+def test_a_forged_file_is_refused(ascents, tmp_path, name, change, why):
+    buffer = io.BytesIO(unsealed(files.to_bytes(ascents[:3])))
+    with h5py.File(buffer, "r+") as file:
+        if change is None:
+            del file[name]
+        else:
+            file[name][1] = change
+    (tmp_path / "front.nc").write_bytes(sealed(buffer.getvalue()))
+    with pytest.raises(ValueError, match=why):
+        Front.load(tmp_path / "front.nc")
+
+
+def test_a_state_may_be_called_hamiltonian(tmp_path):
+    problem = Problem("names")
+    run = problem.phase("run", t0=0, tf=1)
+    x = run.state("hamiltonian", bounds=(-9, 9), initial=0, final=1)
+    y = run.state("costate of x", bounds=(-9, 9), initial=0)
+    u = run.control("u", bounds=(-9, 9))
+    run.dynamics(**{"hamiltonian": u, "costate of x": x + 0 * y})
+    problem.minimize("effort", run.integral(u**2))
+    front = Front.of(optimize(problem, parse("dfet:2x3")).alone())
+    front.save(tmp_path / "front.nc")
+    loaded = Front.load(tmp_path / "front.nc")
+    assert same(front[0], loaded[0])
+    assert loaded.to_xarray("run")["hamiltonian"].values[0, -1] == pytest.approx(1.0)
+    assert loaded.to_xarray("run")["costate_hamiltonian"].attrs["long_name"] == "Hamiltonian"
+
+
+def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
+    fine = optimize(load("standard/car")).alone()
+    coarse = optimize(load("standard/car"), parse("multiple-shooting:12")).alone()
+    front = Front.concatenate([fine, coarse])
+    front.save(tmp_path / "front.nc")
+    assert all(same(*two) for two in zip(front, Front.load(tmp_path / "front.nc"), strict=True))
+
+
+def test_a_picture_shows_them_below(ascents):
+    axes = ascents[3].plot()
+    labels = [ax.get_ylabel() for ax in axes]
+    assert labels[5:] == ["costate of x", "costate of vx", "costate of y", "costate of vy", "Hamiltonian"]
+    axes[0].figure.draw_without_rendering()
+    assert axes[5].get_position().y1 < min(ax.get_position().y0 for ax in axes[:5])
+    # A costate that is zero is drawn as such, not its round-off.
+    low, high = axes[5].get_ylim()
+    assert high - low > 1e-5
+    assert len(ascents.replace(costates=[None] * len(ascents))[3].plot()) == 5
+
+
+def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):
+    ascents.save(tmp_path / "front.nc")
+    assert main(["show", str(tmp_path / "front.nc"), "--point", "3", "--plot", str(tmp_path / "flight.png")]) == 0
+    assert f"{ascents[3].weights['flight time']:.6g}" in capsys.readouterr().out
+    assert (tmp_path / "flight.png").stat().st_size > 1000

@@ -1,0 +1,505 @@
+"""Collocation at Gauss, Radau, Lobatto and Chebyshev points: coefficients, orders, equivalences, what a user states and gets."""
+
+from __future__ import annotations
+
+import json
+
+import casadi as ca
+import numpy as np
+import pytest
+from cases import candidates, integrator, oscillator, oscillator_rates, slot
+from gauss import integrate
+from numpy.polynomial import Polynomial, legendre
+from scipy.integrate import solve_ivp
+
+from macs import MACS, Front, optimize, payoff, sweep
+from problems import Problem, load
+from transcription import DFET, Collocation, from_dict, parse, word
+from transcription.collocation.tables import POINTS, collocation_tables, degree_of_controls
+from transcription.inner import inner_solver
+from transcription.meshes.minimum import Optimum
+from transcription.nlp.scalarized import scalarize
+from transcription.numerics.polynomials import nodes
+
+
+def tables(points: str, degree: int):
+    return collocation_tables(points, degree, degree_of_controls(points, degree), False)
+
+
+def exactness(points: str, degree: int) -> int:
+    """The highest degree that the quadrature integrates."""
+    return {"gauss": 2 * degree - 1, "radau": 2 * degree - 2, "lobatto": 2 * degree - 1, "chebyshev": degree + 1 - degree % 2}[points]
+
+
+# Coefficients
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 8, 40, 60])
+def test_points_are_roots_and_weights_the_closed_forms(degree):
+    n = degree + 1
+    of = {points: tables(points, degree) for points in POINTS}
+    last, lower = legendre.Legendre.basis(degree), legendre.Legendre.basis(degree - 1)
+    gauss, radau, lobatto, chebyshev = (of[points] for points in ("gauss", "radau", "lobatto", "chebyshev"))
+    assert last(gauss.tau) == pytest.approx(np.zeros(degree), abs=1e-13)
+    assert gauss.weights == pytest.approx(2 / ((1 - gauss.tau**2) * last.deriv()(gauss.tau) ** 2), rel=1e-10)
+    assert radau.tau[0] == -1.0 and (last + lower)(radau.tau) == pytest.approx(np.zeros(degree), abs=1e-13)
+    assert radau.weights[1:] == pytest.approx(((1 - radau.tau) / (degree * lower(radau.tau)) ** 2)[1:], rel=1e-10)
+    assert radau.weights[0] == pytest.approx(2 / degree**2, rel=1e-11)
+    assert (lobatto.tau[0], lobatto.tau[-1]) == (-1.0, 1.0) and len(lobatto.tau) == n
+    assert last.deriv()(lobatto.tau[1:-1]) == pytest.approx(np.zeros(n - 2), abs=1e-13 * degree**3)
+    assert lobatto.weights == pytest.approx(2 / (degree * n * last(lobatto.tau) ** 2), rel=1e-10)
+    assert chebyshev.tau == pytest.approx(-np.cos(np.pi * np.arange(n) / degree), abs=1e-15)
+    # Clenshaw and Curtis as Trefethen writes it, "Is Gauss quadrature better than Clenshaw-Curtis?", SIAM Review 50(1), 2008.
+    k = np.arange(n)
+    terms = [2 / (1 - 4 * j**2) * (0.5 if 2 * j == degree else 1.0) * np.cos(2 * j * np.pi * k / degree) for j in range(1, degree // 2 + 1)]
+    curtis = (np.where((k == 0) | (k == degree), 1.0, 2.0) / degree) * (1 + sum(terms, np.zeros(n)))
+    assert chebyshev.weights == pytest.approx(curtis, rel=1e-10)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("points", POINTS)
+def test_quadratures_are_as_exact_as_they_should_be_and_no_more(points, degree):
+    table, highest = tables(points, degree), exactness(points, degree)
+    for power in range(highest + 2):
+        exact = (1 - (-1) ** (power + 1)) / (power + 1)
+        error = abs(table.weights @ table.tau**power - exact)
+        assert error < 1e-14 if power <= highest else power % 2 or error > 1e-8
+
+
+@pytest.mark.parametrize("points", POINTS)
+@pytest.mark.parametrize("degree", [1, 2, 4, 7, 40, 60])
+def test_the_runge_kutta_method_integrates_rates_that_are_polynomials(points, degree):
+    """x(c_i) = x_0 + h sum a_ij f_j, for every rate of the degree of the polynomial through the points."""
+    table = tables(points, degree)
+    rates = legendre.Legendre(np.random.default_rng(degree).uniform(-1, 1, len(table.tau)))
+    states = rates.integ(lbnd=-1)
+    assert 2 * rates(table.tau) @ table.implicit == pytest.approx(states(table.tau), abs=1e-13)
+    assert 2 * rates(table.tau) @ table.recover == pytest.approx(states(table.nodes), abs=1e-13)
+    assert table.weights @ rates(table.tau) == pytest.approx(states(1.0), abs=1e-13)
+
+
+@pytest.mark.parametrize("points", POINTS)
+@pytest.mark.parametrize("degree", [1, 2, 4, 7, 20, 40, 60])
+def test_the_equations_hold_for_what_the_method_gives_and_determine_it(points, degree):
+    table = tables(points, degree)
+    rng = np.random.default_rng(0)
+    left, rates = rng.normal(), rng.normal(size=len(table.tau))
+    X, right = left + 2 * rates @ table.recover, left + table.weights @ rates
+    assert np.array([left, *X, right]) @ table.balance + rates @ table.test == pytest.approx(np.zeros(table.rows), abs=1e-11)
+    assert np.array_equal(table.balance[-1], -np.eye(1, table.rows, table.rows - 1)[0]), "the right end is in the last row alone"
+    # What an equation misses, states miss no more than some times as much.
+    assert np.abs(np.linalg.inv(table.balance[1:])).sum(axis=0).max() < 4 * degree
+
+
+def differential(points: str, degree: int) -> np.ndarray:
+    """D of the literature: derivatives at the points of the polynomial through these and the left end, for Radau also the right one."""
+    tau = tables(points, degree).tau
+    places = np.append(tau, 1.0) if points == "radau" else np.append(-1.0, tau)
+    slopes = np.array([legendre.Legendre.basis(k).deriv()(tau) for k in range(len(places))]).T
+    return slopes @ np.linalg.inv(legendre.legvander(places, len(places) - 1))
+
+
+@pytest.mark.parametrize("points", ["gauss", "radau"])
+@pytest.mark.parametrize("degree", [1, 2, 3, 6, 10])
+def test_it_is_the_differential_form_of_the_literature_with_its_covector_mapping(points, degree):
+    """D X = h/2 f, and for Gauss the quadrature to the end: Benson et al. 2006, Garg et al. 2011. Both forms of the equations have the same
+    weighted sum with any multipliers, if costates are these over the weights (and for Gauss that of the end more)."""
+    table, D, rng = tables(points, degree), differential(points, degree), np.random.default_rng(1)
+    left, right, X, rates = rng.normal(), rng.normal(), rng.normal(size=table.coefficients), rng.normal(size=len(table.tau))
+    multipliers = rng.normal(size=table.rows)
+    costates = dict(zip(np.round(table_places(table), 12), table.costates @ multipliers, strict=True))
+    at_points = np.array([costates[round(tau, 12)] for tau in table.tau])
+    ours = multipliers @ (np.array([left, *X, right]) @ table.balance + rates @ table.test)
+    if points == "radau":
+        theirs = (table.weights * at_points) @ (rates - D @ np.array([left, *X, right]))
+        at_end = (table.weights * at_points) @ D[:, -1]
+    else:
+        at_end = costates[1.0]
+        mapped = table.weights * (at_points - at_end)
+        theirs = mapped @ (rates - D @ np.array([left, *X])) + at_end * (left + table.weights @ rates - right)
+        assert costates[-1.0] == pytest.approx(at_end - D[:, 0] @ mapped, abs=1e-9), "that of the beginning"
+    assert ours == pytest.approx(theirs, abs=1e-10)
+    assert costates[1.0] == pytest.approx(at_end, abs=1e-10)
+
+
+def table_places(table) -> np.ndarray:
+    """Where the costates of a table are told."""
+    return nodes(table.costate_basis, len(table.costates) - 1)
+
+
+def test_gauss_is_dfet_with_controls_of_the_degree_of_the_states():
+    problem = load("goddard")
+    ours, dfet = Collocation(3, 4, points="gauss").transcribe(problem), DFET(3, 3).transcribe(problem)
+    free = candidates(dfet, 4)
+    ends = [i for i, v in enumerate(dfet.variables) if "[edge]" in v.name]
+    places = [slot(ours, dfet.variables[i].name) for i in ends]
+    assert [ours.variables[i].name for i in ours.free] == [dfet.variables[i].name for i in dfet.free]
+    (Z, F, _), (W, G, _) = (nlp.propagate_and_score(nlp.first_guess(free)) for nlp in (ours, dfet))
+    assert Z[:, places] == pytest.approx(W[:, ends], abs=1e-10) and pytest.approx(G, abs=1e-10) == F
+    one, two = (optimize(problem, method, objective="flight time", verify=None) for method in (ours.transcription, dfet.transcription))
+    assert one.objectives["flight time"] == pytest.approx(two.objectives["flight time"], rel=1e-9)
+
+
+def test_gauss_agrees_with_an_independent_implicit_runge_kutta_method():
+    nlp = Collocation(4, 3, points="gauss").transcribe(oscillator())
+    (z,) = nlp.propagate(nlp.first_guess(candidates(nlp, 1)))
+    flown = nlp.unpack(z)["swing"]
+    edges = flown.state.edges
+    m = z[slot(nlp, "m")]
+
+    def rates(j, t, x):
+        u = flown.control.on_element(j, np.array([2 * (t - edges[j]) / (edges[j + 1] - edges[j]) - 1]))[0]
+        return oscillator_rates(t, x, u, m, flown.tf)
+
+    ends, inside = integrate(rates, flown.edge_states[0], edges, 3)
+    assert flown.edge_states == pytest.approx(ends, abs=1e-11)
+    assert flown.state.coefficients[:, 1:-1] == pytest.approx(inside, abs=1e-11)
+
+
+# Orders of convergence
+
+ORDERS = [
+    *(("gauss", degree, 2 * degree) for degree in (1, 2, 3)),
+    *(("radau", degree, 2 * degree - 1) for degree in (1, 2, 3, 4)),
+    *(("lobatto", degree, 2 * degree) for degree in (1, 2, 3)),
+    *(("chebyshev", degree, degree + 1 + (degree + 1) % 2) for degree in (1, 2, 3, 4)),
+]
+
+
+@pytest.mark.parametrize(("points", "degree", "order"), ORDERS)
+def test_ends_of_intervals_converge_with_the_order_of_the_method(points, degree, order):
+    """x' = y, y' = -x - y/2 + cos 3t by propagation, against an integrator of high order."""
+    problem = Problem("driven")
+    phase = problem.phase("run", t0=0, tf=4)
+    x, y = phase.state("x", bounds=(-3, 3), initial=1.0), phase.state("y", bounds=(-3, 3), initial=0.0)
+    scale = phase.control("u", bounds=(0, 2))
+    phase.dynamics(x=y, y=-x - 0.5 * y + scale * ca.cos(3 * phase.time))
+    problem.minimize("end", phase.final(x))
+    exact = solve_ivp(
+        lambda t, x: [x[1], -x[0] - 0.5 * x[1] + np.cos(3 * t)], (0, 4), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14
+    ).y[:, -1]
+    errors = []
+    for intervals in (6, 12, 24) if degree > 1 else (64, 128, 256):
+        nlp = Collocation(intervals, degree, points=points).transcribe(problem)
+        z = nlp.propagate(nlp.first_guess(np.ones((1, len(nlp.free)))))
+        assert nlp.evaluate(z)[1] < 1e-12
+        errors.append(np.linalg.norm(nlp.unpack(z[0])["run"].edge_states[-1] - exact))
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.25)
+
+
+def rise() -> Problem:
+    """y' = 5/2 (y u - y - u^2), y(0) = 1, largest y(2): y = 4 / (1 + 3 exp(5 t/2)), u = y/2 (Garg et al., "A unified framework for the
+    numerical solution of optimal control problems using pseudospectral methods", Automatica 46, 2010, example 1)."""
+    problem = Problem("rise")
+    run = problem.phase("run", t0=0, tf=2)
+    y = run.state("y", bounds=(-0.5, 2), initial=1)
+    u = run.control("u", bounds=(-0.5, 1))
+    run.dynamics(y=2.5 * (y * u - y - u**2))
+    problem.maximize("end", run.final(y))
+    return problem
+
+
+def exact_rise(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """State, control and costate (of what is minimised, -y(2)) in closed form."""
+    y, grown = 4 / (1 + 3 * np.exp(2.5 * t)), lambda t: np.exp(2 * np.log(1 + 3 * np.exp(2.5 * t)) - 2.5 * t)
+    return y, 0.5 * y, -grown(t) / grown(2.0)
+
+
+def risen(method: Collocation):
+    """The NLP of `rise`, and its optimum."""
+    nlp = method.nlp(rise().compile())
+    solved = scalarize(nlp, nlp.first_guess(np.full((1, len(nlp.free)), 0.3))[0], reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status == "converged"
+    return nlp, solved
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_global_collocation_converges_exponentially(points):
+    errors = []
+    for degree in (4, 8, 12, 16, 28, 40):
+        nlp, solved = risen(Collocation(1, degree, points=points))
+        flown = nlp.unpack(solved.z)["run"]
+        y, u, _ = exact_rise(flown.time)
+        # Where a control is no variable, it is extrapolated, and converges as well, a little later.
+        errors.append([abs(solved.F[0] + exact_rise(2.0)[0]), np.abs(flown["y"] - y).max(), np.abs(flown["u"] - u).max()])
+    of_objective, of_state, of_control = np.array(errors).T
+    assert of_objective[2] < 2e-9 and of_state[3] < 5e-9 and of_control[3] < 1e-6
+    assert (np.log10(of_state[:3] / of_state[1:4]) > 1.5).all(), "four degrees more give a digit and a half at least, every time"
+    # From here on it is the accuracy of the solver.
+    assert of_objective[3:].max() < 1e-10 and of_state[3:].max() < 1e-8
+
+
+def regulated(method: Collocation) -> tuple[float, float]:
+    """x' = u from 1, least integral of (x^2 + u^2) / 2 over 4 seconds: errors of the optimum, tanh(4) / 2, and of u at the nodes of the
+    trajectory, -sinh(4 - t) / cosh(4)."""
+    problem = Problem("regulator")
+    run = problem.phase("run", t0=0, tf=4)
+    x, u = run.state("x", bounds=(-2, 2), initial=1), run.control("u", bounds=(-2, 2))
+    run.dynamics(x=u)
+    problem.minimize("cost", run.integral(0.5 * (x**2 + u**2)))
+    nlp = method.nlp(problem.compile())
+    solved = scalarize(nlp, np.zeros(len(nlp.variables)), reference=np.zeros(1), weights=np.ones(1))
+    flown = nlp.unpack(solved.z)["run"]
+    assert solved.status == "converged"
+    return abs(solved.F[0] - 0.5 * np.tanh(4)), np.abs(flown["u"] + np.sinh(4 - flown.time) / np.cosh(4)).max()
+
+
+@pytest.mark.parametrize(
+    "methods",
+    [
+        *([Collocation(1, n, points=points) for n in (4, 6, 8, 10)] for points in ("gauss", "radau", "lobatto")),
+        [Collocation(1, 2 * n, points="chebyshev", control_order=n) for n in (4, 6, 8, 10)],
+    ],
+    ids=["gauss", "radau", "lobatto", "chebyshev, half"],
+)
+def test_an_integral_cost_converges_exponentially(methods):
+    of_optimum, of_control = np.array([regulated(method) for method in methods]).T
+    assert (of_optimum[:-1] / of_optimum[1:] > 50).all() and of_optimum[-1] < 1e-11
+    assert (of_control[:-1] / of_control[1:] > 10).all() and of_control[-1] < 1e-5
+
+
+def test_chebyshev_points_with_controls_of_the_full_degree_converge_like_a_power_alone():
+    """As the differential form of the literature does: the weights of Clenshaw and Curtis do not integrate what the optimum balances."""
+    (_, coarse), (_, fine) = regulated(Collocation(1, 12, points="chebyshev")), regulated(Collocation(1, 24, points="chebyshev"))
+    assert np.log2(coarse / fine) == pytest.approx(2.3, abs=0.4)
+
+
+@pytest.mark.parametrize(
+    "method", [Collocation(1, 24), Collocation(6, 5), Collocation(1, 24, points="gauss"), Collocation(6, 5, points="gauss")]
+)
+def test_costates_of_a_nonlinear_problem_are_those_of_the_closed_form(method):
+    nlp, solved = risen(method)
+    found = Optimum.of(nlp, solved.z, solved.multipliers)
+    costates = found.costates["run"]
+    times = np.linspace(0, 2, 41)
+    of_one = found.of_objectives[0]
+    assert costates(times)[:, 0] / of_one == pytest.approx(exact_rise(times)[2], abs=1e-5)
+    ends = costates.ends()
+    assert ends[0][0, 0] / of_one == pytest.approx(exact_rise(0.0)[2], abs=1e-6)
+    assert ends[1][-1, 0] / of_one == pytest.approx(-1.0, abs=1e-9), "the transversality condition, exactly"
+    assert len(costates.edges) == method.intervals + 1
+
+
+@pytest.mark.parametrize("points", ["lobatto", "chebyshev"])
+def test_points_without_a_covector_mapping_have_no_costates(points):
+    nlp = Collocation(2, 3, points=points).nlp(rise().compile())
+    assert nlp.costates(np.zeros(len(nlp.variables)), np.zeros(len(nlp.g_lower))) == {}
+
+
+# What a user states
+
+
+def two_legs() -> Problem:
+    """A climb and a return of free durations with a point between them at a free height, a path constraint and a parameter."""
+    problem = Problem("two legs")
+    thrust = problem.parameter("thrust", bounds=(1.0, 2.0))
+    up, down = problem.phase("up", t0=0, tf=(0.5, 4)), problem.phase("down", t0=(0.5, 4), tf=(1, 8), duration=(0.2, 6))
+    for phase in (up, down):
+        h = phase.state("h", bounds=(-1, 5), initial=0 if phase is up else None, final=(1, 3) if phase is up else 0)
+        v = phase.state("v", bounds=(-5, 5), initial=0 if phase is up else None, final=None if phase is up else 0)
+        u = phase.control("u", bounds=(-2, 2))
+        phase.dynamics(h=v, v=thrust * u)
+        phase.path("effort", u * thrust + 0.1 * h, lower=-1.5, upper=1.5)
+    problem.link(up, down)
+    problem.constraint("height between", up.final(up["h"]), lower=1.5, upper=1.5)
+    problem.minimize("time", down.tf)
+    problem.minimize("thrust", thrust + 0.01 * (up.integral(up["u"] ** 2) + down.integral(down["u"] ** 2)))
+    return problem
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_phases_free_times_interior_points_and_path_constraints(points):
+    """The path limits hold at the points and at the ends of intervals, and all points agree on the optimum."""
+    method, problem = Collocation(8, 4, points=points), two_legs()
+    front = payoff(problem, method, verify=None)
+    dfet = payoff(problem, DFET(8, 4, basis="bernstein"), verify=None)
+    assert (front.status == "converged").all() and front.violation.max() < 1e-6
+    assert np.diag(front.objectives) == pytest.approx(np.diag(dfet.objectives), rel=2e-3)
+    trajectory = front[0].trajectory
+    assert trajectory["up"]["h"][-1] == pytest.approx(1.5, abs=1e-6) and trajectory["down"]["h"][0] == pytest.approx(1.5, abs=1e-6)
+    for phase in trajectory.phases:
+        assert np.abs(phase["effort"]).max() <= 1.5 + 1e-5
+        assert len(phase.time) == 8 * len(tables(points, 4).points[:-1]) + 1
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_equality_paths_have_as_many_points_as_controls_have_values(points):
+    """A control that a path constraint fixes: u = cos t from x' = u."""
+    problem, run = integrator()
+    run.path("given", run["u"] - ca.cos(run.time), lower=0, upper=0)
+    problem.minimize("end", run.final(run["x"]))
+    point = optimize(problem, Collocation(2, 8, points=points), verify=None)
+    assert point.status == "converged" and point.objectives["end"] == pytest.approx(np.sin(2), abs=1e-7)
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_bernstein_controls_stay_within_their_bounds_everywhere(points):
+    problem = load("goddard")
+    method = Collocation(4, 5, points=points, control="bernstein")
+    point = optimize(problem, method, objective="flight time", verify=None)
+    values = point.trajectory["ascent"].control(np.linspace(0, point.objectives["flight time"], 500))
+    assert np.abs(values).max() <= np.pi / 2 + 1e-9
+    free = optimize(problem, Collocation(4, 5, points=points), objective="flight time", verify=None)
+    assert np.abs(free.trajectory["ascent"].control(np.linspace(0, 109, 500))).max() > np.pi / 2 + 1e-3, "else this shows nothing"
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_peaks_absolute_values_and_periodic_controls(points):
+    """From 0 to 1 in two seconds: the least peak of u^2 is 1/4 with the least way 1; a heading is turned no further than it must."""
+    method, (problem, run) = Collocation(3, 4, points=points), integrator(final=1)
+    problem.minimize("peak", run.peak(run["u"] ** 2))
+    problem.minimize("way", run.integral(ca.fabs(run["u"])))
+    front = payoff(problem, method, verify=1e-5)
+    assert front.verified.all() and front.objectives[0] == pytest.approx([0.25, 1.0], abs=1e-6)
+    assert front.objectives[1, 1] == pytest.approx(1.0, abs=1e-6)
+    problem, run = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi)
+    run._rates = {}
+    run.dynamics(x=ca.cos(run["u"]))
+    problem.maximize("end", run.final(run["x"]))
+    nlp = method.transcribe(problem)
+    Z = nlp.propagate(nlp.first_guess(candidates(nlp, 3)))
+    moved = Z.copy()
+    moved[:, nlp.free] += 2 * np.pi * np.random.default_rng(0).integers(-1, 2, (3, len(nlp.free)))
+    assert nlp.residuals(moved)[0] == pytest.approx(nlp.residuals(Z)[0], abs=1e-12)
+    assert np.abs(np.array(nlp.functions(moved.T)[1])).max() < 1e-10, "the dynamics hold a period on as well"
+
+
+def test_controls_of_a_lower_degree_have_so_many_values():
+    for points in POINTS:
+        nlp = Collocation(3, 4, points=points, control_order=1).transcribe(load("goddard"))
+        assert sum(v.name.startswith("ascent.u") for v in nlp.variables) == 3 * 2
+        assert nlp.evaluate(nlp.propagate(nlp.first_guess(candidates(nlp, 1))))[1] < np.inf
+
+
+@pytest.mark.parametrize(
+    "text", ["radau:10x4", "gauss:1x40", "lobatto:1x40", "chebyshev:1x60", "radau:20x3:bernstein", "lobatto:8x4:bernstein:1", "gauss:3x2:0"]
+)
+def test_words_and_plain_data_give_the_same_method_back(text):
+    method = parse(text)
+    assert word(method) == text
+    meshed = method.remeshed({"ascent": ([0.0, 0.3, 1.0], 5, 2, [1])})
+    assert from_dict(json.loads(json.dumps(meshed.to_dict()))) == meshed and word(meshed) is None
+    assert (method.elements, method.order) == (method.intervals, method.degree)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Collocation(0, 3), "Collocation: intervals must be a whole number of at least 1, not 0"),
+        (lambda: Collocation(2, 0), "Collocation: degree must be a whole number of at least 1, not 0"),
+        (lambda: Collocation(2, 3, points="hermite"), "Collocation: points must be .*radau.*hermite"),
+        (lambda: Collocation(2, 3, control="spline"), "Collocation: control must be .*bernstein.*spline"),
+        (lambda: Collocation(2, 3, control_order=3), "control_order is 3, but 3 radau points determine no more than degree 2"),
+        (
+            lambda: Collocation(2, 3, mesh={"a": ([0, 1], 0)}),
+            "phase 'a': the degree of the mesh must be a whole number of at least 1, not 0",
+        ),
+        (lambda: Collocation(2, 3, mesh={"a": ([0, 1], 2, 2)}), "phase 'a': the order of the controls is 2, but 2 radau points"),
+        (lambda: Collocation(2, 3, mesh={"a": ([0, 2], 2)}), "Collocation: phase 'a': edges of a mesh must increase"),
+        (lambda: parse("radau:4"), "transcription 'radau:4': write it as radau:10x4"),
+        (lambda: parse("radau:4x3:lobatto"), "control must be"),
+        (lambda: parse("radau"), "write it as radau:10x4"),
+        (lambda: Collocation(2, 3, mesh={"a": ([0, 1], 2)}).transcribe(load("goddard")), "a mesh is given for phase 'a'; the phases of"),
+    ],
+)
+def test_bad_input_is_refused_in_the_users_words(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_dynamics_without_derivatives_are_refused():
+    class Rate(ca.Callback):
+        def __init__(self):
+            ca.Callback.__init__(self)
+            self.construct("rate", {})
+
+        def eval(self, arguments):
+            return [-arguments[0]]
+
+    rate = Rate()
+    problem = Problem("callback")
+    phase = problem.phase("fall", t0=0, tf=1)
+    x = phase.state("x", bounds=(-2, 2), initial=1)
+    phase.dynamics(x=rate(x))
+    problem.minimize("end", phase.final(x))
+    with pytest.raises(ValueError, match="Collocation: phase 'fall': the dynamics have no derivatives"):
+        Collocation(2, 3).transcribe(problem)
+
+
+# What a user gets
+
+
+@pytest.mark.parametrize("points", POINTS)
+@pytest.mark.parametrize("inner", ["auto", "ipopt"])
+def test_every_inner_level_makes_candidates_feasible(points, inner):
+    nlp = Collocation(4, 4, points=points).transcribe(load("goddard"))
+    found = inner_solver(inner).solve(nlp, candidates(nlp, 4))
+    assert (found.violation <= 1e-6).all() and (found.status == "converged").all()
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_one_polynomial_that_newtons_method_cannot_find_is_a_status(points):
+    nlp = Collocation(1, 20, points=points).transcribe(load("reentry_case1"))
+    found = inner_solver("propagate").solve(nlp, candidates(nlp, 2))
+    assert set(found.status) <= {"failed", "infeasible"} and (found.violation > 1.0).all()
+
+
+@pytest.mark.parametrize("method", [Collocation(1, 12, points="chebyshev"), Collocation(3, 4), Collocation(2, 5, points="gauss")], ids=str)
+def test_searches_are_solved_saved_and_loaded(method, tmp_path):
+    front = MACS(mesh="fixed").solve(load("goddard"), method, evaluations=150, seed=1)
+    assert len(front) == 10 and front.violation.max() < 1e-6
+    front.save(tmp_path / "front.nc")
+    again = Front.load(tmp_path / "front.nc")
+    assert np.array_equal(again.objectives, front.objectives)
+    times = np.linspace(0, 100, 7)
+    for name in ("y", "u"):
+        assert np.array_equal(again[3].trajectory["ascent"].at(times)[name], front[3].trajectory["ascent"].at(times)[name])
+    assert again[3].simulate().max_defect == front[3].simulate().max_defect
+    swept = sweep(load("goddard"), method, points=3, verify=None)
+    assert len(swept) == 3 and (swept.status == "converged").all()
+
+
+@pytest.mark.parametrize("points", POINTS)
+def test_meshes_are_refined_until_a_simulation_agrees(points):
+    coarse = optimize(load("standard/van_der_pol"), Collocation(8, 4, points=points), verify=None)
+    assert coarse.simulate().violation > 1e-4
+    refined = coarse.alone().refine_mesh(tolerance=1e-6)[0]
+    check = refined.simulate()
+    assert check.max_defect < 1e-6 and check.violation < 1e-6 and refined.note == ""
+    assert refined.objectives["cost"] == pytest.approx(2.8672610452, rel=1e-6), "by the maximum principle"
+
+
+def test_edges_move_to_the_switches():
+    """Minimum time of the ascent is bang-bang, in closed form 109.10894511799619."""
+    coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None)
+    (point,) = coarse.alone().refine_mesh()
+    assert from_dict(point.transcription).mesh_of("ascent").moving and point.simulate().max_defect < 1e-8
+    assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-9)
+
+
+def test_a_trajectory_of_another_method_is_interpolated():
+    problem = load("goddard")
+    given = optimize(problem, DFET(4, 6), objective="horizontal speed", verify=None).trajectory
+    for points in POINTS:
+        nlp = Collocation(4, 8, points=points).nlp(problem)
+        near = nlp.unpack(nlp.interpolate(given))["ascent"]
+        times = np.linspace(0.0, given["ascent"].tf, 33)
+        assert near.state(times) == pytest.approx(given["ascent"].state(times), rel=1e-5, abs=1e-5)
+        assert near.control(times) == pytest.approx(given["ascent"].control(times), abs=1e-6)
+
+
+def test_interpolation_of_polynomials_is_exact():
+    p = Polynomial([0.3, -0.2, 0.2])
+    for points in POINTS:
+        problem, run = integrator()
+        problem.minimize("end", run.final(run["x"]))
+        nlp = Collocation(3, 4, points=points).nlp(problem.compile())
+        z = nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
+        slots, places = nlp.profiles[0].columns, nlp.profiles[0].places
+        z[nlp.free[slots]] = p(2 * places)
+        z = nlp.propagate(z[None])[0]
+        flown = nlp.unpack(z)["run"]
+        t = np.linspace(0, 2, 17)
+        assert flown.at(t)["u"] == pytest.approx(p(t), abs=1e-13)
+        assert flown.at(t)["x"] == pytest.approx(p.integ()(t), abs=1e-13)
+        assert nlp.interpolate(nlp.unpack(z)) == pytest.approx(z, abs=1e-12)

@@ -1,0 +1,1 @@
+"""Collocation at Gauss, Radau, Lobatto and Chebyshev points."""

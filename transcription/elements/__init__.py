@@ -1,0 +1,1 @@
+"""What methods on elements share: tables of basis functions, one phase, propagation."""

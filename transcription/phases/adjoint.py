@@ -1,0 +1,168 @@
+"""Costates of a phase by the adjoint equation, integrated backward along a trajectory: p' = -(df/dx)'p - (dL/dx)'w.
+
+At the nodes of states whose limits have multipliers, costates jump by these (Hartl, Sethi and Vickson, "A survey of the maximum principles
+for optimal control problems with state constraints", SIAM Review 37(2), 1995). Between them the equation is linear, and Gauss-Legendre
+collocation solves it to order 2 STAGES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from problems.compiled import CompiledPhase
+from problems.derived import remembered
+
+from ..numerics.batched import Batched, expanded
+from ..numerics.periodic import wrapped
+from ..numerics.polynomials import basis_matrix, gauss_legendre, lobatto_nodes
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+
+STAGES = 5
+"""Of the collocation, on each piece between two nodes or ends of elements."""
+SAME = 1e-10
+"""Times nearer to each other than this, in durations of the phase, are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseMultipliers:
+    """The multipliers of one phase, positive at upper limits.
+
+    Attributes
+    ----------
+    dynamics : array (k,)
+        Of its rows of dynamics.
+    paths, peaks, states : sequence of arrays
+        Of the samples of each path constraint and each peak, and of the hidden states that have bounds.
+    integrals : array (nq,)
+        What a unit of each integral counts.
+    variables : array (n,)
+        Of the bounds of all variables of the NLP.
+    """
+
+    dynamics: np.ndarray
+    paths: Sequence[np.ndarray]
+    peaks: Sequence[np.ndarray]
+    states: Sequence[np.ndarray]
+    integrals: np.ndarray
+    variables: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Adjoint:
+    """Costates of one phase on their own elements, and their error where it is known: the largest difference at t0 from what the
+    multipliers say there, as a part of the largest costate, all of them in scales of their states."""
+
+    costates: PiecewisePolynomial
+    error: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """What multipliers say of costates: their values (nx,) at tf and t0, and by how much (k, nx) they fall at places (k,) in [0, 1], by
+    jumps there and spread about these places; what falls at the ends themselves does so within the phase."""
+
+    final: np.ndarray
+    initial: np.ndarray
+    places: np.ndarray
+    jumps: np.ndarray
+    spread: np.ndarray
+
+
+def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weights: np.ndarray, ending: Ending) -> Adjoint:
+    """The costates of a trajectory, backward from its end.
+
+    Parameters
+    ----------
+    phase : CompiledPhase
+    trajectory : PhaseTrajectory
+    s : array
+        Its times and the parameters.
+    weights : array (nq,)
+        Of its integrals.
+    ending : Ending
+    """
+    t0, length, nx = trajectory.t0, trajectory.tf - trajectory.t0, len(phase.states)
+    cells, densities = _cells(t0 + length * ending.places, ending.spread, trajectory)
+    edges, jumps = _pieces(trajectory, t0 + length * ending.places, ending.jumps, cells)
+    nodes, _ = gauss_legendre(STAGES)
+    h, tau = 0.5 * np.diff(edges), lobatto_nodes(STAGES + 1)
+    times = edges[:-1, None] + h[:, None] * (1.0 + nodes)
+    x = trajectory.state(times).reshape(times.size, -1)
+    u = wrapped(trajectory.control(times), phase.controls).reshape(times.size, -1 if phase.controls else 0)
+    by_x, own = slopes(phase, x, u, times.ravel(), s, weights)
+    by_x, own = by_x.reshape(*times.shape, nx, nx), own.reshape(*times.shape, nx)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    own += densities[np.clip(np.searchsorted(cells, middles) - 1, 0, len(densities) - 1)][:, None]
+    # Integrals of the Lagrange functions of the stages from the right end to the stages, and to where the results are kept.
+    to_stages, to_kept = _integrals(nodes), _integrals(tau)
+    kept, p = np.empty((len(h), STAGES + 1, nx)), ending.final + jumps[-1]
+    for j in range(len(h) - 1, -1, -1):
+        # Rates r_i = -(A_i'p_i + l_i) at the stages, where p_i = p + h sum_j to_stages_ij r_j.
+        A = h[j] * np.einsum("iab,ij->iajb", by_x[j], to_stages).reshape(STAGES * nx, STAGES * nx)
+        right = -(by_x[j] @ p + own[j]).ravel()
+        rates = np.linalg.solve(np.eye(STAGES * nx) + A, right).reshape(STAGES, nx)
+        kept[j] = p + h[j] * to_kept @ rates
+        p = kept[j, 0] + jumps[j]
+    units = np.array([v.scale for v in phase.states])
+    size = float(np.abs(kept * units).max(initial=0.0))
+    missed = float(np.abs((p - ending.initial) * units).max(initial=0.0)) / (size if size > 0 else 1.0)
+    return Adjoint(PiecewisePolynomial(edges, kept, "lobatto"), missed)
+
+
+def slopes(
+    phase: CompiledPhase, x: np.ndarray, u: np.ndarray, times: np.ndarray, s: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The transposed derivatives (k, nx, nx) of the rates by the states at k places, and those (k, nx) of the weighted integrands."""
+    nx, k = len(phase.states), len(times)
+    by_x, own = _slopes(phase)(x, u, times, np.tile(s, (k, 1)), np.tile(weights, (k, 1)))
+    # Column by column, as CasADi stores them: that of a state has the derivatives by it.
+    return by_x.reshape(k, nx, nx), own
+
+
+@remembered
+def _slopes(phase: CompiledPhase) -> Batched:
+    """(x, u, t, s, weights) -> the derivatives of `slopes`."""
+    inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
+    weights = ca.MX.sym("w", phase.integrands.size1_out(0))
+    values = ca.jacobian(phase.dynamics(*inputs), inputs[0]), ca.gradient(ca.dot(phase.integrands(*inputs), weights), inputs[0])
+    return Batched(expanded(ca.Function("slopes", [*inputs, weights], [ca.densify(one) for one in values])))
+
+
+def _cells(times: np.ndarray, falls: np.ndarray, trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of cells (k + 1,) about these times, halfway between them, and how steeply (k, nx) costates fall in each; one cell over the
+    whole phase where nothing falls."""
+    whole = np.array([trajectory.t0, trajectory.tf])
+    if not falls.any():
+        return whole, np.zeros((1, falls.shape[1]))
+    nodes = np.unique(times)
+    total = np.zeros((len(nodes), falls.shape[1]))
+    np.add.at(total, np.searchsorted(nodes, times), falls)
+    cells = np.concatenate([whole[:1], 0.5 * (nodes[1:] + nodes[:-1]), whole[1:]])
+    widths = np.diff(cells)[:, None]
+    return cells, np.where(widths > 0, total / np.where(widths > 0, widths, 1.0), 0.0)
+
+
+def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray, further: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of pieces (N + 1,) within which states, controls and costates are smooth, and the jumps (N + 1, nx) there."""
+    every = np.sort(np.concatenate([trajectory.state.edges, trajectory.control.edges, times, further]))
+    every = np.clip(every, trajectory.t0, trajectory.tf)
+    apart = np.diff(every) > SAME * (trajectory.tf - trajectory.t0)
+    edges = every[np.append(True, apart)]
+    edges = edges if len(edges) > 1 else np.array([trajectory.t0, trajectory.tf])
+    edges[[0, -1]] = trajectory.t0, trajectory.tf
+    total = np.zeros((len(edges), jumps.shape[1]))
+    np.add.at(total, np.abs(times[:, None] - edges).argmin(axis=1), jumps)
+    return edges, total
+
+
+def _integrals(places: np.ndarray) -> np.ndarray:
+    """Integrals (k, STAGES) of the Lagrange functions of the stages from 1 to places (k,)."""
+    nodes, weights = gauss_legendre(STAGES)
+    half = 0.5 * (places - 1.0)
+    inside = 1.0 + half[:, None] * (1.0 + nodes)
+    values = basis_matrix("legendre", STAGES - 1, inside.ravel()).reshape(len(places), STAGES, STAGES)
+    return half[:, None] * np.einsum("kij,i->kj", values, weights)

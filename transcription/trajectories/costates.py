@@ -1,0 +1,75 @@
+"""Costates and the Hamiltonian along a trajectory, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .trajectory import PiecewisePolynomial
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhaseCostates(Mapping[str, np.ndarray]):
+    """The costates of one phase by state, at the nodes of its trajectory.
+
+    Where they jump they are those just after, and at tf those just before.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The states.
+    at_nodes : array (k, nx)
+        At the nodes of the trajectory.
+    hamiltonian : array (k,)
+        There.
+    polynomial : PiecewisePolynomial
+        The costates between the nodes.
+    error : float or None
+        Of costates that were integrated backward: the largest difference at t0 from what the multipliers say there, as a part of the
+        largest costate, all in scales of their states. None for those that are multipliers themselves, or follow from these exactly.
+    """
+
+    names: tuple[str, ...]
+    at_nodes: np.ndarray
+    hamiltonian: np.ndarray
+    polynomial: PiecewisePolynomial
+    error: float | None = None
+
+    def __repr__(self) -> str:
+        return f"PhaseCostates({len(self.at_nodes)} nodes, [{', '.join(self.names)}])"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.names:
+            raise KeyError(f"there is no costate of '{name}'; there are those of {', '.join(self.names)}")
+        return self.at_nodes[:, self.names.index(name)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Costates(Mapping[str, PhaseCostates]):
+    """The costates of a whole trajectory, by phase, and the weights (m,) of the objectives, all minimised, in the sum to which they belong:
+    not negative, of sum 1 in the objectives' own units."""
+
+    weights: np.ndarray
+    phases: Mapping[str, PhaseCostates]
+
+    def __repr__(self) -> str:
+        return f"Costates({', '.join(self.phases)}; weights {self.weights})"
+
+    def __getitem__(self, name: str) -> PhaseCostates:
+        if name not in self.phases:
+            raise KeyError(f"no phase '{name}'; there are {', '.join(self.phases)}")
+        return self.phases[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.phases)
+
+    def __len__(self) -> int:
+        return len(self.phases)
