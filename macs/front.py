@@ -50,7 +50,13 @@ class Front(Points):
         return f"<Front: {headline(self)}>"
 
     def refine_mesh(
-        self, *, tolerance: float = 1e-7, limit: int = 12, time_limit: float | None = None, progress: bool | None = None
+        self,
+        *,
+        tolerance: float = 1e-7,
+        limit: int = 12,
+        more: bool = True,
+        time_limit: float | None = None,
+        progress: bool | None = None,
     ) -> Front:
         """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
 
@@ -60,6 +66,7 @@ class Front(Points):
         Controls that leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a
         point is solved from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along
         the front; an end of the front is solved as such, and where ends move far, the points between them keep their places between these.
+        Intervals of multiple shooting keep their order: they are short where the trajectory bends, and become more where errors ask for it.
 
         Parameters
         ----------
@@ -70,6 +77,9 @@ class Front(Points):
             `Point.note` says so.
         limit : int
             Largest number of meshes for each point.
+        more : bool
+            Whether there may be more elements, and of higher order. If not, there are as many as before: they move to where the trajectory
+            bends, by a density function. Made for methods with many elements of low order, such as shooting.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool, optional
@@ -87,7 +97,7 @@ class Front(Points):
         ValueError
             For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, and invalid arguments.
         """
-        refined = Front.of(refine_mesh(unmarked(self), tolerance, limit, time_limit, progress))
+        refined = Front.of(refine_mesh(unmarked(self), tolerance, limit, time_limit, progress, more))
         return refined.verify(self.stats.get("verify"))
 
     def polished(

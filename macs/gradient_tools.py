@@ -19,7 +19,8 @@ from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
 from problems.problem import Problem
 from transcription import DFET
-from transcription.base import Meshed, Transcription, check_freedom, check_problem
+from transcription.base import Transcription, check_freedom, check_problem
+from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales

@@ -1,10 +1,11 @@
 """Floor 2: from a continuous problem to an NLP and back: transcriptions, the inner level, trajectories, their simulation."""
 
-from .base import NLP, Meshed, Transcription
+from .base import NLP, Transcription
 from .catalogue import from_dict, parse, stated, word
 from .collocation.method import Collocation
 from .dfet.method import DFET
 from .inner import InnerResult, InnerSolver
+from .meshed import Meshed
 from .shooting.method import MultipleShooting, SingleShooting
 from .smooth import Smooth
 from .trajectories.simulate import Simulation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from transcription import from_dict
-from transcription.base import Meshed
+from transcription.meshed import Meshed
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED

@@ -7,7 +7,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from transcription.base import NLP, Meshed
+from transcription.base import NLP
+from transcription.meshed import Meshed
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from transcription import DFET
-from transcription.base import NLP, Meshed
+from transcription.base import NLP
+from transcription.meshed import Meshed
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from transcription import from_dict
-from transcription.base import Meshed
 from transcription.inner import Propagate
+from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 
 from ..evaluation.bilevel import Bilevel

@@ -9,9 +9,10 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import NLP, Meshed, kept_nlp
+from transcription.base import NLP, kept_nlp
 from transcription.inner import Ipopt
-from transcription.meshes.adaptation import next_method, where_controls_gain
+from transcription.meshed import Meshed
+from transcription.meshes.adaptation import next_method, redistributed, where_controls_gain
 from transcription.meshes.knots import switched
 from transcription.meshes.minimum import Optimum
 from transcription.meshes.scales import objective_variations
@@ -191,6 +192,8 @@ class MeshLoop:
         Whether edges may move to the switches of controls, where meshes then suit one point alone.
     enough : callable
         Whether a point is good enough whatever else is wanted.
+    more : bool
+        Whether there may be more elements, or higher degrees. If not, those that there are move to where a trajectory bends.
     """
 
     def __init__(
@@ -202,9 +205,10 @@ class MeshLoop:
         most_work: float | None = None,
         knots: bool = True,
         enough: Callable[[OnMesh], bool] = lambda point: False,
+        more: bool = True,
     ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
-        self._knots, self._built, self._enough = knots, programs.built, enough
+        self._knots, self._built, self._enough, self._more = knots, programs.built, enough, more
         self.problem = programs.problem
         self._differentiable = differentiable(self.problem)
 
@@ -315,6 +319,9 @@ class MeshLoop:
         while waiting:
             hint = waiting.pop(0)
             yield hint, hint != present.method
+        if not self._more:
+            yield redistributed(present.method, self.problem, present.trajectory), False
+            return
         if present.gaining and not present.verdict.complaints():
             cut = where_controls_gain(present.method, present.verdict, present.trajectory)
             if cut not in seen:

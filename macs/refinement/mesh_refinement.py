@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.checks import check_count, check_positive
 from transcription import from_dict
-from transcription.base import Meshed
+from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.optimality import optimality
 from transcription.stopping import Stopped, stopping
@@ -47,7 +47,7 @@ NEIGHBOURS = 2
 """Number of neighbours whose trajectories are further starts of a point."""
 
 
-def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None) -> Points:
+def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None, more: bool = True) -> Points:
     """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
     if tolerance < LEAST_TOLERANCE:
@@ -60,7 +60,7 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
         return front
     wanted = Wanted(float(tolerance), feasible=front.stats["tolerance"])
     with working(time_limit, progress) as (show, interrupts):
-        job = FrontRefinement(front, wanted, int(limit))
+        job = FrontRefinement(front, wanted, int(limit), more=more)
         job.go(show)
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     return job.points(elapsed, stopped).sorted()
@@ -91,6 +91,8 @@ class FrontRefinement:
         See `MeshLoop`.
     max_iterations : int
         Most iterations of one gradient solve.
+    more : bool
+        See `MeshLoop`.
     """
 
     def __init__(
@@ -104,12 +106,13 @@ class FrontRefinement:
         programs: Programs | None = None,
         enough: Callable[[OnMesh], bool] = lambda point: False,
         max_iterations: int = MOST_ITERATIONS,
+        more: bool = True,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
-        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough, more)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self._most_work = most_work
         self.found: dict[int, Refinement] = {}

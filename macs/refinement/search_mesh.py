@@ -9,9 +9,10 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from transcription.base import Meshed, Transcription
+from transcription.base import Transcription
 from transcription.catalogue import stated
 from transcription.dfet.method import DFET
+from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import Meshed, Transcription
+from transcription.base import Transcription
 from transcription.catalogue import parse
+from transcription.meshed import Meshed
 
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front

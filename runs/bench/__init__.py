@@ -1,6 +1,6 @@
 """Benchmarks: ratios against the alternatives, measured side by side in one run. Inner levels in `inner`, on the batches of `cases`;
-transcriptions in `methods`; populations simulated in one call in `population`; searches in `search`, batches of them in `study`; published
-optima in `standard`; one optimum beside other programs in `peers`."""
+meshes by a density in `density`; transcriptions in `methods`; populations simulated in one call in `population`; searches in `search`,
+batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
 
 from .command import KINDS, bench
 

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import inner, methods, peers, population, search, standard, study
+from . import density, inner, methods, peers, population, search, standard, study
 from .measured import Row, save
 
 BENCHMARKS = {
+    "density": density,
     "inner": inner,
     "methods": methods,
     "peers": peers,
@@ -48,6 +49,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
+        "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),

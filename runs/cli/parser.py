@@ -36,6 +36,7 @@ exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs mi
 BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
+density     shooting on equal intervals, and on as many that follow the trajectory: error when simulated, and of the objective
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
@@ -234,7 +235,9 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument("what", metavar="inner|methods|peers|population|search|standard|study", nargs="?", help="which one (default: all)")
+    bench.add_argument(
+        "what", metavar="density|inner|methods|peers|population|search|standard|study", nargs="?", help="which one (default: all)"
+    )
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )

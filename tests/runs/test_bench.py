@@ -18,7 +18,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, inner, methods, population, search, standard, study
+from runs.bench import command, density, inner, methods, population, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -45,6 +45,7 @@ def small(monkeypatch):
     monkeypatch.setattr(search, "load", coarse)
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
+    monkeypatch.setattr(command.density, "QUICK", density.QUICK[:1])
     monkeypatch.setattr(command.methods, "QUICK", ("linear_tangent",))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
@@ -108,6 +109,35 @@ def test_searches_for_the_same_time_and_points(small):
     assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
     assert all(t > 0.9 * o for o, t in zip(ours.values["seconds"], theirs.values["seconds"], strict=True))
     assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
+
+
+def test_intervals_by_density_beside_equal_ones():
+    rows: list[Row] = []
+    density.bench_density(rows, (replace(density.QUICK[1], words=density.on(10, steps=14)),))
+    equal, dense = rows
+    assert [row.who for row in rows] == [
+        "equal",
+        "density",
+    ] and equal.case == dense.case == "hypersensitive, multiple-shooting:10x14:linear"
+    assert dense.of("defect") < 1e-2 * equal.of("defect") and abs(dense.of("error")) < abs(equal.of("error"))
+    assert equal.of("error") == pytest.approx(equal.of("objective") / 1.330806904943 - 1, rel=1e-9)
+    assert equal.of("defect") == equal.of("defect of run.x") and density.worst(equal) == "run.x"
+    assert "smaller defect by the density: 1 of 1" in density.report(rows)
+    truths = {case.name: case.true() for case in density.CASES}
+    assert truths["goddard, horizontal speed"] == pytest.approx(0.903889755358877) and truths["van_der_pol"] == pytest.approx(2.8672610452)
+    assert truths["goddard, flight time"] == pytest.approx(109.10894511799619) and not np.isnan(list(truths.values())).any()
+    assert all(len(line) <= 150 for line in density.report(rows).splitlines())
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"), [([0, 1, 2, 3], 0), ([0, 3, 1, 3, 0], 3), ([0, 3, 2.9, 3, 0], 1), ([1, 1, 1], 0), ([0, 1, 0, 1, 0, 1], 4)]
+)
+def test_controls_that_turn_round(values, expected):
+    nlp = DFET(len(values), 1, control_order=0).nlp(load("standard/hypersensitive"))
+    vector = np.zeros(len(nlp.variables))
+    places = [i for i, v in enumerate(nlp.variables) if v.name.startswith("run.u")]
+    vector[places] = values
+    assert density.turns(nlp.unpack(vector)["run"]) == expected
 
 
 def test_published_problems_each_in_its_own_process():
@@ -181,7 +211,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    titles = ("INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
+    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
     places = [said.out.index(words) for words in (*titles, f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
@@ -189,7 +219,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"inner", "methods", "peers", "population", "search", "standard", "study"}
+    assert {row["benchmark"] for row in table} == {"density", "inner", "methods", "peers", "population", "search", "standard", "study"}
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -224,7 +254,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "inner, methods, peers, population, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "density, inner, methods, peers, population, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

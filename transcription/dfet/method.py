@@ -21,10 +21,11 @@ from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
 from ..assembly import Assembly
-from ..base import NLP, Meshed
+from ..base import NLP
 from ..elements.phase import ElementsPhase
 from ..elements.points import need_derivatives
 from ..elements.tables import Tables
+from ..meshed import Meshed
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends

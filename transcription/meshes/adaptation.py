@@ -6,9 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..base import Meshed
+from problems.compiled import CompiledProblem
+
+from ..meshed import Meshed
 from ..phases.mesh import PhaseMesh
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from .density import LEAST, equidistributed, raised, trajectory_density
 from .errors import PhaseErrors
 from .verdict import ElementScores, Verdict
 
@@ -18,13 +21,37 @@ Method = TypeVar("Method", bound=Meshed)
 def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
     """The method on finer meshes, with controls that stay within their bounds where one leaves them between nodes. The same method where no
     mesh can be refined further."""
+    all_scores, bounded = verdict.scores(), verdict.leaving > verdict.wanted.leaving
+    by_phase = dict(zip(trajectory, all_scores, strict=True))
+    others, of_controls = {name: one.others for name, one in by_phase.items()}, {name: one.controls for name, one in by_phase.items()}
+    own = method.adapted(verdict.problem, trajectory, others, of_controls)
+    if own is not None:
+        return own.remeshed({}, bounded=bounded)
     finer = {}
-    for name, errors, scores in zip(trajectory, verdict.errors, verdict.scores(), strict=True):
+    for name, errors, scores in zip(trajectory, verdict.errors, all_scores, strict=True):
         old = method.mesh_of(name)
         mesh = _finer(method, old, trajectory[name], errors, scores)
         if mesh != old:
             finer[name] = mesh
-    return method.remeshed(finer, bounded=verdict.leaving > verdict.wanted.leaving)
+    return method.remeshed(finer, bounded=bounded)
+
+
+def redistributed(method: Method, problem: CompiledProblem, trajectory: Trajectory) -> Method:
+    """The method with as many elements in each phase as before, spread by the density of the trajectory; see `density`. Phases whose edges
+    move keep theirs."""
+    found = method
+    for least in LEAST:
+        meshes = {}
+        for name, phase in trajectory.items():
+            old = method.mesh_of(name)
+            if phase.tf > phase.t0 and not old.moving:
+                places, values = trajectory_density(phase)
+                edges = equidistributed(places, raised(places, values, least), old.elements)
+                meshes[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
+        found = method.remeshed(meshes)
+        if found.suits(problem):
+            break
+    return found
 
 
 def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
@@ -35,7 +62,8 @@ def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory
     for name, gain in verdict.gains.items():
         old = method.mesh_of(name).found_in(trajectory[name].state.edges)
         worst_first = [int(j) for j in np.argsort(-gain.amounts, kind="stable") if gain.amounts[j] >= WORST_SHARE * most > 0]
-        if worst_first:
+        # Elements that are integrated in several steps are judged by these.
+        if worst_first and len(gain.amounts) == old.elements:
             # Switches that are found leave fewer.
             limit = 2 * max(method.most_elements, 2 * method.elements)
             edges = split(np.array(old.edges), {j: gain.places[j].tolist() or [0.0] for j in worst_first}, limit)

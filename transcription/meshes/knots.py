@@ -12,7 +12,7 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 
-from ..base import Meshed
+from ..meshed import Meshed
 from ..phases.mesh import PhaseMesh
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory

@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 
-from ..base import Meshed
+from ..meshed import Meshed
 from ..trajectories.simulate import Simulation, simulate, simulate_elements
 from ..trajectories.trajectory import Trajectory
 from .errors import PhaseErrors, phase_errors
@@ -73,6 +73,7 @@ class Verdict:
 
     Attributes
     ----------
+    problem : CompiledProblem
     simulation : Simulation
         Of the whole trajectory.
     by_elements : Simulation
@@ -94,6 +95,7 @@ class Verdict:
         What controls could still gain in each phase, see `minimum`, in units of the objectives; empty where that is not known.
     """
 
+    problem: CompiledProblem
     simulation: Simulation
     by_elements: Simulation
     errors: list[PhaseErrors]
@@ -258,6 +260,7 @@ def judge(
     total = sum(float(phase.defect.sum()) for phase in errors)
     grows = defect > wanted.tolerance and total < HARDLY * defect
     return Verdict(
+        problem=problem,
         simulation=whole,
         by_elements=parts,
         errors=errors,

@@ -102,6 +102,11 @@ class PhaseMesh:
         whole = np.rint(places)
         return np.where(np.abs(places - whole) < 1e-15 * self.elements, whole, places)
 
+    def image(self, places: np.ndarray) -> np.ndarray:
+        """Where places (k,) on equal elements, relative to the phase, lie on these: each in its element, in the same proportion."""
+        own, equal = self.places, np.arange(self.elements + 1.0)
+        return places if np.array_equal(own, equal) else np.interp(places, np.linspace(0.0, 1.0, self.elements + 1), self.edges)
+
     def inside(self, nodes: np.ndarray) -> np.ndarray:
         """Local coordinates (k,) in [-1, 1], relative to the phase: shape (N, k)."""
         places = self.places

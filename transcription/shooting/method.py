@@ -7,8 +7,11 @@ steps see `runge_kutta.py`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
+
+import numpy as np
 
 from problems.checks import check_choice, check_count
 from problems.compiled import CompiledPhase, CompiledProblem
@@ -16,10 +19,15 @@ from problems.problem import Problem
 
 from ..assembly import Assembly
 from ..base import NLP, Transcription
+from ..meshed import Meshed
+from ..meshes.density import LEAST
 from ..phases.layout import Layout
+from ..phases.mesh import PhaseMesh
 from ..phases.writer import Ends
+from ..trajectories.trajectory import Trajectory
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
+from .remeshing import next_intervals
 from .runge_kutta import TABLEAUX
 from .stability import check_steps
 from .step import Step, StepMesh
@@ -40,7 +48,7 @@ class Shooting(Transcription):
         spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere.
     control_nodes : int, optional
         Number of equally spaced nodes of the controls, both ends among them; by default those of the states. No step leads across one:
-        where they fall into a step, it is divided.
+        where they fall into a step, it is divided. Among intervals of other lengths they lie in the same intervals, at the same parts.
     path_points : int
         Path constraints are imposed, and peaks sampled, at the ends of all steps and at as many equally spaced points inside each, which
         are reached by a step of the same method of that part of its length.
@@ -100,18 +108,43 @@ class Shooting(Transcription):
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`. Raises ValueError, too, where steps are too long to be stable."""
         compiled = problem.compile()
-        scheme, law = TABLEAUX[self.scheme], ControlLaw(self.control, self.control_nodes or self._intervals + 1)
-        mesh = StepMesh.of(self._intervals, self.steps, law.edges)
-        count, _ = self._counted
-        check_steps(compiled, scheme, mesh.places, f"{type(self).__name__}: ", {count: getattr(self, count), "steps": self.steps})
+        self._check_steps(compiled)
 
         def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ShootingPhase:
-            points = [i / (self.path_points + 1) for i in range(self.path_points + 1)]
+            mesh, points = self._phase_mesh(phase.name), [i / (self.path_points + 1) for i in range(self.path_points + 1)]
+            law = self._law(mesh)
             if law.jumps and _sees_controls(phase):
                 points.append(1.0)
-            return ShootingPhase(mesh, law, Step(scheme, law.degree, points, phase), phase, layout, ends, apart=self._apart)
+            step = Step(TABLEAUX[self.scheme], law.degree, points, phase)
+            return ShootingPhase(self._steps(mesh), law, step, phase, layout, ends, apart=self._apart)
 
         return Assembly(compiled, writer).nlp(self)
+
+    def _check_steps(self, problem: CompiledProblem) -> None:
+        """Raise ValueError where steps are too long to be stable."""
+        meshes, (count, _) = {phase.name: self._phase_mesh(phase.name) for phase in problem.phases}, self._counted
+        places = {name: self._steps(mesh).places for name, mesh in meshes.items()}
+        own = [name for name, mesh in meshes.items() if mesh != self._equal]
+        settings = {count: getattr(self, count), "steps": self.steps}
+        check_steps(problem, TABLEAUX[self.scheme], places, f"{type(self).__name__}: ", settings, own)
+
+    def _phase_mesh(self, phase: str) -> PhaseMesh:
+        """The intervals of a phase, by its name."""
+        return self._equal
+
+    @property
+    def _equal(self) -> PhaseMesh:
+        """Equal intervals."""
+        return PhaseMesh.uniform(self._intervals, TABLEAUX[self.scheme].order)
+
+    def _law(self, mesh: PhaseMesh) -> ControlLaw:
+        """Controls on nodes that lie among these intervals as equally spaced ones do among equal intervals."""
+        nodes = self.control_nodes or mesh.elements + 1
+        return ControlLaw(self.control, PhaseMesh(tuple(mesh.image(np.linspace(0.0, 1.0, nodes)).tolist()), DEGREES[self.control]))
+
+    def _steps(self, mesh: PhaseMesh) -> StepMesh:
+        """The steps of a phase on these intervals: equal within each, but for those that a node of the controls divides."""
+        return StepMesh.of(mesh.elements, self.steps, np.linspace(0.0, 1.0, self.control_nodes or mesh.elements + 1)).on(mesh)
 
 
 @dataclass(frozen=True)
@@ -142,8 +175,8 @@ class SingleShooting(Shooting):
 
 
 @dataclass(frozen=True)
-class MultipleShooting(Shooting):
-    """The states at the nodes between equal intervals are variables of their own, and each interval is integrated from its left one.
+class MultipleShooting(Meshed, Shooting):
+    """The states at the nodes between intervals are variables of their own, and each interval is integrated from its left one.
 
     The problem is larger, but sparse, and much less nonlinear than by single shooting: for gradient tools.
 
@@ -151,16 +184,91 @@ class MultipleShooting(Shooting):
     ----------
     intervals : int
         Of each phase, of equal length.
+    mesh : mapping, optional
+        Phases that have intervals of their own: name -> (edges, order), edges relative to the phase, increasing from 0 to 1, and the order
+        of the scheme; see `PhaseMesh`.
     scheme, steps, control, control_nodes, path_points
-        See `Shooting`; `steps` are those of each interval.
+        See `Shooting`; `steps` are those of each interval, of equal length.
+
+    Raises
+    ------
+    ValueError
+        As for `Shooting`; also for edges that do not increase from 0 to 1, and for another order than that of the scheme.
     """
 
     intervals: int
+    mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = field(default=None, kw_only=True)
 
+    most_elements: ClassVar[int] = 400
     _counted = "intervals", 1
     _apart = True
     word = "multiple-shooting"
     examples = "multiple-shooting:40 (intervals), the rest as for shooting"
+
+    def __post_init__(self) -> None:
+        Shooting.__post_init__(self)
+        super().__post_init__()
+        for phase, mesh in self.meshes.items():
+            if mesh.order != self.order:
+                raise ValueError(
+                    f"MultipleShooting: phase '{phase}': on a mesh for {self.scheme} the order is {self.order}, not {mesh.order}"
+                )
+
+    @property
+    def elements(self) -> int:  # type: ignore[override]
+        """The number of intervals of a phase that has no mesh of its own."""
+        return self.intervals
+
+    @property
+    def order(self) -> int:  # type: ignore[override]
+        """The order of the scheme, which is the degree of the states on each step."""
+        return TABLEAUX[self.scheme].order
+
+    def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
+        """See `Shooting.transcribe`."""
+        compiled = problem.compile()
+        self.check_phases(compiled)
+        return super().transcribe(compiled)
+
+    def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> MultipleShooting:
+        """See `Meshed.remeshed`: straight lines between values within bounds stay within these."""
+        other = super().remeshed(meshes)
+        return replace(other, control="linear") if bounded and self.control == "spline" else other
+
+    def adapted(
+        self, problem: CompiledProblem, trajectory: Trajectory, errors: Mapping[str, np.ndarray], of_controls: Mapping[str, np.ndarray]
+    ) -> MultipleShooting:
+        """See `Meshed.adapted`: intervals by the density of the trajectory; see `remeshing`. Where their steps would be too long to be
+        stable, they are more even."""
+        degree, most = DEGREES[self.control], max(self.most_elements, 2 * self.elements)
+        found = self
+        for least in LEAST:
+            found = self.remeshed(
+                {
+                    name: next_intervals(self.mesh_of(name), phase, errors[name], of_controls[name], degree, least, most)
+                    for name, phase in trajectory.items()
+                    if phase.tf > phase.t0
+                }
+            )
+            if found.suits(problem):
+                break
+        return found
+
+    def suits(self, problem: CompiledProblem) -> bool:
+        """See `Meshed.suits`: whether all steps may be stable."""
+        try:
+            self._check_steps(problem)
+        except ValueError:
+            return False
+        return True
+
+    def alternatives(self) -> tuple[MultipleShooting, ...]:
+        """See `Meshed.alternatives`: as many equal intervals."""
+        equal = {name: PhaseMesh.uniform(mesh.elements, mesh.order) for name, mesh in self.meshes.items()}
+        return () if equal == self.meshes else (self.remeshed(equal),)
+
+    def _phase_mesh(self, phase: str) -> PhaseMesh:
+        return self.mesh_of(phase)
 
 
 def _sees_controls(phase: CompiledPhase) -> bool:

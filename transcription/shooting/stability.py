@@ -10,7 +10,7 @@ at each of several points, from the initial to the final or guessed states, unde
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import ceil, log
 
 import casadi as ca
@@ -28,26 +28,37 @@ FINEST = 1e4
 """Most times that a message proposes to shorten a step."""
 
 
-def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, prefix: str, settings: Mapping[str, int]) -> None:
+def check_steps(
+    problem: CompiledProblem,
+    scheme: Tableau,
+    places: Mapping[str, np.ndarray],
+    prefix: str,
+    settings: Mapping[str, int],
+    own: Collection[str] = (),
+) -> None:
     """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable.
 
     Parameters
     ----------
     problem : CompiledProblem
     scheme : Tableau
-    places : array (N + 1,)
-        Ends of the steps, relative to a phase.
+    places : mapping of arrays (N + 1,)
+        Ends of the steps of each phase, relative to it.
     prefix : str
         What the message begins with.
     settings : mapping
         The settings that make steps shorter: the first is the number of nodes or intervals, "steps" those between them.
+    own : names
+        Phases whose steps do not follow from the first of these: such are made for a trajectory, which may be far from the guess, so that
+        nothing is certain that is not so in the middle of the states' bounds, too.
     """
     p = np.array([problem.guesses.get(v.name, 0.5 * (v.lower + v.upper)) for v in problem.parameters])
-    n, widest = len(places) - 1, float(np.diff(places).max())
     for phase in problem.phases:
+        shares = np.diff(places[phase.name])
+        n, widest = len(shares), float(shares.max())
         length = max(phase.duration[0], phase.tf.lower - phase.t0.upper)
-        modes = _modes(phase, length, p) if length > 0 else []
-        growing = [_growing(scheme, rates * length, n, widest) for rates, _ in modes]
+        modes = _modes(phase, length, p, middle=phase.name in own) if length > 0 else []
+        growing = [_growing(scheme, rates * length, shares) for rates, _ in modes]
         if not modes or not all(found.any() for found in growing):
             continue
         (rates, names), found = modes[0], np.flatnonzero(growing[0])
@@ -56,22 +67,28 @@ def check_steps(problem: CompiledProblem, scheme: Tableau, places: np.ndarray, p
         finer = np.geomspace(1.0, FINEST, 5000)
         enough = finer[np.abs(scheme.stability(rates[worst] * h / finer)) <= 1.0]
         (count, value), (_, steps) = settings.items()
-        cure = f"{count}={ceil(value * enough[0]) + 1} or more, or steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
+        more = "" if phase.name in own else f"{count}={ceil(value * enough[0]) + 1} or more, or "
+        cure = f"{more}steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
+        such = ("the longest step", f"there are {n} in all") if phase.name in own else ("each step", f"there are {n}")
         raise ValueError(
             f"{prefix}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate "
-            f"of {-rates[worst].real:.3g} per {phase.time_unit}: each step of {scheme.name} multiplies it by {factors.max():.3g}, and "
-            f"there are {n}; take {cure}"
+            f"of {-rates[worst].real:.3g} per {phase.time_unit}: {such[0]} of {scheme.name} multiplies it by {factors.max():.3g}, and "
+            f"{such[1]}; take {cure}"
         )
 
 
-def _growing(scheme: Tableau, decay: np.ndarray, n: int, widest: float) -> np.ndarray:
-    """Which modes, of rates `decay` per phase, should vanish and grow instead."""
-    growth = np.log(np.maximum(np.abs(scheme.stability(decay * widest)), 1e-300))
-    return (decay.real < -FACTOR) & (n * growth > FACTOR)
+def _growing(scheme: Tableau, decay: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Which modes, of rates `decay` per phase, should vanish and grow instead over some of the steps that follow each other, which take
+    `shares` (N,) of the phase."""
+    lengths, place = np.unique(shares, return_inverse=True)
+    growth = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(lengths, decay))), 1e-300))[place]
+    sums = np.cumsum(np.vstack([np.zeros(len(decay)), growth]), axis=0)
+    return (decay.real < -FACTOR) & ((sums - np.minimum.accumulate(sums, axis=0)).max(axis=0) > FACTOR)
 
 
-def _modes(phase: CompiledPhase, length: float, p: np.ndarray) -> list[tuple[np.ndarray, list[str]]]:
-    """Eigenvalues (nx,) of the linearised dynamics at each of the points, and the state that each of them is most about.
+def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) -> list[tuple[np.ndarray, list[str]]]:
+    """Eigenvalues (nx,) of the linearised dynamics at each of the points, and in the middle of the bounds of the states if it is wanted;
+    and the state that each of them is most about.
 
     None where there are no derivatives to know them by, or no numbers.
     """
@@ -83,9 +100,10 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray) -> list[tuple[np.
     t0 = float(np.clip(phase.guesses.get("t0", phase.t0.upper), phase.t0.lower, phase.t0.upper))
     start, s = np.array([t0]), np.array([t0, t0 + length, *p])
     span, found = np.array([v.span for v in phase.states]), []
-    middles = [np.array([0.5 * sum(first)]) for first in phase.initial]
-    states = np.array([state_along(phase, i, middle, start, start + length, POINTS)[0] for i, middle in enumerate(middles)])
-    for x in states.T:
+    first = [np.array([0.5 * sum(limits)]) for limits in phase.initial]
+    states = np.array([state_along(phase, i, value, start, start + length, POINTS)[0] for i, value in enumerate(first)]).T
+    bounds = [[0.5 * (v.lower + v.upper) for v in phase.states]]
+    for x in np.vstack([states, bounds]) if middle else states:
         for level in (0.0, 0.5, 1.0):
             u = [v.lower + level * v.span for v in phase.controls]
             matrix = np.array(jacobian(x, u, t0 + 0.5 * length, s))

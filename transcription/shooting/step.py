@@ -15,6 +15,7 @@ from problems.compiled import CompiledPhase
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped_controls
 from ..numerics.polynomials import basis_matrix
+from ..phases.mesh import PhaseMesh
 from .runge_kutta import Tableau
 
 
@@ -154,6 +155,10 @@ class StepMesh:
         apart = np.abs(nodes[:, None] - whole).min(axis=1) > SAME
         places = np.sort(np.concatenate([whole, nodes[apart]]))
         return cls(places, np.searchsorted(places, whole[::steps]))
+
+    def on(self, mesh: PhaseMesh) -> StepMesh:
+        """The same steps on intervals of other lengths."""
+        return StepMesh(mesh.image(self.places), self.ends)
 
     @property
     def steps(self) -> int:

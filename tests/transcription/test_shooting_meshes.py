@@ -1,0 +1,240 @@
+"""Multiple shooting on intervals of any lengths."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from macs import Front, optimize
+from problems import Problem, load
+from transcription import DFET, Meshed, MultipleShooting, from_dict
+from transcription import word as said
+from transcription.phases.mesh import PhaseMesh
+from transcription.shooting.runge_kutta import TABLEAUX
+from transcription.trajectories.simulate import simulate
+
+EDGES = (0.0, 0.1, 0.15, 0.4, 0.5, 0.9, 1.0)
+KINDS = [("constant", None), ("linear", None), ("spline", None), ("constant", 4), ("linear", 10), ("spline", 4)]
+
+
+def image(places: np.ndarray, edges=EDGES) -> np.ndarray:
+    """Where places on equal intervals lie on those between edges."""
+    return np.interp(places, np.linspace(0, 1, len(edges)), edges)
+
+
+def law(kind: str, times: np.ndarray, values: np.ndarray):
+    """A control as scipy has it, by values at times, or between them."""
+    if kind == "constant":
+        return lambda t: values[np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(values) - 1)]
+    return CubicSpline(times, values) if kind == "spline" else lambda t: np.interp(t, times, values)
+
+
+def values_of(nlp, z: np.ndarray, name: str) -> np.ndarray:
+    return np.array([value for v, value in zip(nlp.variables, z, strict=True) if v.name.startswith(f"{name}[")])
+
+
+def on(edges=EDGES, **more) -> MultipleShooting:
+    return MultipleShooting(3, mesh={"swing": (edges, TABLEAUX[more.get("scheme", "rk4")].order)}, **more)
+
+
+# Equal intervals, and others
+
+
+@pytest.mark.parametrize(("kind", "nodes"), KINDS)
+@pytest.mark.parametrize("count", [5, 6, 49])
+def test_a_mesh_of_equal_intervals_is_the_same_bits(kind, nodes, count):
+    more = {"control": kind, "control_nodes": nodes, "steps": 3}
+    plain = MultipleShooting(count, **more).transcribe(oscillator())
+    meshed = on(tuple(np.linspace(0, 1, count + 1).tolist()), **more).transcribe(oscillator())
+    Z = plain.first_guess(candidates(plain, 3))
+    assert [v.name for v in plain.variables] == [v.name for v in meshed.variables]
+    for one, other in zip(plain.propagate_and_score(Z), meshed.propagate_and_score(Z), strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(("kind", "nodes"), KINDS)
+def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
+    nlp = on(scheme="rk8", steps=4, control=kind, control_nodes=nodes).transcribe(oscillator())
+    for z in propagated(nlp, 2):
+        t0, tf, m = (z[slot(nlp, name)] for name in ("swing.t0", "swing.tf", "m"))
+        kinks = t0 + (tf - t0) * image(np.linspace(0, 1, nodes or len(EDGES)))
+        u, v = (law(kind, kinks, values_of(nlp, z, name)) for name in ("swing.u", "swing.v"))
+        x, cost = np.array([z[slot(nlp, "swing.x(t0)")], 0.5]), 0.0
+
+        def rates(t, y, u=u, v=v, m=m, tf=tf):
+            return [*oscillator_rates(t, y[:2], np.array([u(t), v(t)]), m, tf), u(t) ** 2 + y[0] * y[1]]
+
+        for a, b in zip(kinks[:-1], kinks[1:] - 1e-13, strict=True):
+            *x, cost = solve_ivp(rates, (a, b), [*x, cost], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        assert z[[slot(nlp, "swing.x(tf)"), slot(nlp, "swing.y(tf)")]] == pytest.approx(x, abs=2e-9)
+        assert pytest.approx([cost, -x[0]], abs=2e-9) == nlp.evaluate(z[None])[0][0]
+        flight, times = nlp.unpack(z)["swing"], np.linspace(t0, tf, 200)[1:-1] + 1e-5
+        assert flight.at(times)["u"] == pytest.approx(u(times), abs=1e-11)
+        if nodes is None:
+            assert flight.state.edges[::4] == pytest.approx(t0 + (tf - t0) * np.array(EDGES), abs=1e-12)
+            assert np.diff(flight.state.edges).reshape(6, 4) == pytest.approx((tf - t0) * np.diff(EDGES)[:, None] / 4 * np.ones((6, 4)))
+        assert simulate(nlp.problem, nlp.unpack(z)).max_defect < 1e-8
+
+
+@pytest.mark.parametrize(("kind", "nodes"), KINDS)
+def test_derivatives_of_the_reduced_problem(kind, nodes):
+    nlp = on(control=kind, control_nodes=nodes, steps=2).transcribe(oscillator())
+    reduced, Z = nlp.reduced, nlp.first_guess(candidates(nlp, 2, seed=4))
+    A = reduced.derivatives(reduced.propagate(Z), np.arange(len(reduced.lower)))
+    for k, column in enumerate(nlp.free):
+        moved = [Z.copy(), Z.copy()]
+        moved[0][:, column] += 1e-6
+        moved[1][:, column] -= 1e-6
+        slope = (reduced.propagate(moved[0]).values - reduced.propagate(moved[1]).values) / 2e-6
+        assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
+
+
+@given(
+    st.lists(st.floats(0.02, 1.0), min_size=1, max_size=8),
+    st.integers(1, 3),
+    st.sampled_from([None, 2, 3, 5, 9]),
+    st.sampled_from(["constant", "linear", "spline"]),
+)
+@settings(max_examples=25, deadline=None)
+def test_the_integral_of_a_control_is_exact(lengths, steps, nodes, kind):
+    edges = np.append(0.0, np.cumsum(lengths))
+    edges = tuple((edges / edges[-1]).tolist())
+    problem, phase = integrator()
+    problem.minimize("end", phase.final(phase["x"]))
+    method = MultipleShooting(1, mesh={"run": (edges, 4)}, steps=steps, control=kind, control_nodes=nodes)
+    nlp = method.transcribe(problem)
+    z = propagated(nlp, 1)[0]
+    kinks, values = 2.0 * image(np.linspace(0, 1, nodes or len(edges)), edges), values_of(nlp, z, "run.u")
+    if kind == "spline":
+        exact = CubicSpline(kinks, values).integrate(0, 2)
+    else:
+        exact = values @ np.diff(kinks) if kind == "constant" else np.trapezoid(values, kinks)
+    assert z[slot(nlp, "run.x(tf)")] == pytest.approx(float(exact), abs=1e-11)
+
+
+@pytest.mark.parametrize("scheme", ["euler", "heun", "rk4"])
+def test_errors_fall_with_the_order_on_graded_intervals(scheme):
+    problem, _ = decay(tf=2.0)
+    problem.parameter("idle", bounds=(0, 1))
+    errors = []
+    for n in (20, 40):
+        edges = tuple((np.linspace(0, 1, n + 1) ** 1.5).tolist())
+        nlp = MultipleShooting(1, scheme=scheme, mesh={"fall": (edges, TABLEAUX[scheme].order)}).transcribe(problem)
+        errors.append(abs(nlp.propagate_and_score(np.zeros((1, len(nlp.variables))))[1][0, 0] - np.exp(-2)))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(TABLEAUX[scheme].order, abs=0.3)
+
+
+def test_each_phase_has_a_mesh_of_its_own():
+    problem = Problem("legs")
+    first, second = problem.phase("first", t0=0, tf=(0.5, 1.5)), problem.phase("second", t0=(0.5, 1.5), tf=2.0)
+    for phase, ends in ((first, {"initial": 0}), (second, {"final": 0})):
+        phase.state("x", bounds=(-2, 3), **({"initial": 0} if phase is first else {"final": 1}))
+        v, u = phase.state("v", bounds=(-5, 5), **ends), phase.control("u", bounds=(-10, 10))
+        phase.dynamics(x=v, v=u)
+    problem.link(first, second)
+    problem.minimize("effort", first.integral(first["u"] ** 2) + second.integral(second["u"] ** 2))
+    method = MultipleShooting(7, control="linear", mesh={"second": (EDGES, 4)})
+    point = optimize(problem, method)
+    assert point.status == "converged" and point.verified
+    assert point.objectives["effort"] == pytest.approx(1.5, abs=1e-4), "12 / 2^3, with a control that is a straight line"
+    flight = point.trajectory
+    assert len(flight["first"].state.edges) == 8
+    assert (flight["second"].state.edges - flight["second"].t0) / (2.0 - flight["second"].t0) == pytest.approx(EDGES, abs=1e-12)
+
+
+def test_the_optimum_of_the_ascent_on_other_intervals(tmp_path):
+    """Linear tangent steering at 250 s: 0.903889755358877 km/s, a closed form."""
+    edges = tuple((0.5 * (np.linspace(0, 1, 41) + np.linspace(0, 1, 41) ** 2)).tolist())
+    method = MultipleShooting(40, control="linear", mesh={"ascent": (edges, 4)})
+    point = optimize(load("goddard"), method, objective="horizontal speed")
+    assert point.verified and point.objectives["horizontal speed"] == pytest.approx(0.903889755358877, abs=1e-5)
+    start = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed")
+    again = optimize(
+        load("goddard"), method, objective="horizontal speed", start=method.nlp(load("goddard")).interpolate(start.trajectory)[None]
+    )
+    assert again.objectives["horizontal speed"] == pytest.approx(point.objectives["horizontal speed"], abs=1e-7)
+    Front.of(point.alone()).save(tmp_path / "front.nc")
+    loaded = Front.load(tmp_path / "front.nc")
+    assert from_dict(loaded[0].transcription) == method and np.array_equal(loaded[0].decision, point.decision)
+    assert loaded[0].simulate().max_defect == point.simulate().max_defect
+
+
+# Settings
+
+
+def test_data_and_back():
+    method = MultipleShooting(3, steps=2, mesh={"run": (EDGES, 4), "a": [(0.0, 0.3, 1.0), 4]})
+    assert isinstance(method, Meshed) and (method.elements, method.order) == (3, 4)
+    assert method.mesh_of("run").elements == 6 and method.mesh_of("other") == PhaseMesh.uniform(3, 4)
+    assert from_dict(method.to_dict()) == method == pickle.loads(pickle.dumps(method)) and hash(from_dict(method.to_dict())) == hash(method)
+    assert said(method) is None and said(MultipleShooting(3, mesh={})) == "multiple-shooting:3"
+    assert from_dict({"method": "MultipleShooting", "settings": {"intervals": 3}}) == MultipleShooting(3), "files from before meshes"
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: on((0.0, 0.7, 0.7, 1.0)), "MultipleShooting: phase 'swing': edges of a mesh must increase from 0 to 1"),
+        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 2)}), "phase 'swing': on a mesh for rk4 the order is 4, not 2"),
+        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 4, 2)}), "phase 'swing': the order of its controls cannot be chosen"),
+        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 4, None, (2,))}), "phase 'swing': the edges of its elements cannot move"),
+        (lambda: MultipleShooting(3, mesh={"leg": (EDGES, 4)}).transcribe(oscillator()), "a mesh is given for phase 'leg'; the phases of"),
+    ],
+)
+def test_meshes_that_make_no_sense(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_controls_that_leave_their_bounds_become_straight_lines():
+    spline = MultipleShooting(3, control="spline")
+    assert spline.remeshed({}, bounded=True).control == "linear"
+    assert spline.remeshed({}).control == "spline" and MultipleShooting(3).remeshed({}, bounded=True).control == "constant"
+
+
+# Steps that are too long
+
+
+def lag(rate: float) -> Problem:
+    """y follows a control with a lag, for 100 s."""
+    problem = Problem("lag")
+    phase = problem.phase("turn", t0=0, tf=100.0)
+    y, u = phase.state("y", bounds=(-1, 1), initial=0), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(y=rate * (u - y))
+    problem.maximize("far", phase.final(y))
+    return problem
+
+
+def test_the_longest_step_decides():
+    """Of 100 equal steps of 1 s each is stable to a rate of 2.785; so are 49 half steps and a last one of 75.5 s only to 0.037."""
+    even, tail = np.linspace(0, 1, 101), np.append(0.5e-2 * np.arange(50), 1.0)
+    MultipleShooting(100, mesh={"turn": (tuple(even.tolist()), 4)}).transcribe(lag(2.7))
+    method = MultipleShooting(100, mesh={"turn": (tuple(tail.tolist()), 4)})
+    with pytest.raises(ValueError, match=r"steps of 75.5 s are too long for 'y', .*: the longest step of rk4 .* 50 in all; take steps=\d+"):
+        method.transcribe(lag(1.0))
+    assert not method.suits(lag(1.0).compile()) and method.suits(lag(0.03).compile())
+    # Rates of 0.1: 7.55 decays in one step are multiplied by 80, which is not yet certain to be wrong.
+    method.transcribe(lag(0.1))
+
+
+def test_what_grows_on_some_steps_and_decays_on_others_is_refused_for_what_it_grows():
+    """Forty steps of 2 s, each of which doubles a mode, or more, then two hundred that damp it."""
+    edges = tuple(np.concatenate([np.linspace(0, 0.8, 41), np.linspace(0.8, 1, 201)[1:]]).tolist())
+    with pytest.raises(ValueError, match="steps of 2 s are too long for 'y'"):
+        MultipleShooting(1, mesh={"turn": (edges, 4)}).transcribe(lag(1.6))
+    MultipleShooting(1, mesh={"turn": (edges, 4)}).transcribe(lag(1.3))
+
+
+def test_where_the_guess_is_not_the_trajectory_long_steps_may_be_right():
+    """x' = u - x^3 decays quickly on the guess, from 1.5 to 1, but not at 0, where the optimum is nearly all of the time."""
+    edges = tuple(np.concatenate([np.linspace(0, 0.1, 31), np.linspace(0.1, 0.9, 21)[1:], np.linspace(0.9, 1, 31)[1:]]).tolist())
+    with pytest.raises(ValueError, match=r"steps of 1.667 s are too long for .x."):
+        MultipleShooting(30).transcribe(load("standard/hypersensitive"))
+    MultipleShooting(80, mesh={"run": (edges, 4)}).transcribe(load("standard/hypersensitive"))
