@@ -25,6 +25,10 @@ CASES: dict[str, tuple[str, str]] = {
     "reentry_case2": ("problems.cases.reentry.case2:problem", "the same within narrow limits"),
     "reentry_case3": ("problems.cases.reentry.case3:problem", "the same around three no-fly zones"),
     "skip": ("problems.cases.skip_entry.skip:problem", "skip entry down to 51.88 km and up again: terminal mass against terminal speed"),
+    "smv": (
+        "problems.cases.skip_entry.smv:problem",
+        "skip entry over a turning planet: flight time, heat load, terminal speed and mass",
+    ),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
     **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},

@@ -11,7 +11,7 @@ from math import degrees, radians
 import numpy as np
 
 from ..problem import Problem
-from .reentry.nominal import guess
+from .reentry.nominal import ATTACK, BANK, guess
 from .reentry.statement import ANGLES, END, START, declare
 from .reentry.vehicle import MASS, SHUTTLE
 from .winged import STATES
@@ -38,13 +38,12 @@ def betts(name: str, heating_rate: float | None = None) -> Problem:
     phase = problem.phase("entry", t0=0.0, tf=(500.0, 4000.0))
     states = declare(phase, {state: START[state] for state in STATES}, END)
     attack, bank = (phase.control(angle, bounds=BOUNDS[angle], unit="rad") for angle in ANGLES)
-    rates = SHUTTLE.rates(states, attack, bank, MASS)
-    phase.dynamics(**rates)
+    phase.dynamics(**SHUTTLE.rates(states, attack, bank, MASS))
     if heating_rate is not None:
         heating = SHUTTLE.heating_rate(states["altitude"], states["speed"], attack)
         phase.path("heating rate", heating, upper=heating_rate, scale=heating_rate)
     problem.maximize("cross-range", degrees(1.0) * phase.final(states["latitude"]), unit="deg")
-    guess(phase, rates, START, FINAL_GUESS, ANGLES)
+    guess(phase, START, FINAL_GUESS, dict(zip(ANGLES, (ATTACK, BANK), strict=True)))
     phase.guess(tf=FINAL_GUESS)
     problem.default_transcription = "dfet:20x3"
     problem.default_evaluations = 1_000

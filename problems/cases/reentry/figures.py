@@ -51,7 +51,7 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     phases = _phases(flights)
     limits = phases[0].path_limits
     panels = [*ALONG, *(limit.name for limit in limits)]
-    figure, (shades, colors) = _new_figure(7.2, 1.45 * -(-len(panels) // 3) + 0.3), _colors(phases)
+    figure, (shades, colors) = new_figure(7.2, 1.45 * -(-len(panels) // 3) + 0.3), _colors(phases)
     grid = figure.subplots(-(-len(panels) // 3), 3, sharex=True).ravel()
     for ax, name in zip(grid, panels, strict=False):
         unit, size = UNITS.get(name, ("deg", degrees(1.0) if name in ALONG else 1.0))
@@ -69,14 +69,14 @@ def flights_figure(flights: Sequence[Any]) -> Figure:
     for ax in grid[len(panels) - 3 : len(panels)]:
         ax.tick_params(labelbottom=True)
     figure.supxlabel("time [s]")
-    _bar(figure, shades, colors, grid[: len(panels)].tolist())
+    bar(figure, shades, colors, grid[: len(panels)].tolist(), "cross-range [deg]")
     return figure
 
 
 def track_figure(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> Figure:
     """Latitude over longitude with the no-fly zones; parameters as of `flights_figure`."""
     phases = _phases(flights)
-    figure, (shades, colors) = _new_figure(5.0, 3.0), _colors(phases)
+    figure, (shades, colors) = new_figure(5.0, 3.0), _colors(phases)
     ax = figure.subplots()
     around = np.linspace(0.0, 2 * np.pi, 181)
     for zone in zones:
@@ -89,7 +89,7 @@ def track_figure(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> Figure:
     ax.set_xlabel("longitude [deg]")
     ax.set_ylabel("latitude [deg]")
     ax.set_aspect("equal", adjustable="datalim")
-    _bar(figure, shades, colors, [ax])
+    bar(figure, shades, colors, [ax], "cross-range [deg]")
     return figure
 
 
@@ -106,24 +106,28 @@ def _along(phase: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _colors(phases: Sequence[Any]) -> tuple[Any, list[Any]]:
-    """A scale of colours for cross-ranges in degrees, and the colour of each phase."""
+    return colors(np.array([degrees(phase["latitude"][-1]) for phase in phases]))
+
+
+def colors(values: np.ndarray) -> tuple[Any, list[Any]]:
+    """A scale of colours for the values of flights (k,), and the colour of each."""
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
 
-    values = np.array([degrees(phase["latitude"][-1]) for phase in phases])
-    colors = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
-    shades = ScalarMappable(Normalize(values.min(), values.max()), ListedColormap(colors))
+    shown = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
+    shades = ScalarMappable(Normalize(values.min(), values.max()), ListedColormap(shown))
     return shades, shades.to_rgba(values).tolist()
 
 
-def _bar(figure: Figure, shades: Any, colors: Sequence[Any], axes: Sequence[Any]) -> None:
+def bar(figure: Figure, shades: Any, colors: Sequence[Any], axes: Sequence[Any], label: str) -> None:
     """A colour bar, where there are several colours."""
     if len(colors) > 1:
-        figure.colorbar(shades, ax=axes, label="cross-range [deg]", shrink=0.5, aspect=30, pad=0.02).outline.set_visible(False)
+        figure.colorbar(shades, ax=axes, label=label, shrink=0.5, aspect=30, pad=0.02).outline.set_visible(False)
 
 
-def _new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")

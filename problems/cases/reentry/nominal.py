@@ -1,4 +1,4 @@
-"""A flight to start from: a sensible law of the angles, and where it leads."""
+"""A flight to start from: a sensible law of the controls, and where it leads."""
 
 from __future__ import annotations
 
@@ -17,39 +17,46 @@ BANK = np.radians([-75.0, -45.0, -2.0])
 STEPS = 400
 
 
-def guess(phase: Phase, rates: Mapping[str, ca.MX], start: Mapping[str, float], final_time: float, controls: Sequence[str]) -> None:
-    """Make the nominal flight, and the law that it follows, the guess of a phase.
+def guess(
+    phase: Phase, start: Mapping[str, float], until: float, laws: Mapping[str, Sequence[float] | np.ndarray], begin: float = 0.0
+) -> dict[str, float]:
+    """Make a nominal flight, and the laws that it follows, the guess of a phase, whose dynamics are given.
 
     Parameters
     ----------
     phase : Phase
-    rates : {state: expression}
-        Of the states of the phase, and no other than these and the controls.
     start : {state: value}
-        At least of these.
-    final_time : float
-        s, from 0.
-    controls : two names
-        Of the controls that command the angle of attack and the bank angle.
+        At least of those of the phase.
+    until, begin : float
+        Times at which the flight ends and begins, s.
+    laws : {control: values}
+        Of all controls, at equal steps of time, linear between.
+
+    Returns
+    -------
+    dict
+        The states at the end, as they stand in the guess.
     """
-    times = np.linspace(0.0, final_time, STEPS + 1)
-    laws = {name: np.interp(times, np.linspace(0.0, final_time, len(law)), law) for name, law in zip(controls, (ATTACK, BANK), strict=True)}
-    states = _propagated(phase, rates, [start[name] for name in rates], laws, times)
-    for name, values in zip(rates, states, strict=True):
+    times = np.linspace(begin, until, STEPS + 1)
+    controls = {name: np.interp(times, np.linspace(begin, until, len(law)), law) for name, law in laws.items()}
+    states = _propagated(phase, [start[name] for name in phase._rates], controls, times)
+    end = {}
+    for name, values in zip(phase._rates, states, strict=True):
         # With other data it may lead anywhere: then it is a poor guess, but one.
         lower, upper = phase._states[name].lower, phase._states[name].upper
-        phase.guess(**{name: (times, np.clip(np.where(np.isfinite(values), values, lower), lower, upper))})
-    for name, law in laws.items():
+        inside = np.clip(np.where(np.isfinite(values), values, lower), lower, upper)
+        phase.guess(**{name: (times, inside)})
+        end[name] = float(inside[-1])
+    for name, law in controls.items():
         phase.guess(**{name: (times, law)})
+    return end
 
 
-def _propagated(
-    phase: Phase, rates: Mapping[str, ca.MX], start: Sequence[float], laws: Mapping[str, np.ndarray], times: np.ndarray
-) -> np.ndarray:
+def _propagated(phase: Phase, start: Sequence[float], laws: Mapping[str, np.ndarray], times: np.ndarray) -> np.ndarray:
     """States (nx, n) at equidistant times (n,), by the classical Runge-Kutta method."""
-    groups = {"x": [phase[name] for name in rates], "u": [phase[name] for name in laws]}
-    rate = vector_function("rate", groups, list(rates.values()))
-    h, x = float(times[1] - times[0]), ca.MX.sym("x", len(rates))
+    groups = {"x": [phase[name] for name in phase._rates], "u": [phase[name] for name in laws]}
+    rate = vector_function("rate", groups, list(phase._rates.values()))
+    h, x = float(times[1] - times[0]), ca.MX.sym("x", len(phase._rates))
     left, right = ca.MX.sym("left", len(laws)), ca.MX.sym("right", len(laws))
     k1 = rate(x, left)
     k2 = rate(x + 0.5 * h * k1, 0.5 * (left + right))

@@ -24,7 +24,7 @@ from ... import checks
 from ...phase import Phase
 from ...problem import Problem
 from ..winged import FOOT, GRAVITIES, UNITS
-from .nominal import guess
+from .nominal import ATTACK, BANK, guess
 from .vehicle import MASS, PRESSURE, SHUTTLE
 
 START = {
@@ -161,7 +161,7 @@ def reentry(
     problem.minimize("oscillation", phase.integral(ca.fabs(turning)), unit="rad")
     problem.minimize("peak heating rate", phase.peak(heating), unit="Btu/ft2/s")
 
-    guess(phase, rates, START, final_time, [f"{angle} command" for angle in ANGLES])
+    guess(phase, START, final_time, {f"{angle} command": law for angle, law in zip(ANGLES, (ATTACK, BANK), strict=True)})
     # Commands within bounds everywhere. On fewer or simpler elements simulations confirm hardly a point: the angles follow a jump of their
     # commands within some ten seconds, what is allowed at the end is a hundredth of the altitude's span, and peaks and absolute values are
     # sampled. It takes seconds to make a candidate feasible: they are only propagated, and the best are left to the gradients.

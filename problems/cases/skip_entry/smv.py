@@ -1,0 +1,118 @@
+"""A space manoeuvre vehicle's skip over a turning planet: flight time, heat load, terminal speed and terminal mass.
+
+Chai, Savvaris, Tsourdos and Xia, "An interactive fuzzy physical programming for solving multiobjective skip entry problem", IEEE
+Transactions on Aerospace and Electronic Systems 53(5), 2017, eqs. (2)-(13) and Table I: ten states, since angle of attack, bank angle and
+thrust follow their commands with a lag.
+
+Three terms of the turning planet in eq. (2) are misprinted and are as derived here (`winged`): the rate of the speed has the sine of the
+latitude in place of that of the heading, those of the flight-path angle and of the heading are over the speed (without, the former is 2
+degrees a second). The sign of the exponent of the density in eq. (3) is a slip.
+
+Beginning, end and bounds are in a reference that is not at hand; they are those of the same authors' other skip entry (`skip`), with the
+speed at most the initial one. The lowest altitude is chosen as 50 km: there the limit of the dynamic pressure allows 4642 m/s, and a flight
+without fuel leaves the air again with about the speed to which the paper aspires, 4016 m/s; from 51.88 km it has 4783. Chosen as well: the
+gravitational parameter, the scale height, the constant of the heating rate (Betts'; the coefficients of Table I are his, for radians), a
+specific impulse of 300 s, and 0.2 1/s for the gains of all three lags.
+"""
+
+from __future__ import annotations
+
+from math import degrees
+
+import numpy as np
+
+from ...problem import Problem
+from ..reentry.nominal import guess
+from ..reentry.vehicle import SHUTTLE
+from ..winged import FOOT, SLUG, Winged
+from .figures import plot, track
+from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
+
+__all__ = ["plot", "problem", "track"]
+
+HEATING = 200.0
+"""Btu/ft2/s."""
+LOWEST, IMPULSE, GAIN = 50e3, 300.0, 0.2
+TURNING = 7.2921151e-5
+TABLE = (1.067, -1.101, 0.6988, -0.1903)
+"""Of Table I, for powers of the angle of attack in rad."""
+VEHICLE = Winged(
+    radius=6378135.0,
+    mu=3.986004418e14,
+    density=0.002378 * SLUG / FOOT**3,
+    scale_height=7254.24,
+    area=2690.0 * FOOT**2,
+    lift=(-0.2070, 1.676),
+    drag=(0.07854, -0.3529, 2.040),
+    heating=tuple(value / degrees(1.0) ** power for power, value in enumerate(TABLE)),
+    heating_constant=SHUTTLE.heating_constant,
+    turning=TURNING,
+)
+NOMINAL = {
+    DESCENT: (
+        440.0,
+        np.radians([7, -8, -10, -10, -10, 0, 30, 30, 29, 28, -6, -7, 7, 30, 30, 29, 29, 30, 30, 29, 30, 30, 28, 27, 25]),
+        np.radians(
+            [-13, -10, -8, -11, -20, -39, -67, -79, -80, -68, -39, -43, -72, -80, -79, -80, -80, -79, -80, -79, -79, -79, -77, -62, -51]
+        ),
+        [0.0, 0.0],
+    ),
+    ASCENT: (70.0, np.radians([27, 30, 30, 30]), np.radians([0, 0]), [1e6, 1e6]),
+}
+"""Duration, s, and commands at equal steps of it, rad and N: down without lift, a turn to the left within all limits, level, and up with
+half the thrust."""
+ELEMENTS = 40
+MESHES = {
+    DESCENT: {"edges": np.linspace(0.0, 1.0, ELEMENTS + 1).tolist(), "order": 3},
+    ASCENT: {"edges": [*np.linspace(0.0, 0.4, 15), *np.linspace(0.4, 1.0, 7)[1:]], "order": 3},
+}
+"""Elements of some 11 s on the way down, twice the lag; on fewer, optima are worse by up to a tenth, as the angle of attack is to be
+switched within seconds. Shorter ones at the beginning of the way up, where the engine burns for a moment."""
+
+
+def problem(
+    *,
+    impulse: float = IMPULSE,
+    lag_gain: float = GAIN,
+    lowest: float = LOWEST,
+    fastest: float = START["speed"],
+    mass: float = START["mass"],
+) -> Problem:
+    """The case.
+
+    Parameters
+    ----------
+    impulse : float
+        Specific impulse, s.
+    lag_gain : float
+        Of the lags of angle of attack, bank angle and thrust, 1/s.
+    lowest : float
+        Altitude at which the descent ends, m.
+    fastest : float
+        Bound of the speed, m/s.
+    mass : float
+        At the beginning, kg.
+    """
+    lags = dict.fromkeys(COMMANDED, lag_gain)
+    problem, heating = skip_entry("smv", Mission(VEHICLE, lowest, HEATING, impulse, lags, fastest, mass))
+    descent, ascent = problem.phases[DESCENT], problem.phases[ASCENT]
+    problem.minimize("flight time", ascent.tf, unit="s")
+    load = descent.integral(heating[DESCENT]) + ascent.integral(heating[ASCENT])
+    problem.minimize("heat load", 1e-3 * load, unit="kBtu/ft2")
+    problem.maximize("terminal speed", ascent.final(ascent["speed"]), unit="m/s")
+    problem.maximize("terminal mass", ascent.final(ascent["mass"]), unit="kg")
+
+    state, begin = START | COMMANDED | {"mass": mass}, 0.0
+    for phase in (descent, ascent):
+        duration, *laws = NOMINAL[phase.name]
+        state = guess(phase, state, begin + duration, dict(zip([f"{control} command" for control in COMMANDED], laws, strict=True)), begin)
+        begin += duration
+        phase.guess(tf=begin)
+    # A candidate is propagated only, as it takes seconds to make one feasible.
+    problem.default_transcription = {
+        "method": "DFET",
+        "settings": {"elements": ELEMENTS, "order": 3, "control_order": 1, "basis": "bernstein", "mesh": MESHES},
+    }
+    problem.default_evaluations = 700
+    problem.default_inner, problem.default_start = "propagate", "smooth"
+    return problem
