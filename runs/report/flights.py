@@ -100,7 +100,8 @@ class Flights:
         rows: list[list[Cell]] = [[name, *point.objectives.values(), *self._beside(point, curve)] for name, point in named]
         notes = [f"Of {self.solver}, all runs together."]
         if len(self.ends):
-            notes[0] += f" Alone: one objective optimised by gradients on {word(from_dict(self.ends[0].transcription or {}))}."
+            method = from_dict(self.ends[0].transcription or {})
+            notes[0] += f" Alone: one objective optimised by gradients on {word(method) or 'the same mesh'}."
         if curve is not None and any(isinstance(row[-1], float) and row[-1] < -BETTER for row in rows):
             notes.append(
                 f"Negative: better than the {self._truth}, by the errors of the mesh and of the curve through it; see macs verify."

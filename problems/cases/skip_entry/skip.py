@@ -9,17 +9,21 @@ flight is level at its lowest point. Thrust follows without lag.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from ...problem import Problem
 from ..reentry.vehicle import SHUTTLE
-from ..winged import FOOT, Winged
+from ..winged import Winged
+from .figures import plot, track
 from .statement import ASCENT, DESCENT, START, TOP, Mission, skip_entry
 
-BTU = 1054.350264488889
-"""One thermochemical Btu in J."""
-HEATING = 2269.7864
-"""kW/m2: 200 Btu/ft2/s."""
+__all__ = ["REFERENCE", "plot", "problem", "reference", "track"]
+
+REFERENCE = "the front that gradients found"
+HEATING = 200.0
+"""Btu/ft2/s: the paper's 2269.7864 kW/m2, with the thermochemical Btu."""
 LOWEST, IMPULSE = 51880.0, 319.0
 VEHICLE = Winged(
     radius=6371203.92,
@@ -30,7 +34,7 @@ VEHICLE = Winged(
     lift=(-0.2070, 1.676),
     drag=(0.07854, -0.3529, 2.040),
     heating=SHUTTLE.heating,
-    heating_constant=SHUTTLE.heating_constant * BTU / FOOT**2 * 1e-3,
+    heating_constant=SHUTTLE.heating_constant,
 )
 
 DOWN = {
@@ -100,3 +104,8 @@ def _guess(problem: Problem, lowest: float, mass: float) -> None:
         held = {"latitude": 0.0, "heading": START["heading"], "mass": mass, "angle of attack": attack, "bank angle": bank}
         problem.phases[name].guess(tf=begin + duration, **lines, **held, thrust=0.0)
         begin += duration
+
+
+def reference() -> np.ndarray:
+    """The front (k, 2): terminal mass, kg, and terminal speed, m/s; by `python -m runs.truths.skip`."""
+    return np.loadtxt(Path(__file__).with_name("skip.csv"), delimiter=",", ndmin=2)
