@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from textwrap import wrap
+from textwrap import fill, wrap
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,10 @@ Laws = Mapping[str, Sequence[Law | None]]
 
 DASHES: Sequence[Any] = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 """Of the first laws, the second, ..."""
+
+
+LABEL = 14
+"""Most characters on a line of a vertical label."""
 
 
 def representatives(front: Front, count: int = 4) -> list[int]:
@@ -82,7 +86,8 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
                 ax.margins(x=0.0)
             grid[0, column].set_title(_title(column + 1, point, round(75 / len(points)) + 10), loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
-            ax.set_ylabel(label(name, units.get(name, "")))
+            # A long label on one line would run into those above and below.
+            ax.set_ylabel(fill(label(name, units.get(name, "")), LABEL, break_long_words=False, break_on_hyphens=False))
             ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         for ax in grid[-1]:
             ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
