@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,10 @@ WIDE = 1.5
 """A gap this many times as wide as the median one gets a point of its own; crowded points are left out for it."""
 
 
+NEARER = 0.15
+"""Where the middle of a gap was not reached, places are tried at this part of the way from both sides."""
+
+
 GAIN = 0.995
 """A slide is tried only if it is expected to lower the energy of the point at least to this fraction."""
 
@@ -35,7 +40,8 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
     1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
     2. One guarded solve from each point; the best point of each objective is first solved for the least value of that objective.
     3. Solves for each point from the positions of its neighbours, as long as this finds better points.
-    4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places.
+    4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap
+       is too far, places nearer to its sides. The ends are then solved once more from their neighbours.
 
     If there are few solves, step 2 uses only some points, well spread, and leaves half of the solves for the other steps. The remaining
     points fill free places in the end, if they are not dominated. If the work is asked to end early, no solves are left, and the result is
@@ -65,14 +71,22 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
     pool, span = archive, ranges(archive.F)
     archive = _thinned(pool, limit, exponent)
     for _ in range(ROUNDS):
-        references, starts = _slide(archive, limit, exponent)
+        references, starts, gaps = _slide(archive, limit, exponent)
         if not (len(references) and solves.left):
             break
         found = solves(starts, references, np.tile(span, (len(references), 1)))
-        pool = _front(pool.joined(Archive.of(found, found.status == CONVERGED)), span)
+        pool = pool.joined(Archive.of(found, found.status == CONVERGED))
+        failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
+        if len(failed) and solves.left:
+            near, far = failed.ravel(), failed[:, ::-1].ravel()
+            nearer = archive.F[near] + NEARER * (archive.F[far] - archive.F[near])
+            found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
+            pool = pool.joined(Archive.of(found, found.status == CONVERGED))
+        pool = _front(pool, span)
         before, archive = archive, _thinned(pool, limit, exponent)
         if np.array_equal(before.F, archive.F):
             break
+    archive = _helped_by_neighbours(archive, solves, extremes(archive.F))
     if len(waiting):
         archive = _thinned(_front(archive.joined(waiting), span), limit, exponent)
     return archive
@@ -133,10 +147,15 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     return ends.replaced(feasible_and_no_worse(both, ends.F, ends.violation, span), both)
 
 
-def _helped_by_neighbours(archive: Archive, solves: CountedSolves) -> Archive:
-    """The archive after guarded solves of all points from their neighbours; the archive itself if none is better or solves are too few."""
+def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: Iterable[int] | None = None) -> Archive:
+    """The archive after guarded solves of all, or the chosen, points from their neighbours; the archive itself if none is better or solves
+    are too few."""
     span = ranges(archive.F)
-    pairs = [(i, j) for i in range(len(archive)) for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]]
+    pairs = [
+        (i, j)
+        for i in (range(len(archive)) if chosen is None else np.unique(list(chosen)))
+        for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]
+    ]
     if not 0 < len(pairs) <= solves.left:
         return archive
     own, other = (np.array(index) for index in zip(*pairs, strict=True))
@@ -148,12 +167,13 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves) -> Archive:
     return _front(Archive.of(found, better).joined(archive), span)
 
 
-def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """References (k, m) on the lines between neighbours, in wide gaps and where points have less energy, and start vectors (k, D)."""
+def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """References (k, m) on the lines between neighbours, in wide gaps first and then where points have less energy; start vectors (k, D);
+    and the points (g, 2) on both sides of the gaps."""
     span = ranges(archive.F)
     F, n = archive.F / span, len(archive)
     if n < 2:
-        return np.empty((0, F.shape[1])), archive.Z[:0]
+        return np.empty((0, F.shape[1])), archive.Z[:0], np.empty((0, 2), dtype=int)
     neighbours = [nearest(point, archive.F, span)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
     pairs = sorted({(min(i, j), max(i, j)) for i in range(n) for j in neighbours[i]})
     apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
@@ -170,7 +190,8 @@ def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nda
         if energy[best] < GAIN * energy[0]:
             references.append(lines[best])
             starts.append(archive.Z[i])
-    return np.array(references).reshape(-1, F.shape[1]) * span, np.array(starts).reshape(-1, archive.Z.shape[1])
+    found = np.array(references).reshape(-1, F.shape[1]) * span, np.array(starts).reshape(-1, archive.Z.shape[1])
+    return *found, np.array(gaps, dtype=int).reshape(-1, 2)
 
 
 def _front(points: Archive, span: np.ndarray) -> Archive:

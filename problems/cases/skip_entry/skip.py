@@ -92,6 +92,9 @@ def problem(
         "method": "DFET",
         "settings": {"elements": 12, "order": 5, "control_order": 2, "basis": "bernstein", "mesh": MESHES},
     }
+    # A candidate is propagated only, as it takes seconds to make one feasible; the budget is that of the gradient solves that follow.
+    problem.default_evaluations = 1500
+    problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem
 
 
