@@ -216,8 +216,8 @@ FINE = {
     "lobatto": "lobatto:24x3",
     "chebyshev": "chebyshev:24x3",
     "dfet": "dfet:24x3",
-    "single": "shooting:61:linear",
-    "multiple": "multiple-shooting:20x3:linear",
+    "single": "shooting:31:linear",
+    "multiple": "multiple-shooting:20x2:linear",
 }
 
 
@@ -228,8 +228,9 @@ def test_the_first_costate_is_the_slope_of_the_optimum(name, method):
     there, which is a share of a step."""
     statement: Callable[[float], Problem] = STATEMENTS[name]
     x0, step = STARTS.get(name, 0.1), 1e-3
-    _, found = adjoint(statement(x0), FINE[method])
-    low, high = (solved(statement(x0 + d), FINE[method])[1].F[0] for d in (-step, step))
+    word = "shooting:61:linear" if (name, method) == ("mixed", "single") else FINE[method]
+    _, found = adjoint(statement(x0), word)
+    low, high = (solved(statement(x0 + d), word)[1].F[0] for d in (-step, step))
     slope = (high - low) / (2 * step)
     (phase,) = found.values()
     assert np.isfinite(phase.hamiltonian).all() and np.isfinite(phase.at_nodes).all()
