@@ -58,7 +58,7 @@ def small(monkeypatch):
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
     monkeypatch.setattr(standard, "apart", lambda *given: {"status": "converged", **dict.fromkeys(SOLVED, 1.0)})
-    monkeypatch.setattr(command.density, "QUICK", density.QUICK[:1])
+    monkeypatch.setattr(command.density, "QUICK", (density.Flight("standard/van_der_pol", density.on(8)),))
     monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
     monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
