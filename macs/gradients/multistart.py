@@ -27,7 +27,8 @@ WIDE = 0.3
 
 
 LOOSE = 1e-2
-"""An objective that falls by more than this part of its range while those before keep their least values was not determined by these."""
+"""Part of an objective's range that is more than the tolerance of those before it explains: if it falls by more while these keep their
+least values, it was not determined by them, and a point where it is lower by more lies in another valley."""
 
 
 MOST_ITERATIONS = 500
@@ -146,28 +147,35 @@ class MultistartSolver:
         """The optimum of objective i alone."""
         return self.solve(*_alone(i, len(self.nlp.problem.goals)))
 
-    def ends(self, singles: Sequence[Solved] | None = None) -> list[Solved]:
+    def ends(self, singles: Sequence[Solved] = ()) -> list[Solved]:
         """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
-        those before. It begins at the `singles`, the optima of each objective alone, which by default are found first."""
-        m = len(self.nlp.problem.goals)
-        singles = [self.single(i) for i in range(m)] if singles is None else singles
-        return [self._lexicographic(i, singles) for i in range(m)]
+        those before. It begins at the `singles`, the optima of each objective alone, in their order; those that are not given are found
+        where they are needed first, so that they may begin at what is known by then."""
+        known = dict(enumerate(singles))
+        return [self._lexicographic(i, known) for i in range(len(self.nlp.problem.goals))]
 
-    def _lexicographic(self, i: int, singles: Sequence[Solved]) -> Solved:
+    def _lexicographic(self, i: int, singles: dict[int, Solved]) -> Solved:
+        def single(k: int) -> Solved:
+            if k not in singles:
+                singles[k] = self.single(k)
+            return singles[k]
+
         m = len(self.nlp.problem.goals)
-        best, ceiling = singles[i], np.full(m, np.inf)
+        best, ceiling = single(i), np.full(m, np.inf)
         for j in (k for k in range(m) if k != i):
             if best.status != CONVERGED:
                 break
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[i] = best.F[i]
             reference, weights = _alone(j, m)
-            found = [self.solve(reference, weights, ceiling, best.z)]
-            gained = best.F[j] - found[0].F[j] if found[0].status == CONVERGED else np.inf
-            if singles[j].status == CONVERGED and gained > LOOSE * abs(best.F[j] - singles[j].F[j]):
+            solved = self.solve(reference, weights, ceiling, best.z)
+            large = LOOSE * abs(best.F[j] - single(j).F[j])
+            if single(j).status == CONVERGED and (solved.status != CONVERGED or best.F[j] - solved.F[j] > large):
                 # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
-                found.append(self.from_vector(singles[j].z, reference, weights, ceiling))
-            solved = self.better(found, reference, weights)
+                # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
+                other = self.from_vector(single(j).z, reference, weights, ceiling)
+                if other.status == CONVERGED and (solved.status != CONVERGED or solved.F[j] - other.F[j] > large):
+                    solved = other
             best = solved if solved.status == CONVERGED else best
             ceiling[j] = best.F[j]
         return best

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from problems import Problem, describe, is_catalogued, load, names
-from transcription import parse
+from transcription import stated
 
 CASE = """
 from __future__ import annotations
@@ -63,7 +63,7 @@ def test_every_case_loads_compiles_and_names_its_defaults(name):
     assert problem.name == name.removeprefix("standard/") and problem.address == name
     assert len(problem.compile().goals) >= (1 if name.startswith(("betts", "standard/")) else 2)
     assert describe(name) and "\n" not in describe(name)
-    parse(problem.default_transcription or "dfet:8x3:bernstein").transcribe(problem)
+    stated(problem.default_transcription or "dfet:8x3:bernstein").transcribe(problem)
     assert problem.default_evaluations > 0 and problem.default_verify > 0
     assert load(name).compile().fingerprint == problem.compile().fingerprint
 

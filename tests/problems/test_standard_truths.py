@@ -381,6 +381,7 @@ def test_fishing_with_three_arcs():
     assert value("lotka_fishing") == pytest.approx(1.34408, abs=5e-6), "as published"
 
 
+@pytest.mark.slow
 def test_a_flight_of_less_fuel_than_the_published_one():
     """Nine arcs of the free-flying robot, and the nine symmetric ones of the literature, whose fuel is that of Betts.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import signal
 import subprocess
@@ -40,13 +41,26 @@ def coarse(name):
     return problem
 
 
+SOLVED = ("ours", "simulated", "violation", "seconds", "starts", "iterations", "verified", "memory")
+"""What is measured of a published problem."""
+
+
+def optima(*values, verified=1.0):
+    """What the first transcriptions found for a problem."""
+    words = zip(methods.METHODS, values, strict=False)
+    return [{"method": word, "value": value, "verified": verified, "again": 0.0} for word, value in words]
+
+
 @pytest.fixture
 def small(monkeypatch):
+    """Benchmarks that take little; those in processes of their own, which other tests measure, find what is given here."""
     monkeypatch.setattr(search, "load", coarse)
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
-    monkeypatch.setattr(command.density, "QUICK", density.QUICK[:1])
-    monkeypatch.setattr(command.methods, "QUICK", ("linear_tangent",))
+    monkeypatch.setattr(standard, "apart", lambda *given: {"status": "converged", **dict.fromkeys(SOLVED, 1.0)})
+    monkeypatch.setattr(command.density, "QUICK", (density.Flight("standard/van_der_pol", density.on(8)),))
+    monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
+    monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
@@ -177,15 +191,11 @@ def test_methods_agree_on_published_problems():
 
 
 def test_verified_optima_that_differ_are_told(monkeypatch, capsys):
-    def found(*values, verified=1.0):
-        words = zip(methods.METHODS, values, strict=False)
-        return [{"method": word, "value": value, "verified": verified, "again": 0.0} for word, value in words]
-
     same, other = (1.4203, 1.4204), (1.4203, 1.4203, 1.4303)
-    row = methods.compared("moon_landing", found(*other), "")
-    assert row.who == methods.DISAGREED and methods.compared("moon_landing", found(*same), "").who == methods.AGREED
-    assert methods.compared("moon_landing", found(*other, verified=0.0), methods.LATE).who == f"-, {methods.LATE}"
-    fixed = [*found(1.4203, 1.4203), {"method": methods.METHODS[-1], "value": 1.4303, "verified": 1.0, "again": 1.0}]
+    row = methods.compared("moon_landing", optima(*other), "")
+    assert row.who == methods.DISAGREED and methods.compared("moon_landing", optima(*same), "").who == methods.AGREED
+    assert methods.compared("moon_landing", optima(*other, verified=0.0), methods.LATE).who == f"-, {methods.LATE}"
+    fixed = [*optima(1.4203, 1.4203), {"method": methods.METHODS[-1], "value": 1.4303, "verified": 1.0, "again": 1.0}]
     assert methods.compared("moon_landing", fixed, "").who == methods.AGREED, "linear controls on nodes are somewhat worse"
     monkeypatch.setattr(command.methods, "bench_methods", lambda rows, effort: rows.append(row))
     assert main(["bench", "methods"]) == 1 and "verified, but different: asked none, measured 1" in capsys.readouterr().out

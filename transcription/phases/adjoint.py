@@ -18,7 +18,7 @@ from problems.derived import remembered
 
 from ..numerics.batched import Batched, expanded
 from ..numerics.periodic import wrapped
-from ..numerics.polynomials import basis_matrix, gauss_legendre, lobatto_nodes
+from ..numerics.polynomials import gauss_legendre, lagrange_integrals, lobatto_nodes
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
 
 STAGES = 5
@@ -98,7 +98,7 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
     middles = 0.5 * (edges[1:] + edges[:-1])
     own += densities[np.clip(np.searchsorted(cells, middles) - 1, 0, len(densities) - 1)][:, None]
     # Integrals of the Lagrange functions of the stages from the right end to the stages, and to where the results are kept.
-    to_stages, to_kept = _integrals(nodes), _integrals(tau)
+    to_stages, to_kept = (lagrange_integrals(nodes, places) - lagrange_integrals(nodes, np.ones(1)) for places in (nodes, tau))
     kept, p = np.empty((len(h), STAGES + 1, nx)), ending.final + jumps[-1]
     for j in range(len(h) - 1, -1, -1):
         # Rates r_i = -(A_i'p_i + l_i) at the stages, where p_i = p + h sum_j to_stages_ij r_j.
@@ -157,12 +157,3 @@ def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray, f
     total = np.zeros((len(edges), jumps.shape[1]))
     np.add.at(total, np.abs(times[:, None] - edges).argmin(axis=1), jumps)
     return edges, total
-
-
-def _integrals(places: np.ndarray) -> np.ndarray:
-    """Integrals (k, STAGES) of the Lagrange functions of the stages from 1 to places (k,)."""
-    nodes, weights = gauss_legendre(STAGES)
-    half = 0.5 * (places - 1.0)
-    inside = 1.0 + half[:, None] * (1.0 + nodes)
-    values = basis_matrix("legendre", STAGES - 1, inside.ravel()).reshape(len(places), STAGES, STAGES)
-    return half[:, None] * np.einsum("kij,i->kj", values, weights)

@@ -15,14 +15,6 @@ from macs.fronts.pictures.flight_plot import _dense
 from macs.fronts.pictures.style import blank_figure
 
 
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
-
 def draw(figure: Figure) -> bytes:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -107,8 +107,8 @@ def swinging(bounds: tuple[float, float] = (-5, 5)) -> Problem:
 
 
 def test_a_search_refines_the_intervals_of_its_points():
-    solver = MACS(agents=4, archive=4, mesh="adaptive", mesh_tolerance=5e-3)
-    front = solver.solve(swinging(), MultipleShooting(12, control="linear"), evaluations=60, seed=1)
+    solver = MACS(agents=3, archive=3, mesh="adaptive", mesh_tolerance=2e-2)
+    front = solver.solve(swinging(), MultipleShooting(12, control="linear"), evaluations=40, seed=1)
     assert len(front) >= 2 and front.verified.all()
     counts = [method_of(point).mesh_of("up").elements for point in front]
     assert max(counts) > 12 and all(point.max_defect < 1e-3 for point in (p.simulate() for p in front))
