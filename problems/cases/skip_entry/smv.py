@@ -18,6 +18,7 @@ specific impulse of 300 s, and 0.2 1/s for the gains of all three lags.
 from __future__ import annotations
 
 from math import degrees
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ VEHICLE = Winged(
     heating_constant=SHUTTLE.heating_constant,
     turning=TURNING,
 )
-NOMINAL = {
+NOMINAL: dict[str, tuple[float, Any, Any, Any]] = {
     DESCENT: (
         440.0,
         np.radians([7, -8, -10, -10, -10, 0, 30, 30, 29, 28, -6, -7, 7, 30, 30, 29, 29, 30, 30, 29, 30, 30, 28, 27, 25]),
