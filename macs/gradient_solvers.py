@@ -13,10 +13,11 @@ from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Transcription
 
-from .evaluation.evaluator import Evaluator
+from .evaluation.evaluator import CONVERGED, Evaluator
 from .front import Front
+from .fronts.builders import nearest_violation
 from .fronts.verified import VERIFY
-from .gradient_tools import payoff, sweep
+from .gradient_tools import optimize, payoff, sweep
 from .gradients.targets import METHODS, check_points
 from .solvers.run import ENDED
 from .solvers.solver import Solver
@@ -27,7 +28,7 @@ MESHES = ("fixed", "mended", "adaptive", "density")
 
 @dataclass(frozen=True)
 class GradientSolver(Solver):
-    """A gradient tool with the calls and the contract of a solver; see `Payoff` and `Sweep`.
+    """A gradient tool with the calls and the contract of a solver; see `Optimum`, `Payoff` and `Sweep`.
 
     It evaluates no candidates: `evaluations` and `inner` are not used, and its cost is in `gradient_solves` and `inner_iterations`. No
     checkpoint keeps a run of it: it begins again.
@@ -114,6 +115,29 @@ class Payoff(GradientSolver):
     def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
         """See `payoff`."""
         return payoff(problem, transcription, **terms)
+
+
+@dataclass(frozen=True)
+class Optimum(GradientSolver):
+    """The best of one objective by gradients, a front of one point: `macs.optimize` as a solver.
+
+    Parameters
+    ----------
+    objective : str, optional
+        Its name. Default: the first one.
+    starts, mesh
+        See `GradientSolver`.
+    """
+
+    objective: str | None = None
+
+    def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
+        """See `optimize`. If no solve converged, the front is empty, and `closest` is the least infeasible point."""
+        point = optimize(problem, transcription, objective=self.objective, **terms)
+        alone = point.alone()
+        if point.status != CONVERGED:
+            alone = alone.take([]).replace(closest=point, message=f"no solve converged; {nearest_violation(point)}")
+        return Front.of(alone)
 
 
 @dataclass(frozen=True)

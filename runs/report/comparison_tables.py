@@ -26,8 +26,12 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
         claimed, verified = sum(one.claimed for one in found), sum(one.verified for one in found)
         counts = summarise([len(one.front) for one in found], larger=True)
         share = 100.0 * verified / claimed if claimed else None
-        rows.append([solver, len(found), claimed, verified, share, counts.mean, counts.median])
-    heads = ["solver", "runs", "points claimed", "verified", "%", "of these not dominated, mean of a run", "median"]
+        fronts = [run.front for run in comparison.runs[solver]]
+        misses = [_median([getattr(front, name) for front in fronts]) for name in ("defect", "simulated_violation")]
+        rows.append([solver, len(found), claimed, verified, share, *misses, counts.mean, counts.median])
+    heads: list[Column | str] = ["solver", "runs", "points claimed", "verified", "%"]
+    heads += [Column("median defect of a claim", digits=2), Column("median violation, simulated", digits=2)]
+    heads += ["of those verified not dominated, mean of a run", "median"]
     note = (
         f"All points were simulated by DOP853. A point is verified if nothing differs by more than {tolerance:g}: its states, in spans of "
         "their bounds; its bounds, final values, paths and constraints, in their scales; its objectives, in ranges of its front. "
@@ -35,6 +39,13 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
         "their run dominate. Figures over evaluations, iterations or time are of the points as claimed."
     )
     return {"claims": table(heads, rows, f"{comparison.name}: points claimed, and points verified.", [note])}
+
+
+def _median(columns: Sequence[np.ndarray]) -> float | None:
+    """The median of all numbers in some columns; None if there are none."""
+    values = np.concatenate([np.empty(0), *columns])
+    values = values[~np.isnan(values)]
+    return float(np.median(values)) if len(values) else None
 
 
 def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:

@@ -111,6 +111,8 @@ def test_the_report_says_how_many_were_claimed(folder):
     for solver, runs in comparison.verified.items():
         assert int(rows[solver]["points claimed"]) == sum(one.claimed for one in runs)
         assert int(rows[solver]["verified"]) == sum(one.verified for one in runs)
+        defects = np.concatenate([run.front.defect for run in comparison.runs[solver]])
+        assert float(rows[solver]["median defect of a claim"]) == pytest.approx(np.nanmedian(defects), rel=0.05)
 
 
 def test_published_ends_and_feasibility_beside_ours(folder):

@@ -29,6 +29,20 @@ def test_they_find_what_the_tools_find(goddard):
         assert front.stats["gradient_solves"] == tool.stats["gradient_solves"] > 0
 
 
+def test_the_best_of_one_objective(goddard):
+    front = solver("optimum", objective="horizontal speed").solve(goddard, METHOD, seed=0)
+    assert len(front) == 1 and front[0].objectives["horizontal speed"] == pytest.approx(
+        payoff(goddard, METHOD)[1].objectives["horizontal speed"]
+    )
+
+
+def test_without_an_optimum_the_front_is_empty():
+    problem = load("goddard")
+    problem.constraint("nowhere", problem.phases["ascent"].final(problem.phases["ascent"]["y"]), lower=11.0, scale=1.0)
+    front = solver("optimum").solve(problem, METHOD, seed=0)
+    assert len(front) == 0 and front.closest is not None and "no solve converged" in front.message
+
+
 def test_meshes_follow_on_request(goddard):
     method = parse("multiple-shooting:8:linear")
     fixed, dense = (solver("payoff", mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
