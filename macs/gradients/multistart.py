@@ -30,6 +30,11 @@ LOOSE = 1e-2
 """An objective that falls by more than this part of its range while those before keep their least values was not determined by these."""
 
 
+SLACK, TIES = 1e-5, 150
+"""Where the others cannot be improved without any loss in an objective, how much of it may be lost, in its range between the ends; most
+iterations of a solve that is to improve the others."""
+
+
 MOST_ITERATIONS = 500
 """Iterations of IPOPT after which a strategy of a solve is given up by default."""
 
@@ -111,6 +116,7 @@ class MultistartSolver:
         self._solves = solves
         self.rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
+        self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
         self._violation: np.ndarray = np.empty(0)
         if given is not None:
@@ -143,12 +149,18 @@ class MultistartSolver:
         return solved
 
     def single(self, i: int) -> Solved:
-        """The optimum of objective i alone."""
-        return self.solve(*_alone(i, len(self.nlp.problem.goals)))
+        """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
+        objective within tight limits, also from what was given."""
+        task = _alone(i, len(self.nlp.problem.goals))
+        solved = self.solve(*task)
+        for start in self._known[: self._given] if solved.status != CONVERGED else ():
+            solved = self.better([solved, self.from_vector(start, *task)], *task)
+        return solved
 
     def ends(self, singles: Sequence[Solved] | None = None) -> list[Solved]:
         """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
-        those before. It begins at the `singles`, the optima of each objective alone, which by default are found first."""
+        those before, or, where no solve achieves that, with a loss of `SLACK`. It begins at the `singles`, the optima of each objective
+        alone, which by default are found first."""
         m = len(self.nlp.problem.goals)
         singles = [self.single(i) for i in range(m)] if singles is None else singles
         return [self._lexicographic(i, singles) for i in range(m)]
@@ -156,17 +168,24 @@ class MultistartSolver:
     def _lexicographic(self, i: int, singles: Sequence[Solved]) -> Solved:
         m = len(self.nlp.problem.goals)
         best, ceiling = singles[i], np.full(m, np.inf)
+        loss = SLACK * np.ptp([single.F for single in singles], axis=0)
         for j in (k for k in range(m) if k != i):
             if best.status != CONVERGED:
                 break
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[i] = best.F[i]
             reference, weights = _alone(j, m)
-            found = [self.solve(reference, weights, ceiling, best.z)]
-            gained = best.F[j] - found[0].F[j] if found[0].status == CONVERGED else np.inf
-            if singles[j].status == CONVERGED and gained > LOOSE * abs(best.F[j] - singles[j].F[j]):
-                # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
-                found.append(self.from_vector(singles[j].z, reference, weights, ceiling))
+            much = LOOSE * abs(best.F[j] - singles[j].F[j]) if singles[j].status == CONVERGED else np.inf
+            with self._solves.at_most(TIES):
+                found = [self.solve(reference, weights, ceiling, best.z)]
+                if found[0].status != CONVERGED:
+                    # Perhaps nothing is strictly inside, and yet much can be gained near by; if not, what is known stays.
+                    freer = self.from_vector(best.z, reference, weights, ceiling + loss)
+                    near = freer.status == CONVERGED and best.F[j] - freer.F[j] > much
+                    found, ceiling = ([freer], ceiling + loss) if near else ([best], ceiling)
+                if best.F[j] - found[0].F[j] > much:
+                    # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
+                    found.append(self.from_vector(singles[j].z, reference, weights, ceiling))
             solved = self.better(found, reference, weights)
             best = solved if solved.status == CONVERGED else best
             ceiling[j] = best.F[j]
