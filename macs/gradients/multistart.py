@@ -31,6 +31,11 @@ LOOSE = 1e-2
 least values, it was not determined by them, and a point where it is lower by more lies in another valley."""
 
 
+SLACK, TIES = 1e-5, 150
+"""Where the others cannot be improved without any loss in an objective, how much of it may be lost, in its range between the ends; most
+iterations of a solve that is to improve the others."""
+
+
 MOST_ITERATIONS = 500
 """Iterations of IPOPT after which a strategy of a solve is given up by default."""
 
@@ -112,6 +117,7 @@ class MultistartSolver:
         self._solves = solves
         self.rng = rng
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
+        self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
         self._violation: np.ndarray = np.empty(0)
         if given is not None:
@@ -144,13 +150,19 @@ class MultistartSolver:
         return solved
 
     def single(self, i: int) -> Solved:
-        """The optimum of objective i alone."""
-        return self.solve(*_alone(i, len(self.nlp.problem.goals)))
+        """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
+        objective within tight limits, also from what was given."""
+        task = _alone(i, len(self.nlp.problem.goals))
+        solved = self.solve(*task)
+        for start in self._known[: self._given] if solved.status != CONVERGED else ():
+            solved = self.better([solved, self.from_vector(start, *task)], *task)
+        return solved
 
     def ends(self, singles: Sequence[Solved] = ()) -> list[Solved]:
         """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
-        those before. It begins at the `singles`, the optima of each objective alone, in their order; those that are not given are found
-        where they are needed first, so that they may begin at what is known by then."""
+        those before, or, where no solve achieves that, with a loss of `SLACK`. It begins at the `singles`, the optima of each objective
+        alone, in their order; those that are not given are found where they are needed first, so that they may begin at what is known by
+        then."""
         known = dict(enumerate(singles))
         return [self._lexicographic(i, known) for i in range(len(self.nlp.problem.goals))]
 
@@ -168,15 +180,22 @@ class MultistartSolver:
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[i] = best.F[i]
             reference, weights = _alone(j, m)
-            solved = self.solve(reference, weights, ceiling, best.z)
-            large = LOOSE * abs(best.F[j] - single(j).F[j])
-            if single(j).status == CONVERGED and (solved.status != CONVERGED or best.F[j] - solved.F[j] > large):
+            with self._solves.at_most(TIES):
+                solved = self.solve(reference, weights, ceiling, best.z)
+                large = LOOSE * abs(best.F[j] - single(j).F[j])
+                if solved.status != CONVERGED:
+                    # Perhaps nothing is strictly inside, and yet much can be gained near by; if not, what is known stays.
+                    freer = ceiling + SLACK * np.ptp([single(k).F for k in range(m)], axis=0)
+                    solved = self.from_vector(best.z, reference, weights, freer)
+                    near = solved.status == CONVERGED and best.F[j] - solved.F[j] > large
+                    solved, ceiling = (solved, freer) if near else (best, ceiling)
+            if single(j).status == CONVERGED and best.F[j] - solved.F[j] > large:
                 # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
                 # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
                 other = self.from_vector(single(j).z, reference, weights, ceiling)
-                if other.status == CONVERGED and (solved.status != CONVERGED or solved.F[j] - other.F[j] > large):
+                if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
                     solved = other
-            best = solved if solved.status == CONVERGED else best
+            best = solved
             ceiling[j] = best.F[j]
         return best
 
