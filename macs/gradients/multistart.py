@@ -180,15 +180,18 @@ class MultistartSolver:
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[i] = best.F[i]
             reference, weights = _alone(j, m)
-            with self._solves.at_most(TIES):
-                solved = self.solve(reference, weights, ceiling, best.z)
-                large = LOOSE * abs(best.F[j] - single(j).F[j])
-                if solved.status != CONVERGED:
-                    # Perhaps nothing is strictly inside, and yet much can be gained near by; if not, what is known stays.
-                    freer = ceiling + SLACK * np.ptp([single(k).F for k in range(m)], axis=0)
-                    solved = self.from_vector(best.z, reference, weights, freer)
-                    near = solved.status == CONVERGED and best.F[j] - solved.F[j] > large
-                    solved, ceiling = (solved, freer) if near else (best, ceiling)
+            solved = near = self.solve(reference, weights, ceiling, best.z)
+            large, freer = LOOSE * abs(best.F[j] - single(j).F[j]), ceiling
+            if solved.status != CONVERGED:
+                # Perhaps nothing is strictly inside, and yet much can be gained near by; if not, what is known stays.
+                freer = ceiling + SLACK * np.ptp([single(k).F for k in range(m)], axis=0)
+                with self._solves.at_most(TIES):
+                    near = self.from_vector(best.z, reference, weights, freer)
+            if solved.status != CONVERGED and near.status == CONVERGED and best.F[j] - near.F[j] > large:
+                solved = self.from_vector(near.z, reference, weights, ceiling)
+                solved, ceiling = (solved, ceiling) if solved.status == CONVERGED else (near, freer)
+            elif solved.status != CONVERGED:
+                solved = best
             if single(j).status == CONVERGED and best.F[j] - solved.F[j] > large:
                 # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
                 # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.

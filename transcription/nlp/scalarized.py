@@ -217,10 +217,7 @@ def scalarize(
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     found: list[Solved] = []
-    # At a limit of an objective that is attained, hardly anything is strictly inside, and a barrier that begins large loses the start.
-    attained = bool((np.abs((F[0] - task.shift) / task.scale - task.top) <= tolerance).any())
-    order = (NEAR, ADAPTIVE, MONOTONE) if attained else (ADAPTIVE, NEAR, MONOTONE)
-    for strategy in order if feasible else (ADAPTIVE, UNSCALED, MONOTONE):
+    for strategy in (ADAPTIVE, NEAR, MONOTONE) if feasible else (ADAPTIVE, UNSCALED, MONOTONE):
         share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
         if sum(solved.iterations for solved in found) + share > max_iterations:
             break
