@@ -62,13 +62,12 @@ NOMINAL: dict[str, tuple[float, Any, Any, Any]] = {
 }
 """Duration, s, and commands at equal steps of it, rad and N: down without lift, a turn to the left within all limits, level, and up with
 half the thrust."""
-ELEMENTS = 40
 MESHES = {
-    DESCENT: {"edges": np.linspace(0.0, 1.0, ELEMENTS + 1).tolist(), "order": 3},
-    ASCENT: {"edges": [*np.linspace(0.0, 0.4, 15), *np.linspace(0.4, 1.0, 7)[1:]], "order": 3},
+    DESCENT: {"edges": [*np.linspace(0.0, 0.88, 37), *np.linspace(0.88, 1.0, 11)[1:]], "order": 3},
+    ASCENT: {"edges": [*np.linspace(0.0, 0.4, 21), *np.linspace(0.4, 1.0, 7)[1:]], "order": 3},
 }
 """Elements of some 11 s on the way down, twice the lag; on fewer, optima are worse by up to a tenth, as the angle of attack is to be
-switched within seconds. Shorter ones at the beginning of the way up, where the engine burns for a moment."""
+switched within seconds. Shorter ones before and after the lowest point, where two limits are reached and the engine burns for a moment."""
 
 
 def problem(
@@ -112,7 +111,7 @@ def problem(
     # A candidate is propagated only, as it takes seconds to make one feasible.
     problem.default_transcription = {
         "method": "DFET",
-        "settings": {"elements": ELEMENTS, "order": 3, "control_order": 1, "basis": "bernstein", "mesh": MESHES},
+        "settings": {"elements": 46, "order": 3, "control_order": 1, "basis": "bernstein", "mesh": MESHES},
     }
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"
