@@ -7,7 +7,7 @@ bound, which implies it, and a coarse mesh would dip below without.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, pi, radians
 
 import casadi as ca
@@ -46,7 +46,7 @@ SLOWEST = 1.0
 PRESSURE, LOAD = 13406.4583, 2.5
 """Limits of the dynamic pressure, Pa, and of the load, in weights."""
 DURATIONS = {DESCENT: (20.0, 3000.0), ASCENT: (20.0, 1500.0)}
-"""s; no flight of interest takes so little or so much."""
+"""Usual bounds, s; no flight of interest takes so little or so much."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,8 @@ class Mission:
         Bound of the speed, m/s.
     mass : float
         At the beginning, kg.
+    durations : mapping
+        Bounds of the duration of each phase, s.
     """
 
     vehicle: Winged
@@ -77,6 +79,7 @@ class Mission:
     lags: Mapping[str, float]
     fastest: float = START["speed"]
     mass: float = START["mass"]
+    durations: Mapping[str, tuple[float, float]] = field(default_factory=lambda: DURATIONS)
 
 
 def skip_entry(name: str, mission: Mission) -> tuple[Problem, dict[str, ca.MX]]:
@@ -102,9 +105,9 @@ def skip_entry(name: str, mission: Mission) -> tuple[Problem, dict[str, ca.MX]]:
     checks.within((START["speed"], START["speed"]), (SLOWEST, mission.fastest), f"{name}: the initial speed")
     checks.within((mission.mass, mission.mass), (BOUNDS["mass"][0], inf), f"{name}: mass")
     problem = Problem(name)
-    down = problem.phase(DESCENT, t0=0.0, tf=DURATIONS[DESCENT])
-    latest = DURATIONS[DESCENT][1] + DURATIONS[ASCENT][1]
-    up = problem.phase(ASCENT, t0=DURATIONS[DESCENT], tf=(DURATIONS[DESCENT][0], latest), duration=DURATIONS[ASCENT])
+    first, second = (mission.durations[name] for name in (DESCENT, ASCENT))
+    down = problem.phase(DESCENT, t0=0.0, tf=first)
+    up = problem.phase(ASCENT, t0=first, tf=(first[0], first[1] + second[1]), duration=second)
     heating = {}
     for phase, ends in ((down, {"altitude": mission.lowest, "flight-path angle": 0.0}), (up, {"altitude": TOP})):
         begins = (START | {"mass": mission.mass} | COMMANDED) if phase is down else {}
