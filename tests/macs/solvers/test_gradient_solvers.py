@@ -56,8 +56,7 @@ def test_a_start_is_used(goddard):
     known = solver("payoff").solve(goddard, METHOD, seed=0)
     again = solver("payoff").solve(goddard, METHOD, seed=0, start=known)
     assert again.stats["inner_iterations"] < known.stats["inner_iterations"]
-    # At the least time the speed goes with the root of what the time may exceed it by.
-    np.testing.assert_allclose(again.objectives, known.objectives, rtol=1e-6, atol=1e-5)
+    np.testing.assert_allclose(again.objectives, known.objectives, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize(
