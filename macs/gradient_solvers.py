@@ -19,7 +19,6 @@ from .fronts.builders import nearest_violation
 from .fronts.verified import VERIFY
 from .gradient_tools import optimize, payoff, sweep
 from .gradients.targets import METHODS, check_points
-from .solvers.run import ENDED
 from .solvers.solver import Solver
 from .solvers.start import check_run, drawing
 
@@ -79,17 +78,23 @@ class GradientSolver(Solver):
         """See `Solver.solve` and the class. `start` holds vectors that are known; words for random first candidates are not used."""
         check_run(evaluations or 1, seed, tolerance, time_limit, callback, checkpoint)
         known = start if drawing(start) is None else None
-        terms = {"start": known, "starts": self.starts, "seed": seed, "tolerance": tolerance, "verify": verify}
-        front = self.find(problem, transcription, **terms, time_limit=time_limit, progress=progress)
-        if "stopped" not in front.stats and transcription is not None and self.mesh != "fixed" and len(front):
-            front = self._on_other_meshes(front, verify, progress)
-        return front.replace(stats={"stopped": ENDED[0], "inner": "gradients"} | front.stats)
-
-    def _on_other_meshes(self, front: Front, verify: float | None, progress: bool | None) -> Front:
-        if self.mesh == "mended":
-            return front.mended(progress=progress)
-        refined = front.refine_mesh(more=self.mesh == "adaptive", progress=progress)
-        return refined if verify is None else refined.verify(verify)
+        remeshed = transcription is not None and self.mesh in ("adaptive", "density")
+        terms = {
+            "start": known,
+            "starts": self.starts,
+            "seed": seed,
+            "tolerance": tolerance,
+            "time_limit": time_limit,
+            "progress": progress,
+        }
+        front = self.find(problem, transcription, **terms, verify=None if remeshed else verify)
+        left = None if time_limit is None else time_limit - front.stats["wall_time"]
+        if transcription is not None and "stopped" not in front.stats and len(front) and (left is None or left > 0.0):
+            if self.mesh == "mended":
+                front = front.mended(time_limit=left, progress=progress)
+            elif remeshed:
+                front = front.refine_mesh(more=self.mesh == "adaptive", time_limit=left, progress=progress)
+        return front.verify(verify) if remeshed and verify is not None else front
 
     @property
     def certifies(self) -> bool:
@@ -132,7 +137,8 @@ class Optimum(GradientSolver):
     objective: str | None = None
 
     def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
-        """See `optimize`. If no solve converged, the front is empty, and `closest` is the least infeasible point."""
+        """See `optimize`, also for what it raises where it is ended before the first solve. If no solve converged, the front is empty, and
+        `closest` is the least infeasible point."""
         point = optimize(problem, transcription, objective=self.objective, **terms)
         alone = point.alone()
         if point.status != CONVERGED:

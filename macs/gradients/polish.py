@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,13 +146,13 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     return ends.replaced(feasible_and_no_worse(both, ends.F, ends.violation, span), both)
 
 
-def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: Iterable[int] | None = None) -> Archive:
+def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.ndarray | None = None) -> Archive:
     """The archive after guarded solves of all, or the chosen, points from their neighbours; the archive itself if none is better or solves
     are too few."""
     span = ranges(archive.F)
     pairs = [
         (i, j)
-        for i in (range(len(archive)) if chosen is None else np.unique(list(chosen)))
+        for i in (range(len(archive)) if chosen is None else np.unique(chosen))
         for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]
     ]
     if not 0 < len(pairs) <= solves.left:

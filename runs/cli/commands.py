@@ -79,7 +79,7 @@ def solve(arguments: Namespace) -> int:
                 checkpoint=arguments.checkpoint,
                 progress=True,
             )
-        if interrupts.reason and not front.stats["evaluations"]:
+        if interrupts.reason and not len(front) and front.closest is None:
             complain(front.message, "macs solve")
             return INTERRUPTED
         try:

@@ -89,8 +89,9 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         from macs.fronts.files import to_bytes
         from macs.solvers.run import ENDED
 
-        if front.stats["stopped"] not in ENDED:
-            return Outcome(KILLED, f"it was stopped: {front.stats['stopped']}", wall_time=time.perf_counter() - began)
+        # Gradient tools that came to their end name no reason for it.
+        if (stopped := front.stats.get("stopped", ENDED[0])) not in ENDED:
+            return Outcome(KILLED, f"it was stopped: {stopped}", wall_time=time.perf_counter() - began)
         content = to_bytes(front)
         samples.add(front.stats, front.stats["wall_time"], front.F)
         # The front alone knows the time before the run was resumed.

@@ -37,7 +37,10 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=36)
     parser.add_argument("--out")
     given = parser.parse_args()
-    front = sweep(load("skip"), points=given.points)
+    try:
+        front = sweep(load("skip"), points=given.points)
+    except ValueError as error:
+        parser.error(str(error))
     write_whole(given.out or Path(skip.__file__).with_name("skip.csv"), text(front).encode())
     print(front.table())
 

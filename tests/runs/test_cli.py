@@ -9,6 +9,7 @@ import pytest
 
 import macs
 from macs import Front
+from macs.gradients.multistart import MultistartSolver
 from runs.cli import main
 
 MACS = [sys.executable, "-m", "runs.cli"]
@@ -310,6 +311,22 @@ def test_a_folder_that_cannot_be_written_to_is_found_first(capsys, monkeypatch):
 def test_a_wrong_call_in_a_process(here):
     done = subprocess.run([*MACS, "solve", "godard"], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+
+
+def test_ctrl_c_keeps_what_gradient_tools_found(capsys, monkeypatch):
+    """They evaluate no candidates, which is no sign of nothing found."""
+    solve = MultistartSolver.from_vector
+
+    def then_interrupted(self, *task, **more):
+        found = solve(self, *task, **more)
+        if self.counts.gradient_solves == 4:
+            signal.raise_signal(signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(MultistartSolver, "from_vector", then_interrupted)
+    assert main(["solve", "goddard", "--solver", "payoff", "--out", "ends.nc"]) == 130
+    assert "front saved in ends.nc" in capsys.readouterr().out
+    assert len(Front.load("ends.nc")) == 2 and Front.load("ends.nc").stats["stopped"] == "interrupted"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

@@ -75,8 +75,8 @@ def _tested(tau: np.ndarray, weights: np.ndarray, nodes: np.ndarray) -> tuple[np
     balance = (nodes[:, None] == tau) @ (weights[:, None] * slopes)
     balance[0] += polynomials.lagrange_matrix(of_tests, nodes[:1])[0]
     balance[-1, -1] -= 1.0
-    told = np.append(tau, 1.0) if radau else nodes
-    return balance, weights[:, None] * values, polynomials.lagrange_matrix(of_tests, told)
+    places = np.append(tau, 1.0) if radau else nodes
+    return balance, weights[:, None] * values, polynomials.lagrange_matrix(of_tests, places)
 
 
 def _integrated(tau: np.ndarray, integrals: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, None]:

@@ -12,9 +12,9 @@ def dfet_tables(order: int, control_order: int, basis: str) -> Tables:
     """The element of states of degree l = `order` and controls of degree q, tested with functions of degree l + 1.
 
     Dynamics are evaluated at max(l, q) + 1 Gauss-Legendre nodes. The first l + 1 tests, solved for the states' coefficients, give these
-    from the rates there. The trajectory is told by the (l + 1)-stage Gauss-Legendre Runge-Kutta method that is equivalent for q <= l:
-    through the states at its stages and at both ends passes its collocation polynomial, which is more accurate by one order than the
-    states' own polynomial of degree l.
+    from the rates there. The trajectory is the collocation polynomial of the (l + 1)-stage Gauss-Legendre Runge-Kutta method that is
+    equivalent for q <= l: through the states at its stages and at both ends. It is more accurate by one order than the states' own
+    polynomial of degree l.
 
     Parameters
     ----------

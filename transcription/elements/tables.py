@@ -31,7 +31,7 @@ class Tables:
     nodes : array (k,)
         Abscissae of X.
     stages, at_stages : arrays (k,), (k, k)
-        Where between the ends the trajectory is told, and the states there from X.
+        Where trajectories have their states between the ends, and these states from X.
     closed : str
         Basis of the polynomial through L, the states at the stages and R.
     control_basis, control_order : str, int

@@ -3,7 +3,7 @@
 Bae, Shin, Savvaris and Tsourdos, "Multi-objective skip trajectory optimization for hypersonic reentry vehicles", Cranfield University. What
 the paper leaves open is chosen here: the specific impulse, 319 s, is such that the printed 86502 kg and 4970 m/s lie on the front (a
 calibration); the constant of the heating rate is that of Betts (`reentry.vehicle`), which the paper's limit of 200 Btu/ft2/s goes with; the
-speed, "free" in the table of bounds, is at most the initial one, as the printed 7803 m/s says (12 km/s are possible otherwise); and the
+speed, "free" in the table of bounds, is at most the initial one, as the printed 7803 m/s says; and the
 flight is level at its lowest point. Thrust follows without lag.
 """
 

@@ -9,8 +9,8 @@ latitude in place of that of the heading, those of the flight-path angle and of 
 degrees a second). The sign of the exponent of the density in eq. (3) is a slip.
 
 Beginning, end and bounds are in a reference that is not at hand; they are those of the same authors' other skip entry (`skip`), with the
-speed at most the initial one. The lowest altitude is chosen as 50 km: there the limit of the dynamic pressure allows 4642 m/s, and a flight
-without fuel leaves the air again with about the speed to which the paper aspires, 4016 m/s; from 51.88 km it has 4783. Chosen as well: the
+speed at most the initial one. The lowest altitude is chosen as 50 km: there the limit of the dynamic pressure allows 4643 m/s, so that a
+flight that saves propellant leaves the air again not much faster than the speed to which the paper aspires, 4016 m/s. Chosen as well: the
 gravitational parameter, the scale height, the constant of the heating rate (Betts'; the coefficients of Table I are his, for radians), a
 specific impulse of 300 s, and 0.2 1/s for the gains of all three lags.
 """
@@ -35,7 +35,7 @@ HEATING = 200.0
 """Btu/ft2/s."""
 LOWEST, IMPULSE, GAIN = 50e3, 300.0, 0.2
 DURATIONS = {DESCENT: (20.0, 1500.0), ASCENT: (20.0, 600.0)}
-"""s; a longer flight, with more skips on its way down, gains nothing in any objective."""
+"""s; chosen: room for several skips on the way down. The ends of the front that were found are well within."""
 TURNING = 7.2921151e-5
 TABLE = (1.067, -1.101, 0.6988, -0.1903)
 """Of Table I, for powers of the angle of attack in rad."""
@@ -68,9 +68,8 @@ MESHES = {
     DESCENT: {"edges": np.linspace(0.0, 1.0, 49).tolist(), "order": 3},
     ASCENT: {"edges": [*np.linspace(0.0, 0.4, 21), *np.linspace(0.4, 1.0, 7)[1:]], "order": 3},
 }
-"""Elements of some 9 s on the way down, twice the lag: on fewer, optima are worse by up to a tenth, as the angle of attack is to be
-switched within seconds, and long flights gain mass by the errors of the mesh. Shorter ones after the lowest point, where the engine burns
-for a moment."""
+"""Elements of some 9 s on the way down, twice the lag: on fewer, the angle of attack cannot be switched within seconds, and long flights
+gain mass by the errors of the mesh. Shorter ones after the lowest point, where the engine burns for a moment."""
 
 
 def problem(

@@ -8,7 +8,6 @@ import pytest
 from macs import payoff, sweep
 from macs.solvers.catalogue import solver
 from macs.solvers.checkpoint import keeps
-from macs.solvers.run import ENDED
 from problems import load
 from runs.cli import main
 from transcription import parse
@@ -25,7 +24,7 @@ def test_they_find_what_the_tools_find(goddard):
     for own, tool in ((solver("payoff"), payoff(goddard, METHOD)), (solver("sweep", points=4), sweep(goddard, METHOD, points=4))):
         front = own.solve(goddard, METHOD, evaluations=10, seed=0)
         np.testing.assert_array_equal(front.objectives, tool.objectives)
-        assert front.stats["stopped"] in ENDED and front.stats["evaluations"] == 0
+        assert "stopped" not in front.stats and front.stats["evaluations"] == 0
         assert front.stats["gradient_solves"] == tool.stats["gradient_solves"] > 0
 
 
