@@ -102,6 +102,14 @@ class Meshed(Transcription):
         """Other methods on much the same meshes, to be tried where solves with this one fail."""
         return ()
 
+    def variants(self, degree: str, **other: Any) -> tuple[Self, ...]:
+        """Methods much like this one, which has a `control_order`: with `other` settings; with controls of the full degree; both; with one
+        more in the setting that is the `degree` of the states."""
+        full = {"control_order": None, "mesh": {name: replace(mesh, control_order=None) for name, mesh in self.meshes.items()}}
+        more = {degree: self.order + 1, "mesh": {name: replace(mesh, order=mesh.order + 1) for name, mesh in self.meshes.items()}}
+        found = [replace(self, **changed) for changed in (other, full, {**other, **full}, more)]  # type: ignore[type-var]
+        return tuple(one for one in dict.fromkeys(found) if one != self)
+
     def check_phases(self, problem: CompiledProblem) -> None:
         """Raise ValueError if a mesh is given for a phase, or names a control, that the problem does not have."""
         controls = {phase.name: [v.name for v in phase.controls] for phase in problem.phases}

@@ -140,16 +140,7 @@ class Collocation(Meshed):
 
     def alternatives(self) -> tuple[Collocation, ...]:
         """See `Meshed.alternatives`: the other controls; of the full degree; both; a degree more."""
-        control = next(one for one in CONTROLS if one != self.control)
-        full = {name: replace(mesh, control_order=None) for name, mesh in self.meshes.items()}
-        more = {name: replace(mesh, order=mesh.order + 1) for name, mesh in self.meshes.items()}
-        found = (
-            replace(self, control=control),
-            replace(self, control_order=None, mesh=full),
-            replace(self, control=control, control_order=None, mesh=full),
-            replace(self, degree=self.degree + 1, mesh=more),
-        )
-        return tuple(one for one in dict.fromkeys(found) if one != self)
+        return self.variants("degree", control=next(one for one in CONTROLS if one != self.control))
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Collocation:

@@ -88,16 +88,7 @@ class DFET(Meshed):
 
     def alternatives(self) -> tuple[DFET, ...]:
         """See `Meshed.alternatives`: the other basis; controls of the degree of the states; both; a degree more."""
-        basis = next(one for one in BASES if one != self.basis)
-        full = {name: replace(mesh, control_order=None) for name, mesh in self.meshes.items()}
-        more = {name: replace(mesh, order=mesh.order + 1) for name, mesh in self.meshes.items()}
-        found = (
-            replace(self, basis=basis),
-            replace(self, control_order=None, mesh=full),
-            replace(self, basis=basis, control_order=None, mesh=full),
-            replace(self, order=self.order + 1, mesh=more),
-        )
-        return tuple(one for one in dict.fromkeys(found) if one != self)
+        return self.variants("order", basis=next(one for one in BASES if one != self.basis))
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> DFET:
