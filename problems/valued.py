@@ -1,0 +1,298 @@
+"""A problem whose one objective is a function of the objectives of another: what somebody prefers, for gradient solves.
+
+Objectives are mostly integrals or peaks, and depend on all of a trajectory. A function of them that is not linear would couple all of it in
+its second derivatives, and a maximum of several has none. So the problem gets a further parameter for each objective, and one for each
+maximum, which constraints tie to what they stand for; the function is one of these few parameters alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+
+from .compiled import CompiledPhase, CompiledProblem, Limit, Objective, Variable
+from .peaks import NEGLIGIBLE, refuse_peaks, with_sizes
+
+SAMPLES = 512
+"""Random values of the objectives at which functions of them are looked at, besides the corners of their ranges."""
+CORNERS = 8
+"""Most objectives of which all corners are looked at."""
+WIDER = 1.0
+"""By how many times its range among those values a maximum may leave it."""
+
+
+class Valuation(Protocol):
+    """A function of objectives that is minimised; see `macs.preferences.stage.Stage`, which says more."""
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+
+    @property
+    def value(self) -> Callable[[Any, Any], Any]:
+        """(objectives, maxima) -> the value, which rises with each of the maxima; objectives in the user's units and senses."""
+
+    @property
+    def groups(self) -> Callable[[Any], Any]:
+        """objectives -> lists of expressions: the maxima are those of each."""
+
+    @property
+    def limits(self) -> Callable[[Any], Any]:
+        """objectives -> expressions that may not be positive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Where objectives (m,) are, in the user's units: best and worst as the one who decides sees them, and within which limits they are
+    looked for, lower and upper."""
+
+    best: np.ndarray
+    worst: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @property
+    def scales(self) -> np.ndarray:
+        """What counts as one in each objective (m,): its range between best and worst."""
+        span = np.abs(self.worst - self.best)
+        return np.where(span > 0.0, span, np.maximum(np.abs(self.best), 1.0))
+
+    def inner(self) -> np.ndarray:
+        """Objectives (m, k) between best and worst."""
+        return _inside(np.minimum(self.best, self.worst), np.maximum(self.best, self.worst))
+
+    def outer(self) -> np.ndarray:
+        """Objectives (m, k) between lower and upper."""
+        return _inside(self.lower, self.upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Valued:
+    """A problem whose one objective is a function of those of another.
+
+    Attributes
+    ----------
+    problem : CompiledProblem
+        Its objective is 1 + (value - zero) / unit.
+    original : CompiledProblem
+    further : tuple of Variable
+        Its further parameters, which come after those of the original.
+    names : tuple of str
+        Names of its objective's objectives: those that the first of the further parameters stand for.
+    follow : Function
+        Objectives (m, k), in the user's units -> the further parameters that belong to them.
+    zero, unit : float
+        A value that is nearly the least, and what counts as one in it.
+    """
+
+    problem: CompiledProblem
+    original: CompiledProblem
+    further: tuple[Variable, ...]
+    names: tuple[str, ...]
+    follow: ca.Function
+    zero: float
+    unit: float
+
+    def value(self, objective: float) -> float:
+        """The value that belongs to an objective of the problem."""
+        return self.zero + self.unit * (objective - 1.0)
+
+    def lifted(self, variables: Sequence[Variable], places: Sequence[Variable], Z: np.ndarray, F: np.ndarray) -> np.ndarray:
+        """Vectors (k, n) of the original, with `variables` and objectives F (k, m), all minimised, as vectors of the problem, whose variables
+        are `places`."""
+        own = {v.name: column for v, column in zip(variables, np.asarray(Z).T, strict=True)}
+        values = np.array(self.follow((F * self.original.signs).T)).reshape(len(self.further), len(Z))
+        own |= {v.name: np.clip(row, v.lower, v.upper) for v, row in zip(self.further, values, strict=True)}
+        return np.array([own[v.name] for v in places]).T.reshape(len(Z), len(places))
+
+    def dropped(self, places: Sequence[Variable], variables: Sequence[Variable], z: np.ndarray) -> np.ndarray:
+        """The vector (n,) of the original that belongs to one of the problem."""
+        own = dict(zip((v.name for v in places), z, strict=True))
+        return np.array([own[v.name] for v in variables])
+
+    def at_ends(self, parameters: Mapping[str, float]) -> list[str]:
+        """Names of the objectives that are at an end of their range, which the original does not have."""
+        return [
+            name
+            for name, v in zip(self.names, self.further, strict=False)
+            if min(parameters[v.name] - v.lower, v.upper - parameters[v.name]) < 1e-3 * v.span
+        ]
+
+
+def valued(
+    problem: CompiledProblem, aim: Valuation, box: Box, *, kept: Sequence[tuple[Valuation, float]] = (), zero: float = 0.0
+) -> Valued:
+    """The problem with a function of its objectives in their place.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    aim : Valuation
+        The function.
+    box : Box
+    kept : sequence of (Valuation, float)
+        Functions that may not exceed these values.
+    zero : float
+        See `Valued`.
+
+    Raises
+    ------
+    ValueError
+        If a peak would be used otherwise than minimised or bounded above.
+    """
+    program = _Program(problem, [aim, *(one for one, _ in kept)], box)
+    values, scales, unit = program.values, program.spreads, program.spreads[0]
+    objective = 1.0 + (values[0] - zero) / unit
+    limits = [
+        *program.limits,
+        *(Limit(f"value of {one.name}", -np.inf, most, scale) for (one, most), scale in zip(kept, scales[1:], strict=True)),
+    ]
+    rows = [*program.rows, *values[1:]]
+    phases = [ca.MX.sym(f"q{i}", phase.n_quantities) for i, phase in enumerate(problem.phases)]
+    parameters = ca.MX.sym("p", len(problem.parameters) + len(program.further))
+    given = parameters[: len(problem.parameters)]
+    of_objectives = problem.objectives.call([*phases, given], True, False)[0] * problem.signs
+    of_constraints = problem.constraints.call([*phases, given], True, False)[0]
+    inputs = [*phases, parameters]
+    arguments = [of_objectives, parameters[len(problem.parameters) :]]
+    symbols = [program.exact, program.symbols]
+    inner = ca.Function("rows", symbols, [ca.densify(ca.vertcat(objective)), ca.densify(ca.vertcat(ca.MX(0, 1), *rows))])
+    value, found = inner.call(arguments, True, False)
+    names = [f"q{i}" for i in range(len(phases))] + ["p"]
+    derived = replace(
+        problem,
+        name=f"{problem.name}: {aim.name}",
+        phases=tuple(_with_parameters(phase, len(problem.parameters), len(program.further)) for phase in problem.phases),
+        parameters=(*problem.parameters, *program.further),
+        goals=(Objective(aim.name, scale=1.0),),
+        limits=(*problem.limits, *limits),
+        objectives=ca.Function("objectives", inputs, [value], names, ["objectives"]),
+        constraints=ca.Function("constraints", inputs, [ca.vertcat(of_constraints, found)], names, ["constraints"]),
+        address="",
+        data={},
+    )
+    derived = with_sizes(derived)
+    refuse_peaks(derived)
+    return Valued(derived, problem, program.further, program.names, program.follow, zero, unit)
+
+
+class _Program:
+    """Functions of the objectives as rows of constraints in a few further parameters.
+
+    `symbols` are these parameters, `exact` the objectives themselves; `rows` has an expression for each of `limits`.
+    """
+
+    def __init__(self, problem: CompiledProblem, aims: Sequence[Valuation], box: Box) -> None:
+        m = len(problem.goals)
+        self.exact = ca.MX.sym("J", m)
+        J = [ca.MX.sym(f"J{i}") for i in range(m)]
+        groups = [[[ca.MX(one) for one in group] for group in aim.groups(J)] for aim in aims]
+        peaks = [[ca.MX.sym(f"peak{k}") for k in range(len(of_aim))] for of_aim in groups]
+        self.values = [ca.MX(aim.value(J, own)) for aim, own in zip(aims, peaks, strict=True)]
+        below = [[ca.MX(one) for one in aim.limits(J)] for aim in aims]
+        flat = [peak for own in peaks for peak in own]
+        every = [group for of_aim in groups for group in of_aim]
+        members = [one for group in every for one in group]
+        bounded = [one for of_aim in below for one in of_aim]
+        column = ca.vertcat(*self.values, *members, *bounded)
+        used = [i for i in range(m) if ca.depends_on(column, J[i])]
+        rising = _rising(column, J, flat, every, box, problem.signs)
+        inner, outer = (_maxima(J, every, objectives) for objectives in (box.inner(), box.outer()))
+        self.spreads = [_spread(_at(J, flat, value, box.inner(), inner)) for value in self.values]
+        low, high = outer.min(axis=1, initial=np.inf), outer.max(axis=1, initial=-np.inf)
+        wide = WIDER * np.where(high > low, high - low, 1.0)
+        self.names = tuple(problem.goals[i].name for i in used)
+        self.further = (
+            *(
+                Variable(f"value of {problem.goals[i].name}", box.lower[i], box.upper[i], problem.goals[i].unit, box.scales[i])
+                for i in used
+            ),
+            *(
+                Variable(f"maximum {k}", low[k] - wide[k], high[k] + wide[k], "", float(np.ptp(inner[k])) or wide[k])
+                for k in range(len(flat))
+            ),
+        )
+        self.symbols = ca.MX.sym("further", len(used) + len(flat))
+        self.follow = ca.Function("follow", [ca.vertcat(*J)], [ca.vertcat(ca.MX(0, 1), *(J[i] for i in used), *map(_largest, every))])
+        rows, limits = [], []
+        for i in used:
+            sign = problem.goals[i].sign
+            rows.append(sign * (self.exact[i] - J[i]))
+            limits.append(Limit(f"objective '{problem.goals[i].name}'", -np.inf if rising[i] else 0.0, 0.0, box.scales[i]))
+        for k, group in enumerate(every):
+            rows += [one - flat[k] for one in group]
+            limits += [Limit(f"maximum {k}", -np.inf, 0.0, self.further[len(used) + k].scale)] * len(group)
+        for aim, of_aim in zip(aims, below, strict=True):
+            rows += of_aim
+            limits += [Limit(f"limit of {aim.name}", -np.inf, 0.0)] * len(of_aim)
+        old = [*(J[i] for i in used), *flat]
+        new = [self.symbols[k] for k in range(len(old))]
+        # What is not used is in no row: its symbol needs no value.
+        self.rows = list(ca.substitute(rows, old, new)) if old else rows
+        self.values = list(ca.substitute(self.values, old, new)) if old else self.values
+        self.limits = limits
+
+
+def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase:
+    """The phase of a problem with so many more parameters, on which nothing in it depends."""
+
+    def widened(function: ca.Function) -> ca.Function:
+        x, u, t, _ = function.mx_in()
+        s = ca.MX.sym("s", 2 + own + more)
+        value = function.call([x, u, t, s[: 2 + own]], True, False)
+        return ca.Function(function.name(), [x, u, t, s], value, function.name_in(), function.name_out())
+
+    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "sizes")
+    return replace(phase, **{name: widened(getattr(phase, name)) for name in names})
+
+
+def _rising(
+    column: ca.MX, J: Sequence[ca.MX], peaks: Sequence[ca.MX], groups: Sequence[Sequence[ca.MX]], box: Box, signs: np.ndarray
+) -> np.ndarray:
+    """Mask (m,) of the objectives, all minimised, with which no row of a column falls anywhere in the box: for these, a bound from above
+    does as well as the objective itself, and better, since it leaves room."""
+    objectives = box.outer()
+    symbols = [ca.vertcat(*J), ca.vertcat(ca.MX(0, 1), *peaks)]
+    slopes = ca.Function("slopes", symbols, [ca.densify(ca.jacobian(column, symbols[0]))])
+    maxima = _maxima(J, groups, objectives)
+    found = np.array(slopes(objectives, maxima)).reshape(column.numel(), objectives.shape[1], len(J)) * signs
+    found = np.where(np.isfinite(found), found, 0.0)
+    return (found >= -NEGLIGIBLE * np.abs(found).max(axis=(0, 1), initial=0.0)).all(axis=(0, 1))
+
+
+def _largest(group: Sequence[ca.MX]) -> ca.MX:
+    return ca.mmax(ca.vertcat(*group))
+
+
+def _maxima(J: Sequence[ca.MX], groups: Sequence[Sequence[ca.MX]], objectives: np.ndarray) -> np.ndarray:
+    """The maxima (k, n) of groups at objectives (m, n); those that are no numbers are the largest that is one."""
+    if not groups:
+        return np.empty((0, objectives.shape[1]))
+    function = ca.Function("maxima", [ca.vertcat(*J)], [ca.vertcat(*map(_largest, groups))])
+    values = np.array(function(objectives)).reshape(len(groups), -1)
+    return np.array([np.where(np.isfinite(row), row, row[np.isfinite(row)].max(initial=0.0)) for row in values])
+
+
+def _at(J: Sequence[ca.MX], peaks: Sequence[ca.MX], value: ca.MX, objectives: np.ndarray, maxima: np.ndarray) -> np.ndarray:
+    function = ca.Function("value", [ca.vertcat(*J), ca.vertcat(ca.MX(0, 1), *peaks)], [value])
+    return np.array(function(objectives, maxima)).ravel()
+
+
+def _spread(values: np.ndarray) -> float:
+    """The difference between values that counts as one: the range of the middle four fifths, 1 where that is 0."""
+    values = values[np.isfinite(values)]
+    spread = float(np.subtract(*np.quantile(values, [0.9, 0.1]))) if len(values) else 0.0
+    return spread if spread > 0.0 else 1.0
+
+
+def _inside(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Values (m, k) between two corners: random ones, and all corners as long as there are few."""
+    m = len(lower)
+    rng = np.random.default_rng(0)
+    corners = np.array(np.meshgrid(*[[0.0, 1.0]] * m)).reshape(m, -1) if m <= CORNERS else np.empty((m, 0))
+    share = np.hstack([corners, rng.random((m, SAMPLES))])
+    return lower[:, None] + share * (upper - lower)[:, None]
