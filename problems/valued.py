@@ -102,8 +102,8 @@ class Valued:
         return self.zero + self.unit * (objective - 1.0)
 
     def lifted(self, variables: Sequence[Variable], places: Sequence[Variable], Z: np.ndarray, F: np.ndarray) -> np.ndarray:
-        """Vectors (k, n) of the original, with `variables` and objectives F (k, m), all minimised, as vectors of the problem, whose variables
-        are `places`."""
+        """Vectors (k, n') of the problem, of the variables `places`, from vectors Z (k, n) of the original, of `variables`, with objectives
+        F (k, m), all minimised."""
         own = {v.name: column for v, column in zip(variables, np.asarray(Z).T, strict=True)}
         values = np.array(self.follow((F * self.original.signs).T)).reshape(len(self.further), len(Z))
         own |= {v.name: np.clip(row, v.lower, v.upper) for v, row in zip(self.further, values, strict=True)}
@@ -246,8 +246,16 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
         value = function.call([x, u, t, s[: 2 + own]], True, False)
         return ca.Function(function.name(), [x, u, t, s], value, function.name_in(), function.name_out())
 
-    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "sizes")
-    return replace(phase, **{name: widened(getattr(phase, name)) for name in names})
+    return replace(
+        phase,
+        dynamics=widened(phase.dynamics),
+        path=widened(phase.path),
+        initials=widened(phase.initials),
+        finals=widened(phase.finals),
+        integrands=widened(phase.integrands),
+        peaks=widened(phase.peaks),
+        sizes=widened(phase.sizes),
+    )
 
 
 def _rising(
