@@ -1,7 +1,34 @@
 """Choosing a point: preferences on fronts and on the problem itself, and what a choice costs."""
 
-from ..preferences import Preference, Ranges, Ranking, Stage, WeightedSum
+from ..preferences import (
+    Around,
+    FuzzyGoal,
+    FuzzySatisfactory,
+    GoalProgramming,
+    Nimbus,
+    Preference,
+    Ranges,
+    Ranking,
+    ReferencePoint,
+    Stage,
+    WeightedSum,
+)
 from .choice import Choice, Step
 from .decide import decide
 
-__all__ = ["Choice", "Preference", "Ranges", "Ranking", "Stage", "Step", "WeightedSum", "decide"]
+__all__ = [
+    "Around",
+    "Choice",
+    "FuzzyGoal",
+    "FuzzySatisfactory",
+    "GoalProgramming",
+    "Nimbus",
+    "Preference",
+    "Ranges",
+    "Ranking",
+    "ReferencePoint",
+    "Stage",
+    "Step",
+    "WeightedSum",
+    "decide",
+]

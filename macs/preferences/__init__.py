@@ -1,9 +1,27 @@
 """What a person wants of the objectives: preferences that rank points, and that gradient solves minimise."""
 
+from .fuzzy_goal import FuzzyGoal
+from .fuzzy_satisfactory import FuzzySatisfactory
+from .goal_programming import GoalProgramming
+from .nimbus import Nimbus
 from .preference import Preference
 from .ranges import Ranges
 from .ranking import Ranking
+from .reference_point import ReferencePoint
 from .stage import Stage
+from .targets import Around
 from .weighted_sum import WeightedSum
 
-__all__ = ["Preference", "Ranges", "Ranking", "Stage", "WeightedSum"]
+__all__ = [
+    "Around",
+    "FuzzyGoal",
+    "FuzzySatisfactory",
+    "GoalProgramming",
+    "Nimbus",
+    "Preference",
+    "Ranges",
+    "Ranking",
+    "ReferencePoint",
+    "Stage",
+    "WeightedSum",
+]

@@ -69,3 +69,12 @@ def places(names: Iterable[str], goals: Sequence[Objective]) -> dict[str, int]:
 def shown(value: float, goal: Objective) -> str:
     """A value with its unit."""
     return f"{value:.6g}{f' {goal.unit}' if goal.unit else ''}"
+
+
+def levels(priorities: Any) -> tuple[tuple[str, ...], ...]:
+    """Levels of priority, most important first, each a tuple of names; no name occurs twice."""
+    if isinstance(priorities, str) or not isinstance(priorities, Sequence) or not priorities:
+        raise ValueError(f"priorities must be a list of names of objectives, most important first, not {priorities!r}")
+    found = tuple(names_of([level] if isinstance(level, str) else level, "priorities") for level in priorities)
+    names_of([name for level in found for name in level], "priorities")
+    return found

@@ -34,7 +34,8 @@ class Ranking:
     ranges : Ranges
         By which objectives were normalised.
     stage_values : array (n, number of stages)
-        Values of the stages of the preference: smaller is better, infinite where a hard limit is exceeded or an objective is not finite.
+        Values of the stages of the preference: smaller is better, infinite where a hard limit is exceeded or an objective is not finite,
+        NaN where a stage does not follow (see `Stage.after_zero`).
     degrees : array (n, m)
         How well each objective is satisfied; see the class of the preference.
     order : array (n,) of int
@@ -83,9 +84,10 @@ class Ranking:
             units.append(f"{goal.sense[:3]} [{goal.unit or '-'}]")
             cells.append(numbers(column))
         for name, column in zip(self.stage_names, self.stage_values[shown].T, strict=True):
-            titles.append("value")
-            units.append(name)
-            cells.append(["-" if np.isinf(value) else f"{value:.6g}" for value in column])
+            if not np.isnan(column).all():
+                titles.append("value")
+                units.append(name)
+                cells.append([f"{value:.6g}" if np.isfinite(value) else "-" for value in column])
         for goal, column in zip(front.goals, self.degrees[shown].T, strict=True):
             if not np.isnan(column).all():
                 titles.append("degree")
@@ -115,7 +117,7 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
     for stage in stages:
         found = stage.numbers(J)
         follows = columns[-1] <= ATTAINED if columns and stage.after_zero else np.ones(len(J), dtype=bool)
-        columns.append(np.where(follows | np.isinf(found), found, 0.0))
+        columns.append(np.where(follows, found, np.nan))
     excess = np.max([stage.excess(J) for stage in stages], axis=0)
     excess = np.where(excess <= SLACK, 0.0, excess)
     confirmed = feasible & ~(front.was_simulated & ~front.verified)
@@ -124,7 +126,8 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
         tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)
         # What stages before the last attain is kept, but for rounding.
         rounded = [np.round(column / ATTAINED) for column in columns[:-1]]
-    order = np.lexsort([tie, columns[-1], *rounded[::-1], excess, kind])
+    keys = [tie, columns[-1], *rounded[::-1], excess, kind]
+    order = np.lexsort([np.where(np.isnan(key), 0.0, key) for key in keys])
     return Ranking(
         front,
         preference,
