@@ -36,7 +36,7 @@ def decide(
     """The point of a problem that suits a preference best, by gradients: a local optimum, and never worse than the best of `start`.
 
     Each stage of the preference is minimised as the one objective of a problem that has the user's objectives as parameters. Of several
-    stages, each keeps what those before attained, but for a part of 1e-6 of its size, and of 1 at least. The vector that is found is one of
+    stages, each keeps what those before attained, but for a part of 1e-7 of its size, and of 1 at least. The vector that is found is one of
     the problem itself: the point is certified and simulated as all points are.
 
     Parameters

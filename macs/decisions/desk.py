@@ -30,7 +30,7 @@ from ..preferences.stage import SLACK
 from ..solvers.start import beginning
 from .choice import Choice, Step
 from .judging import Merit, excess_stage, meets, stage_values, unmet, with_all_limits
-from .stages import KEEPS, Kept, Known, Outcome, StageSolver
+from .stages import SAME, Kept, Known, Outcome, StageSolver
 
 BEST = 3
 """Points of `start` that solves begin at by default, the best-ranked."""
@@ -160,7 +160,7 @@ class Desk:
                 return self._point(outcome), unmet(limits, J)
         kept: list[Kept] = []
         for stage in stages:
-            if stage.after_zero and kept and kept[-1].value > KEEPS:
+            if stage.after_zero and kept and kept[-1].value > SAME:
                 break
             if kept and outcome is not None:
                 reached = self._solver.on_mesh(stage, kept, outcome.known, 1)

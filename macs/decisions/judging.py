@@ -12,7 +12,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.point import Point
 from ..preferences import Stage
 from ..preferences.stage import SLACK
-from .stages import KEEPS
+from .stages import SAME
 
 ALIKE = 0.5
 """Part of the largest excess from which on a limit is in conflict with others."""
@@ -23,7 +23,7 @@ def stage_values(stages: Sequence[Stage], objectives: np.ndarray) -> np.ndarray:
     columns: list[np.ndarray] = []
     for stage in stages:
         found = stage.numbers(objectives)
-        follows = columns[-1] <= KEEPS if columns and stage.after_zero else np.ones(len(found), dtype=bool)
+        follows = columns[-1] <= SAME if columns and stage.after_zero else np.ones(len(found), dtype=bool)
         columns.append(np.where(follows | np.isinf(found), found, 0.0))
     return np.stack(columns, axis=1)
 
@@ -62,7 +62,7 @@ class Merit:
 
 def _equal(value: float, least: float) -> bool:
     """Whether a value is as good as the least, as far as stages keep what they attained."""
-    return bool(value <= least + KEEPS * max(abs(least), 1.0)) if np.isfinite(least) else True
+    return bool(value <= least + SAME * max(abs(least), 1.0)) if np.isfinite(least) else True
 
 
 def _kind(point: Point) -> int:

@@ -30,8 +30,9 @@ WIDENED = 3
 """Most times that this is made ten times as wide for an objective that is at an end of it."""
 FEASIBLE = 1e-2
 """Largest violation of a vector whose objectives say where others may lie."""
-KEEPS = 1e-6
-"""What a stage attained may be exceeded by in the stages after it: this part of its size, and of 1 at least."""
+KEEPS, SAME = 1e-7, 1e-6
+"""What a stage attained may be exceeded by in the stages after it, and by how much values may differ that are as good as each other: these
+parts of its size, and of 1 at least."""
 
 
 @dataclass(frozen=True, eq=False)
