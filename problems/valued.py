@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, Protocol
 
 import casadi as ca
@@ -21,6 +22,8 @@ SAMPLES = 512
 """Random values of the objectives at which functions of them are looked at, besides the corners of their ranges."""
 CORNERS = 8
 """Most objectives of which all corners are looked at."""
+INSIDE = 1e-6
+"""By what part of their ranges the corners lie inside."""
 WIDER = 1.0
 """By how many times its range among those values a maximum may leave it."""
 
@@ -68,6 +71,10 @@ class Box:
     def outer(self) -> np.ndarray:
         """Objectives (m, k) between lower and upper."""
         return _inside(self.lower, self.upper)
+
+    def not_better(self, signs: np.ndarray) -> np.ndarray:
+        """Objectives (m, k) between lower and upper that are not better than the best."""
+        return _inside(np.where(signs > 0, self.best, self.lower), np.where(signs > 0, self.upper, self.best))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +183,13 @@ def valued(
         data={},
     )
     derived = with_sizes(derived)
-    refuse_peaks(derived)
+    try:
+        refuse_peaks(derived)
+    except ValueError as error:
+        refuse_peaks(problem)
+        exactly = ", ".join(f"'{name}'" for name in program.exactly)
+        words = "gradient tools can only minimise a peak or bound it above; preference.rank(front) needs no derivatives"
+        raise ValueError(f"{aim.name} may ask for a worse value of {exactly} than there need be: {words}") from error
     return Valued(derived, problem, program.further, program.names, program.follow, zero, unit)
 
 
@@ -200,12 +213,15 @@ class _Program:
         bounded = [one for of_aim in below for one in of_aim]
         column = ca.vertcat(*self.values, *members, *bounded)
         used = [i for i in range(m) if ca.depends_on(column, J[i])]
-        rising = _rising(column, J, flat, every, box, problem.signs)
-        inner, outer = (_maxima(J, every, objectives) for objectives in (box.inner(), box.outer()))
-        self.spreads = [_spread(_at(J, flat, value, box.inner(), inner)) for value in self.values]
+        maxima = [reduce(ca.fmax, group) for group in every]
+        whole = list(ca.substitute(self.values, flat, maxima)) if flat else self.values
+        rising = _rising(J, [*whole, *bounded], box, problem.signs)
+        inner, outer = (_finite(_at(J, maxima, objectives)) for objectives in (box.inner(), box.outer()))
+        self.spreads = [_spread(row) for row in _at(J, whole, box.inner())]
         low, high = outer.min(axis=1, initial=np.inf), outer.max(axis=1, initial=-np.inf)
         wide = WIDER * np.where(high > low, high - low, 1.0)
         self.names = tuple(problem.goals[i].name for i in used)
+        self.exactly = [problem.goals[i].name for i in used if not rising[i]]
         self.further = (
             *(
                 Variable(f"value of {problem.goals[i].name}", box.lower[i], box.upper[i], problem.goals[i].unit, box.scales[i])
@@ -217,7 +233,7 @@ class _Program:
             ),
         )
         self.symbols = ca.MX.sym("further", len(used) + len(flat))
-        self.follow = ca.Function("follow", [ca.vertcat(*J)], [ca.vertcat(ca.MX(0, 1), *(J[i] for i in used), *map(_largest, every))])
+        self.follow = ca.Function("follow", [ca.vertcat(*J)], [ca.vertcat(ca.MX(0, 1), *(J[i] for i in used), *maxima)])
         rows, limits = [], []
         for i in used:
             sign = problem.goals[i].sign
@@ -258,36 +274,26 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
     )
 
 
-def _rising(
-    column: ca.MX, J: Sequence[ca.MX], peaks: Sequence[ca.MX], groups: Sequence[Sequence[ca.MX]], box: Box, signs: np.ndarray
-) -> np.ndarray:
-    """Mask (m,) of the objectives, all minimised, with which no row of a column falls anywhere in the box: for these, a bound from above
-    does as well as the objective itself, and better, since it leaves room."""
-    objectives = box.outer()
-    symbols = [ca.vertcat(*J), ca.vertcat(ca.MX(0, 1), *peaks)]
-    slopes = ca.Function("slopes", symbols, [ca.densify(ca.jacobian(column, symbols[0]))])
-    maxima = _maxima(J, groups, objectives)
-    found = np.array(slopes(objectives, maxima)).reshape(column.numel(), objectives.shape[1], len(J)) * signs
+def _rising(J: Sequence[ca.MX], rows: Sequence[ca.MX], box: Box, signs: np.ndarray) -> np.ndarray:
+    """Mask (m,) of the objectives, all minimised, with which no row falls where they are not better than what is known to be best: for
+    these, a bound from above does as well as the objective itself, and better, since it leaves room."""
+    column = ca.vertcat(*rows)
+    slopes = [ca.densify(ca.jacobian(column, one)) for one in J]
+    found = np.array([_at(J, [of_one], box.not_better(signs)) for of_one in slopes]) * signs[:, None, None]
     found = np.where(np.isfinite(found), found, 0.0)
-    return (found >= -NEGLIGIBLE * np.abs(found).max(axis=(0, 1), initial=0.0)).all(axis=(0, 1))
+    return (found >= -NEGLIGIBLE * np.abs(found).max(axis=(1, 2), initial=0.0)[:, None, None]).all(axis=(1, 2))
 
 
-def _largest(group: Sequence[ca.MX]) -> ca.MX:
-    return ca.mmax(ca.vertcat(*group))
+def _at(J: Sequence[ca.MX], rows: Sequence[ca.MX], objectives: np.ndarray) -> np.ndarray:
+    """Values (k, n) of rows at objectives (m, n)."""
+    column = ca.densify(ca.vertcat(ca.MX(0, 1), *rows))
+    values = ca.Function("values", [ca.vertcat(*J)], [column])(objectives)
+    return np.array(values).reshape(column.numel(), objectives.shape[1])
 
 
-def _maxima(J: Sequence[ca.MX], groups: Sequence[Sequence[ca.MX]], objectives: np.ndarray) -> np.ndarray:
-    """The maxima (k, n) of groups at objectives (m, n); those that are no numbers are the largest that is one."""
-    if not groups:
-        return np.empty((0, objectives.shape[1]))
-    function = ca.Function("maxima", [ca.vertcat(*J)], [ca.vertcat(*map(_largest, groups))])
-    values = np.array(function(objectives)).reshape(len(groups), -1)
-    return np.array([np.where(np.isfinite(row), row, row[np.isfinite(row)].max(initial=0.0)) for row in values])
-
-
-def _at(J: Sequence[ca.MX], peaks: Sequence[ca.MX], value: ca.MX, objectives: np.ndarray, maxima: np.ndarray) -> np.ndarray:
-    function = ca.Function("value", [ca.vertcat(*J), ca.vertcat(ca.MX(0, 1), *peaks)], [value])
-    return np.array(function(objectives, maxima)).ravel()
+def _finite(rows: np.ndarray) -> np.ndarray:
+    """The same rows with the largest number of each in place of what is none."""
+    return np.array([np.where(np.isfinite(row), row, row[np.isfinite(row)].max(initial=0.0)) for row in rows]).reshape(rows.shape)
 
 
 def _spread(values: np.ndarray) -> float:
@@ -302,5 +308,6 @@ def _inside(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     m = len(lower)
     rng = np.random.default_rng(0)
     corners = np.array(np.meshgrid(*[[0.0, 1.0]] * m)).reshape(m, -1) if m <= CORNERS else np.empty((m, 0))
-    share = np.hstack([corners, rng.random((m, SAMPLES))])
+    # Just inside, where there are no kinks.
+    share = np.clip(np.hstack([corners, rng.random((m, SAMPLES))]), INSIDE, 1.0 - INSIDE)
     return lower[:, None] + share * (upper - lower)[:, None]

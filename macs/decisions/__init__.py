@@ -15,6 +15,7 @@ from ..preferences import (
 )
 from .choice import Choice, Step
 from .decide import decide
+from .satisfy import satisfy
 
 __all__ = [
     "Around",
@@ -31,4 +32,5 @@ __all__ = [
     "Step",
     "WeightedSum",
     "decide",
+    "satisfy",
 ]

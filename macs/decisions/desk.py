@@ -102,6 +102,11 @@ class Desk:
         self._costs = dict(ends.stats)
         return ends
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the work is to end."""
+        return bool(self._reason())
+
     def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
         """The choice by a preference, never worse than a known point.
 
