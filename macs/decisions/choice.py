@@ -86,6 +86,11 @@ class Choice:
         """Objectives of the point by name, in the user's units and senses."""
         return self.point.objectives
 
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Costs, those of the payoff table included if it was found on the way; the seed, and more, as of a front."""
+        return dict(self.point.alone().stats)
+
     def __repr__(self) -> str:
         return f"<Choice by {self.preference!r}: {self.point.title}; value {self.value:.6g}>"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from transcription.meshed import Meshed
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import certified, vectors_points
+from ..fronts.builders import OPTIMAL, certified, vectors_points
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
@@ -81,7 +81,12 @@ class Desk:
         with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
             self._reason = lambda: interrupts.reason
             self.solves.before = lambda: show(f"decide: {self.solves.counts.gradient_solves} gradient solves done")
-            self.known = self._ends() if self._start is None else self._start
+            try:
+                self.known = self._ends() if self._start is None else self._start
+            except Stopped as reason:
+                self._end(str(reason))
+            if self.stopped and not (self.known.status == CONVERGED).any():
+                self._end(self._reason())
             self.ranges = Ranges.of(self.known) if self._given is None else self._given
             best, worst = self.ranges.ends(self.problem.goals)
             self._solver = StageSolver(self.problem, best, worst, self.solves, np.random.default_rng(self._seed))
@@ -107,6 +112,12 @@ class Desk:
         """Whether the work is to end."""
         return bool(self._reason())
 
+    @staticmethod
+    def _end(reason: str) -> NoReturn:
+        """Raise what says that there is no result."""
+        words = f"decide: {reason} before the first solve"
+        raise (KeyboardInterrupt(words) if reason == "interrupted" else TimeoutError(words)) from None
+
     def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
         """The choice by a preference, never worse than a known point.
 
@@ -125,14 +136,17 @@ class Desk:
         except Stopped as reason:
             found, message = None, f"{reason}: no stage was solved to its end"
             if not candidates:
-                words = f"decide: {reason} before the first solve"
-                raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
+                self._end(str(reason))
         points = [*([] if found is None else [found]), *candidates]
         chosen = min(points, key=Merit(stages, points))
+        said = [message]
         if chosen is not found and not message:
-            message = "no better point was found than the best that was known"
-        elif chosen.verified is False:
-            message = "; ".join(filter(None, [message, f"not confirmed by a simulation: {chosen.note}"]))
+            said.append("no better point was found than the best that was known")
+        if chosen.verified is False:
+            said.append(f"not confirmed by a simulation: {chosen.note}")
+        if chosen is found and not message and (chosen.optimality or 0.0) > OPTIMAL:
+            said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
+        message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
         values = stage_values(stages, J)[0].tolist()
         return Choice(chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message=message)
