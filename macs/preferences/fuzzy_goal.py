@@ -69,7 +69,13 @@ class FuzzyGoal(Preference):
             each = [aim.excesses(J) for aim in found.values()]
             return [[0.0, *(one for excesses in each for one in excesses)]] if self.aggregate == "min" else [[0.0, *one] for one in each]
 
-        stage = Stage("largest 1 - membership" if self.aggregate == "min" else "sum of 1 - membership", lambda J, peaks: sum(peaks), groups, limits, limit_names)
+        stage = Stage(
+            "largest 1 - membership" if self.aggregate == "min" else "sum of 1 - membership",
+            lambda J, peaks: sum(peaks),
+            groups,
+            limits,
+            limit_names,
+        )
         return stage, sum_of_all(goals, needed(ranges, self))
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
