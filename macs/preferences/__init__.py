@@ -4,6 +4,7 @@ from .fuzzy_goal import FuzzyGoal
 from .fuzzy_satisfactory import FuzzySatisfactory
 from .goal_programming import GoalProgramming
 from .nimbus import Nimbus
+from .physical import FuzzyPhysicalProgramming, Larger, PhysicalProgramming, Range, Smaller, Value
 from .preference import Preference
 from .ranges import Ranges
 from .ranking import Ranking
@@ -15,13 +16,19 @@ from .weighted_sum import WeightedSum
 __all__ = [
     "Around",
     "FuzzyGoal",
+    "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",
     "GoalProgramming",
+    "Larger",
     "Nimbus",
+    "PhysicalProgramming",
     "Preference",
+    "Range",
     "Ranges",
     "Ranking",
     "ReferencePoint",
+    "Smaller",
     "Stage",
+    "Value",
     "WeightedSum",
 ]
