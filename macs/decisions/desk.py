@@ -163,20 +163,22 @@ class Desk:
             return []
         order = [int(i) for i in preference.rank(self.known, self.ranges).order if feasible[int(i)]]
         most = len(order) if self._start is None else BEST if self._terms.starts == AUTO else int(self._terms.starts)
-        return [self.known[i] for i in order[:most]]
+        chosen, verify = self.known[order[:most]], self._terms.verify
+        # Compared with what is found and simulated.
+        return list(chosen if chosen.was_simulated.all() or verify is None else verified(chosen, verify, objective_scales(self.known)))
 
     def _solved(
         self, preference: Preference, stages: Sequence[Stage], candidates: Sequence[Point], about: Mapping[str, float]
     ) -> tuple[Point, str]:
         """The point that solves of all stages lead to, and what is to be said of it."""
-        stages = with_all_limits(stages)
+        stages = with_all_limits(stages, len(self.problem.goals))
         limits = stages[0]
         outcome: Outcome | None = None
         if limits.limit_names and not any(meets(limits, point) for point in candidates):
             outcome = self._within_limits(preference, limits, candidates, about)
             J = outcome.F * self.problem.signs
             if outcome.status == CONVERGED and limits.excess(J[None])[0] > SLACK:
-                return self._point(outcome), unmet(limits, J)
+                return self._point(outcome), unmet(limits, self.problem.goals, J)
         kept: list[Kept] = []
         for stage in stages:
             if stage.after_zero and kept and kept[-1].value > SAME:

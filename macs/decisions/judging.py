@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from problems.compiled import Objective
+
 from ..evaluation.evaluator import CONVERGED
 from ..fronts.point import Point
 from ..preferences import Stage
@@ -70,11 +72,12 @@ def _kind(point: Point) -> int:
     return 2 if point.status != CONVERGED else int(point.verified is False)
 
 
-def with_all_limits(stages: Sequence[Stage]) -> list[Stage]:
-    """The stages, of which the first has all limits, each once: the later ones keep it, and so have them, too."""
+def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
+    """The stages of m objectives, of which the first has all limits, each once: the later ones keep it, and so have them, too."""
     limits: dict[str, tuple[int, int]] = {}
     for i, stage in enumerate(stages):
-        for k, name in enumerate(stage.limit_names):
+        count = len(stage.limits([1.0] * m))
+        for k, name in enumerate(stage.limit_names or [f"limit {k + 1} of {stage.name}" for k in range(count)]):
             limits.setdefault(name, (i, k))
 
     def every(J: Sequence[Any]) -> list[Any]:
@@ -95,13 +98,14 @@ def meets(limits: Stage, point: Point) -> bool:
     return bool(limits.excess(np.array([list(point.objectives.values())]))[0] <= SLACK)
 
 
-def unmet(limits: Stage, J: np.ndarray) -> str:
+def unmet(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     """Text with the limits that cannot be met, by objectives (m,) that exceed them as little as possible: those in conflict are exceeded
     alike there."""
     excess = limits.excesses(J[None])[0]
     names = [name for name, one in zip(limits.limit_names, excess, strict=True) if one >= ALIKE * excess.max()]
+    nearest = ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in zip(goals, J, strict=True))
     what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
-    return f"no point was found that meets {what}; the nearest exceeds {'each' if len(names) > 1 else 'it'} by {excess.max():.2g}"
+    return f"no point was found that meets {what}; the nearest has {nearest}"
 
 
 def _nothing(J: Sequence[Any]) -> list[Any]:
