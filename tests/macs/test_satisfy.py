@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from test_decide import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, both, cart, ends
 
-from macs.decisions import FuzzySatisfactory, satisfy
-from problems import Problem, load
+from macs.decisions import FuzzySatisfactory, Ranges, satisfy
+from problems import load
 from transcription import DFET
 
 
@@ -30,27 +31,29 @@ def test_nothing_is_raised_where_the_order_is_kept_at_once() -> None:
     assert "kappa" in choice.table() and "lambda" in choice.table()
 
 
-def hollow() -> Problem:
-    """A front that bows inward, f_1^4 + f_2^4 = 1: its weighted sums are least at its ends."""
-    problem = Problem("hollow")
-    phase = problem.phase("wait", t0=0, tf=1)
-    phase.state("x", bounds=(-1, 1), initial=0)
-    phase.dynamics(x=0)
-    p = problem.parameter("p", bounds=(0.0, 1.0))
-    q = problem.parameter("q", bounds=(0.0, 1.0))
-    problem.constraint("outside", p**4 + q**4, lower=1.0)
-    problem.minimize("first", p)
-    problem.minimize("second", q)
-    return problem
+STEEP = Ranges({"effort": -1e4, "time": 0.5}, {"effort": 96.0, "time": 4.03})
+"""Ranges in which a whole second is worth next to no effort: lambda would have to be within 1e-4 of 1/2 until the effort comes first."""
 
 
-@pytest.mark.parametrize("order", [("first", "second"), ("second", "first")])
-def test_the_order_is_imposed_where_lambda_jumps_past_it(order: tuple[str, str]) -> None:
-    # Equal memberships are at 2^(-1/4) each; below lambda = 1/2 the sum is least at an end, if not at the wrong one.
-    start = satisfy(hollow(), MESH, FuzzySatisfactory({}, order), seed=3)
-    assert start.history[-1].about["kappa"] <= 0.0
-    imposed = satisfy(hollow(), MESH, FuzzySatisfactory({order[0]: 0.9}, order, 0.0), seed=3)
-    assert imposed.history[-1].about["kappa"] <= 0.0
+def test_the_order_is_imposed_where_lambda_does_not_do() -> None:
+    choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["effort", "time"]), ranges=STEEP, start=ends())
+    T = brentq(lambda T: (12 / T**3 + 1e4) / 10_096 - (T - 0.5) / 3.53, 0.5, 4.0, xtol=1e-12)
+    assert choice.objectives["time"] == pytest.approx(T, abs=1e-5)
+    *raised, imposed = choice.history
+    assert all(step.about["kappa"] > 0 for step in raised) and imposed.about["kappa"] <= 0.0
+    assert [step.about["lambda"] for step in raised] == sorted({step.about["lambda"] for step in raised})
+    assert imposed.about["lambda"] == raised[-1].about["lambda"] < 0.5
+    assert "imposed" in choice.message and choice.preference.ordered  # type: ignore[attr-defined]
+    # On the front still, which a limit on the order need not leave.
+    assert choice.point.optimality < 1e-6
+
+
+def test_an_order_that_no_point_keeps_is_named() -> None:
+    # All efforts are in the worse half of their range, all times in the better tenth.
+    ranges = Ranges({"effort": -100.0, "time": 0.5}, {"effort": 96.0, "time": 40.0})
+    choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["effort", "time"]), ranges=ranges, start=ends())
+    assert "no point was found that meets" in choice.message and "effort satisfied at least as time" in choice.message
+    assert choice.history[-1].about["kappa"] > 0 and choice.objectives["time"] == pytest.approx(4.0, rel=1e-6)
 
 
 def test_an_order_that_is_a_limit_from_the_first() -> None:
