@@ -99,8 +99,20 @@ class Ranking:
         return "\n".join([*lines, *(["", self.message] if self.message else [])])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Axes with the front, its points coloured by rank, and the best marked."""
-        raise NotImplementedError
+        """Axes with the front, its points coloured by rank, and the best marked: two objectives as a scatter plot, more as parallel
+        coordinates. Points that exceed a hard limit are hollow, or broken lines."""
+        from .pictures.ranking_plot import draw_ranking
+
+        return draw_ranking(self.front, self.order, self.values, self.preference._title(), ax)
+
+    def plot_degrees(self, count: int = 3, ax: Axes | None = None) -> Axes:
+        """Axes with the degrees of the best points as bars side by side."""
+        rows = [int(i) for i in self.order[:count]]
+        return self.preference.plot_degrees({f"rank {k + 1} (#{i})": self.front[i] for k, i in enumerate(rows)}, self.ranges, ax)
+
+    def plot_functions(self, figure: Any = None) -> np.ndarray:
+        """Axes, one for each objective, with what the preference makes of it, the points of the front on it, and the best marked."""
+        return self.preference.plot_functions(self.front, self.ranges, self.best.index, figure)
 
 
 def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Ranking:
