@@ -34,6 +34,11 @@ class Preference(ABC):
     MARKS: ClassVar[tuple[tuple[float, str], ...]] = ()
     """Degrees that mean something, with the words, for axes of figures."""
 
+    @property
+    def title(self) -> str:
+        """The name of the method, for figures."""
+        return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+
     @abstractmethod
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         """The scalar functions that are minimised, one after the other: mostly one, several where the preference is lexicographic.
@@ -120,11 +125,7 @@ class Preference(ABC):
         from .pictures.function_plot import draw_functions
 
         curves = self._curves(front.goals, Ranges.of(front) if ranges is None else ranges)
-        return draw_functions(curves, self._title(), self._curve_label(), self.SMALLER, front.objectives, best, figure)
-
-    def _title(self) -> str:
-        """What a figure is of."""
-        return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+        return draw_functions(curves, self.title, self._curve_label(), self.SMALLER, front.objectives, best, figure)
 
     def _curve_label(self) -> str:
         """Label of the vertical axes of `plot_functions`."""

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..evaluation.evaluator import CONVERGED
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import counted, numbers, text_table
-from .ranges import Ranges
+from .ranges import Ranges, usable
 from .stage import ATTAINED, SLACK, Stage
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ class Ranking:
         coordinates. Points that exceed a hard limit are hollow, or broken lines."""
         from .pictures.ranking_plot import draw_ranking
 
-        return draw_ranking(self.front, self.order, self.values, self.preference._title(), ax)
+        return draw_ranking(self.front, self.order, self.values, self.preference.title, ax)
 
     def plot_degrees(self, count: int = 3, ax: Axes | None = None) -> Axes:
         """Axes with the degrees of the best points as bars side by side."""
@@ -119,7 +118,7 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
     """The points of a front in the order of a preference; see `Preference.rank`."""
     if not isinstance(front, Points):
         raise ValueError(f"a front is ranked, not {front!r}")
-    feasible = (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)
+    feasible, confirmed = usable(front)
     if not feasible.any():
         raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
     ranges = Ranges.of(front) if ranges is None else ranges
@@ -132,7 +131,6 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
         columns.append(np.where(follows, found, np.nan))
     excess = np.max([stage.excess(J) for stage in stages], axis=0)
     excess = np.where(excess <= SLACK, 0.0, excess)
-    confirmed = feasible & ~(front.was_simulated & ~front.verified)
     kind = np.where(confirmed, 0, np.where(feasible, 1, 2))
     with np.errstate(invalid="ignore"):
         tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)

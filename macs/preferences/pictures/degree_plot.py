@@ -66,7 +66,7 @@ def draw_degrees(
         ax.grid(False, axis="x")
         if smaller:
             shade_degrees(ax, 1.1 * top)
-            ax.set_ylim(0.0, max(5.5, 1.1 * top))
+            ax.set_ylim(0.0, max(6.0, 1.1 * top))
             ax.grid(False)
             ax.set_yticks(range(6))
         else:

@@ -55,9 +55,7 @@ def _scatter(front: Any, place: np.ndarray, met: np.ndarray, ax: Any) -> None:
     ax.scatter(x[best], y[best], s=130, facecolors="none", edgecolors=BEST, linewidths=1.6, zorder=4, label=f"best (#{best})")
     ax.legend(frameon=True, framealpha=0.85, edgecolor="none", loc="best")
     if met.any():
-        bar = ax.figure.colorbar(drawn, ax=ax, label="rank", pad=0.02)
-        bar.outline.set_visible(False)
-        bar.ax.invert_yaxis()
+        _bar(drawn, len(place), ax)
     ax.set_xlabel("rank" if J.shape[1] == 1 else better(front.goals[0]))
     ax.set_ylabel(better(front.goals[-1]))
 
@@ -84,9 +82,7 @@ def _parallel(front: Any, place: np.ndarray, met: np.ndarray, ax: Any) -> None:
             hollow = True
     ax.plot(height[best], color=BEST, lw=2.2, marker="o", ms=4, label=f"best (#{best})", zorder=4)
     ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-    bar = ax.figure.colorbar(ScalarMappable(norm, shade), ax=ax, label="rank", pad=0.02)
-    bar.outline.set_visible(False)
-    bar.ax.invert_yaxis()
+    _bar(ScalarMappable(norm, shade), len(place), ax)
     for k, goal in enumerate(front.goals):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
         ax.text(k, 1.015, f"{goal.sign * low[k] + 0.0:.4g}", ha="center", va="bottom", fontsize=8)
@@ -99,3 +95,11 @@ def _parallel(front: Any, place: np.ndarray, met: np.ndarray, ax: Any) -> None:
     ax.tick_params(length=0)
     for side in ("left", "bottom"):
         ax.spines[side].set_visible(False)
+
+
+def _bar(drawn: Any, count: int, ax: Any) -> None:
+    """The scale of ranks, the best at the top."""
+    ticks = np.unique(np.linspace(1, count, 6).round())
+    bar = ax.figure.colorbar(drawn, ax=ax, label="rank", pad=0.02, ticks=ticks)
+    bar.outline.set_visible(False)
+    bar.ax.invert_yaxis()
