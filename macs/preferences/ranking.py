@@ -156,7 +156,7 @@ def _message(stages: Sequence[Stage], J: np.ndarray, exceeded: bool, unconfirmed
     if exceeded:
         most = [(np.min(stage.excesses(J), axis=0), stage.limit_names) for stage in stages]
         never = [name for least, names in most for value, name in zip(least, names, strict=True) if value > SLACK]
-        parts.append(f"No point meets {'; none has ' + ', nor '.join(never) if never else 'all hard limits together'}.")
+        parts.append(f"No point meets all hard limits{'; none has ' + ', nor '.join(never) if never else ' together'}.")
     if unconfirmed:
         parts.append("No point was confirmed by a simulation.")
     return " ".join(parts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -33,7 +35,7 @@ def mean(fuzzy: FuzzyFunction, J: float, centre: float) -> float:
         return np.exp(top - ((t - centre) / d) ** 2)
 
     def integral(f) -> float:
-        return sum(quad(f, a, b, epsabs=0, epsrel=1e-13, limit=200)[0] for a, b in zip(cuts[:-1], cuts[1:], strict=True))
+        return sum(quad(f, a, b, epsabs=0, epsrel=1e-13, limit=200)[0] for a, b in pairwise(cuts))
 
     return integral(lambda t: weight(t) * fuzzy.crisp(t)) / integral(weight)
 
@@ -58,7 +60,7 @@ def test_quadrature(one, spread):
 def test_steep_ideal_sides():
     """One range is so narrow that beta is in the hundreds, and the ideal side falls by e in a small part of the spread."""
     fuzzy = FuzzyPhysicalProgramming({"J": Smaller(1, 1.003, 3, 3.2, 5)}, spread=0.1).fuzzy_functions["J"]
-    assert max(piece.steepness for piece in fuzzy.crisp.pieces) * fuzzy.spread > 100
+    assert fuzzy.crisp.pieces[0].formula.steepness * fuzzy.spread > 100
     for J in (1.0, 1.05, 1.2, 0.999, 0.99, 0.75, 0.70):
         assert fuzzy(J) == pytest.approx(mean(fuzzy, J, J), rel=1e-8)
 
@@ -68,8 +70,7 @@ def test_as_printed_it_jumps_half_way_between_boundaries():
     classes = {name: Smaller(1, 2, 3, 4, 5) for name in "abcd"}
     printed = FuzzyPhysicalProgramming(classes, spread=0.1, printed=True).fuzzy_functions["a"]
     ours = FuzzyPhysicalProgramming(classes, spread=0.1).fuzzy_functions["a"]
-    assert [round(float(printed(J)), 2) for J in (3.5 - 1e-9, 3.5 + 1e-9)] == [3.68, 9.0]
-    assert float(printed(3.5 + 1e-9)) == pytest.approx(9.005, abs=1e-3)
+    assert [round(float(printed(J)), 2) for J in (3.5 - 1e-9, 3.5 + 1e-9)] == [3.68, 9.01]
     assert round(float(printed.crisp(3.5)), 2) == 6.03
     assert float(ours(3.5 + 1e-9)) == pytest.approx(float(ours(3.5 - 1e-9)), rel=1e-7)
 
@@ -92,14 +93,14 @@ def test_tends_to_the_crisp_one_with_the_square_of_the_spread(one):
     crisp = PhysicalProgramming({"J": one}).functions["J"]
     marks = [mark for mark, _ in crisp.boundaries]
     J = np.union1d(np.linspace(marks[0] - 1, marks[-1] + 1, 400), marks)
-    off = []
-    for spread in (1e-2, 1e-3, 1e-4):
-        fuzzy = FuzzyPhysicalProgramming({"J": one}, spread={"J": spread}).fuzzy_functions["J"]
+    off, gap = [], np.diff(marks).min()
+    for part in (1e-1, 1e-2, 1e-3):
+        fuzzy = FuzzyPhysicalProgramming({"J": one}, spread={"J": part * gap}).fuzzy_functions["J"]
         off.append(np.abs(fuzzy(J) / crisp(J) - 1).max())
     # At a kink of the second derivative, too: it takes its mean there.
     assert off[1] < 0.02 * off[0]
     assert off[2] < 0.02 * off[1]
-    assert off[2] < 1e-4
+    assert off[2] < 1e-3
 
 
 @pytest.mark.parametrize("one", CLASSES, ids=repr)
