@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class FuzzyGoal(Preference):
     targets: Mapping[str, Target]
     tolerances: Mapping[str, float] | None = None
     aggregate: str = "min"
+
+    DEGREE: ClassVar[str] = "membership"
 
     def __post_init__(self) -> None:
         targets = named_targets(self.targets)

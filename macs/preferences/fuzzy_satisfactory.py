@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -48,6 +49,8 @@ class FuzzySatisfactory(Preference):
     priorities: Sequence[str | Sequence[str]]
     regulating: float = 0.1
     ordered: bool = False
+
+    DEGREE: ClassVar[str] = "membership"
 
     def __post_init__(self) -> None:
         targets = named_targets(self.targets) if self.targets else {}

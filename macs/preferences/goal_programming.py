@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class GoalProgramming(Preference):
     targets: Mapping[str, Target]
     weights: Mapping[str, float] | None = None
     priorities: Sequence[str | Sequence[str]] | None = None
+
+    DEGREE: ClassVar[str] = "degree (1: target met)"
 
     def __post_init__(self) -> None:
         targets = named_targets(self.targets)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -54,6 +55,8 @@ class Nimbus(Preference):
     until: Mapping[str, float] | None = None
     free: Sequence[str] = ()
     augmentation: float = AUGMENTATION
+
+    DEGREE: ClassVar[str] = "part of what was asked for"
 
     def __post_init__(self) -> None:
         given = self.current.objectives if isinstance(self.current, Point) else self.current

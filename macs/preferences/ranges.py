@@ -41,6 +41,8 @@ class Ranges:
     def of(cls, front: Points) -> Ranges:
         """The ranges of a front, or of a payoff table: the best and the worst values over its feasible, non-dominated points.
 
+        Points that a simulation did not confirm do not count, unless there are no others.
+
         Raises
         ------
         ValueError
@@ -48,9 +50,10 @@ class Ranges:
         """
         if not isinstance(front, Points):
             raise ValueError(f"ranges are those of a front or a payoff table, not of {front!r}")
-        F = front.F[(front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)]
-        if not len(F):
+        feasible, confirmed = usable(front)
+        if not feasible.any():
             raise ValueError(f"the front has no feasible point, so that it has no ranges{f': {front.message}' if front.message else ''}")
+        F = front.F[confirmed if confirmed.any() else feasible]
         F = F[nondominated(F)]
         best, worst = (F.min(axis=0) * front.signs + 0.0, F.max(axis=0) * front.signs + 0.0)
         return cls(dict(zip(front.names, best.tolist(), strict=True)), dict(zip(front.names, worst.tolist(), strict=True)))
@@ -92,3 +95,9 @@ class Ranges:
         if low < high and not low - slack <= value <= high + slack:
             best, worst = shown(self.best[goal.name], goal), shown(self.worst[goal.name], goal)
             raise ValueError(f"{what} of '{goal.name}', {shown(value, goal)}, lies beyond its range: best {best}, worst {worst}")
+
+
+def usable(front: Points) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (n,) of the feasible points, and of those among them that no simulation contradicts."""
+    feasible = (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)
+    return feasible, feasible & ~(front.was_simulated & ~front.verified)

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..evaluation.evaluator import CONVERGED
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import counted, numbers, text_table
-from .ranges import Ranges
+from .ranges import Ranges, usable
 from .stage import ATTAINED, SLACK, Stage
 
 if TYPE_CHECKING:
@@ -99,15 +98,27 @@ class Ranking:
         return "\n".join([*lines, *(["", self.message] if self.message else [])])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Axes with the front, its points coloured by rank, and the best marked."""
-        raise NotImplementedError
+        """Axes with the front, its points coloured by rank, and the best marked: two objectives as a scatter plot, more as parallel
+        coordinates. Points that exceed a hard limit are hollow, or broken lines."""
+        from .pictures.ranking_plot import draw_ranking
+
+        return draw_ranking(self.front, self.order, self.values, self.preference.title, ax)
+
+    def plot_degrees(self, count: int = 3, ax: Axes | None = None) -> Axes:
+        """Axes with the degrees of the best points as bars side by side."""
+        rows = [int(i) for i in self.order[:count]]
+        return self.preference.plot_degrees({f"rank {k + 1} (#{i})": self.front[i] for k, i in enumerate(rows)}, self.ranges, ax)
+
+    def plot_functions(self, figure: Any = None) -> np.ndarray:
+        """Axes, one for each objective, with what the preference makes of it, the points of the front on it, and the best marked."""
+        return self.preference.plot_functions(self.front, self.ranges, self.best.index, figure)
 
 
 def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Ranking:
     """The points of a front in the order of a preference; see `Preference.rank`."""
     if not isinstance(front, Points):
         raise ValueError(f"a front is ranked, not {front!r}")
-    feasible = (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)
+    feasible, confirmed = usable(front)
     if not feasible.any():
         raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
     ranges = Ranges.of(front) if ranges is None else ranges
@@ -120,7 +131,6 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
         columns.append(np.where(follows, found, np.nan))
     excess = np.max([stage.excess(J) for stage in stages], axis=0)
     excess = np.where(excess <= SLACK, 0.0, excess)
-    confirmed = feasible & ~(front.was_simulated & ~front.verified)
     kind = np.where(confirmed, 0, np.where(feasible, 1, 2))
     with np.errstate(invalid="ignore"):
         tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)
@@ -146,7 +156,7 @@ def _message(stages: Sequence[Stage], J: np.ndarray, exceeded: bool, unconfirmed
     if exceeded:
         most = [(np.min(stage.excesses(J), axis=0), stage.limit_names) for stage in stages]
         never = [name for least, names in most for value, name in zip(least, names, strict=True) if value > SLACK]
-        parts.append(f"No point meets {'; none has ' + ', nor '.join(never) if never else 'all hard limits together'}.")
+        parts.append(f"No point meets all hard limits{'; none has ' + ', nor '.join(never) if never else ' together'}.")
     if unconfirmed:
         parts.append("No point was confirmed by a simulation.")
     return " ".join(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,6 +42,8 @@ class ReferencePoint(Preference):
     aspiration: Mapping[str, float]
     reservation: Mapping[str, float] | None = None
     augmentation: float = AUGMENTATION
+
+    DEGREE: ClassVar[str] = "degree (1: aspiration, 0: reservation)"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "aspiration", named_numbers(self.aspiration, "the aspiration"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ class WeightedSum(Preference):
     """
 
     weights: Mapping[str, float]
+
+    DEGREE: ClassVar[str] = "degree (1: best, 0: worst)"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", named_weights(self.weights))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,8 +17,11 @@ from ..operands import log10
 from ..preference import Preference
 from ..ranges import Ranges
 from ..stage import Operand, Stage
-from .classes import ObjectiveClass
+from .classes import NAMES, ObjectiveClass
 from .spline import PreferenceFunction, preference_functions
+
+CRISP, FUZZY = "preference function", "fuzzy preference function"
+"""Words of legends."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,7 +47,8 @@ class PhysicalProgramming(Preference):
     beta: float = 1.5
 
     DEGREE: ClassVar[str] = "degree"
-    LEVELS: ClassVar[tuple[float, ...]] = (1.0, 2.0, 3.0, 4.0, 5.0)
+    SMALLER: ClassVar[bool] = True
+    MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(NAMES))
 
     def __post_init__(self) -> None:
         classes = named(self.classes, "classes")
@@ -95,3 +99,19 @@ class PhysicalProgramming(Preference):
         for name, place in self._places(goals).items():
             result[:, place] = self.classes[name].degree(J[:, place])
         return result
+
+    def _curve_label(self) -> str:
+        return "preference"
+
+    def _curves(self, goals: Sequence[Objective], ranges: Ranges) -> list[Any]:
+        from ..pictures.function_plot import Curve
+
+        found, minimised = self._places(goals), self.minimised()
+        curves = []
+        for name, crisp in self.functions.items():
+            marks = [boundary for boundary, _ in crisp.boundaries]
+            margin = 0.08 * (marks[-1] - marks[0])
+            shown = ((FUZZY, minimised[name]), (CRISP, crisp)) if minimised[name] is not crisp else ((CRISP, crisp),)
+            goal = goals[found[name]]
+            curves.append(Curve(goal, found[name], shown, marks[0] - margin, marks[-1] + margin, tuple(marks), self.classes[name].degree))
+        return curves

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..operands import clipped, exp, greatest, least
 from ..stage import Operand
-from .spline import PreferenceFunction
+from .spline import Ideal, PreferenceFunction
 
 WIDTH = 3.0
 """The Gaussian is cut off at so many spreads."""
@@ -63,10 +63,11 @@ class FuzzyFunction:
             begin = clipped(J + self.spread * low, piece.lower, piece.upper)
             end = clipped(J + self.spread * high, piece.lower, piece.upper)
             panels = 1
-            if piece.steepness:
-                depth = DEEP / piece.steepness
+            if isinstance(piece.formula, Ideal):
+                steepness = piece.formula.steepness
+                depth = DEEP / steepness
                 begin, end = (greatest(begin, end - depth), end) if math.isinf(piece.lower) else (begin, least(end, begin + depth))
-                panels += int(min(DEEP, 2.0 * WIDTH * self.spread * piece.steepness) / PANEL)
+                panels += int(min(DEEP, 2.0 * WIDTH * self.spread * steepness) / PANEL)
             for place, part in _nodes(panels):
                 t = begin + (end - begin) * place
                 total = total + part * (end - begin) / self.spread * weight((t - J) / self.spread) * piece.formula(t)

@@ -6,7 +6,7 @@ The sign of eq. (23) is mended: A_1(xi) = -xi^4/2 + (xi - 1)^4/2 + 2 xi - 1/2, w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,14 +75,64 @@ def raised_beta(classes: Sequence[ObjectiveClass], beta: float) -> float:
 
 
 @dataclass(frozen=True)
+class Spline:
+    """Eq. (20): from p0 with slope s0 at `begin` to p1 with slope s1 at `end`, slopes along this way."""
+
+    begin: float
+    end: float
+    p0: float
+    p1: float
+    s0: float
+    s1: float
+
+    def __call__(self, J: Operand) -> Operand:
+        # Outside of its range the formula is not used; it is cut off there, so that it remains finite.
+        length = abs(self.end - self.begin)
+        xi = clipped((J - self.begin) / (self.end - self.begin), -1.0, 2.0)
+        up4, down4 = xi**4, (xi - 1.0) ** 4
+        a0 = 0.5 * up4 - 0.5 * down4 - 2.0 * xi + 1.5
+        a1 = -0.5 * up4 + 0.5 * down4 + 2.0 * xi - 0.5
+        b0 = length * (0.125 * up4 - 0.375 * down4 - 0.5 * xi + 0.375)
+        b1 = length * (0.375 * up4 - 0.125 * down4 - 0.5 * xi + 0.125)
+        return a0 * self.p0 + a1 * self.p1 + b0 * self.s0 + b1 * self.s1
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """z_1 exp(slope (J - J_1) / z_1) on the ideal side of J_1."""
+
+    first: float
+    value: float
+    slope: float
+
+    @property
+    def steepness(self) -> float:
+        """Slope over value."""
+        return abs(self.slope) / self.value
+
+    def __call__(self, J: Operand) -> Operand:
+        return self.value * exp(clipped(self.slope / self.value * (J - self.first), DEEPEST, 1.0))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through a point."""
+
+    at: float
+    value: float
+    slope: float
+
+    def __call__(self, J: Operand) -> Operand:
+        return self.value + self.slope * (J - self.at)
+
+
+@dataclass(frozen=True)
 class Piece:
     """One formula of a preference function, which holds from `lower` to `upper`; one of them may be infinite."""
 
     lower: float
     upper: float
-    formula: Callable[[Operand], Operand]
-    steepness: float = 0.0
-    """Slope over value, of a piece that falls exponentially."""
+    formula: Spline | Ideal | Line
 
     def holds(self, x: Operand) -> Operand:
         """1 where the formula holds, else 0; each value belongs to one piece."""
@@ -126,57 +176,22 @@ def preference_functions(classes: Sequence[ObjectiveClass], beta: float) -> list
 
 def _function(one: ObjectiveClass, z: np.ndarray, beta: float) -> PreferenceFunction:
     flat = len(one.sides) > 1
-    pieces = []
-    for side in one.sides:
-        s, _ = slopes(z, side.lengths, flat)
-        pieces += _ranges(side, z, s)
-        if not flat:
-            pieces.append(_ideal(side, float(z[0]), float(s[0] / z[0])))
+    pieces = [piece for side in one.sides for piece in _pieces(side, z, slopes(z, side.lengths, flat)[0], flat)]
     if flat:
-        first = [side.boundaries[0] for side in one.sides]
-        if first[1] < first[0]:
-            pieces.append(Piece(first[1], first[0], lambda J: float(z[0]) + 0.0 * J))
-    marks = {value: float(level) for side in one.sides for value, level in zip(side.boundaries, z, strict=True)}
-    pieces.sort(key=lambda piece: piece.lower)
-    return PreferenceFunction(one, z, beta, tuple(pieces), tuple(sorted(marks.items())))
+        high, low = (side.boundaries[0] for side in one.sides)
+        if low < high:
+            pieces.append(Piece(low, high, Line(low, float(z[0]), 0.0)))
+    marks = {mark: float(level) for side in one.sides for mark, level in zip(side.boundaries, z, strict=True)}
+    return PreferenceFunction(one, z, beta, tuple(sorted(pieces, key=lambda piece: piece.lower)), tuple(sorted(marks.items())))
 
 
-def _ranges(side: Side, z: np.ndarray, s: np.ndarray) -> list[Piece]:
-    """The splines between the boundaries, and the line beyond the last."""
-    b, up = side.boundaries, side.direction
-    pieces = [
-        _piece(up, b[k], b[k + 1], _spline(up, b[k], b[k + 1], float(z[k]), float(z[k + 1]), float(s[k]), float(s[k + 1])))
-        for k in range(COUNT - 1)
+def _pieces(side: Side, z: np.ndarray, s: np.ndarray, flat: bool) -> list[Piece]:
+    """The splines between the boundaries, the line beyond the last, and, if the function is not flat there, the ideal side."""
+    b, up, p, steep = side.boundaries, side.direction, z.tolist(), s.tolist()
+    found: list[tuple[float, float, Spline | Ideal | Line]] = [
+        (b[k], b[k + 1], Spline(b[k], b[k + 1], p[k], p[k + 1], steep[k], steep[k + 1])) for k in range(COUNT - 1)
     ]
-    return [*pieces, _piece(up, b[-1], up * math.inf, lambda J: float(z[-1]) + float(s[-1]) * (up * (J - b[-1])))]
-
-
-def _ideal(side: Side, first: float, steepness: float) -> Piece:
-    """z_1 exp(s_1 (J - J_1) / z_1)."""
-    begin, up = side.boundaries[0], side.direction
-
-    def formula(J: Operand) -> Operand:
-        return first * exp(clipped(steepness * (up * (J - begin)), DEEPEST, 1.0))
-
-    return _piece(up, -up * math.inf, begin, formula, steepness)
-
-
-def _piece(up: float, begin: float, end: float, formula: Callable[[Operand], Operand], steepness: float = 0.0) -> Piece:
-    return Piece(begin, end, formula, steepness) if up > 0 else Piece(end, begin, formula, steepness)
-
-
-def _spline(up: float, begin: float, end: float, p0: float, p1: float, s0: float, s1: float) -> Callable[[Operand], Operand]:
-    """Eq. (20): from p0 with slope s0 to p1 with slope s1."""
-    length = up * (end - begin)
-
-    def formula(J: Operand) -> Operand:
-        # Outside of the range the formula is not used; it is cut off there, so that it remains finite.
-        xi = clipped((J - begin) / (end - begin), -1.0, 2.0)
-        up4, down4 = xi**4, (xi - 1.0) ** 4
-        a0 = 0.5 * up4 - 0.5 * down4 - 2.0 * xi + 1.5
-        a1 = -0.5 * up4 + 0.5 * down4 + 2.0 * xi - 0.5
-        b0 = length * (0.125 * up4 - 0.375 * down4 - 0.5 * xi + 0.375)
-        b1 = length * (0.375 * up4 - 0.125 * down4 - 0.5 * xi + 0.125)
-        return a0 * p0 + a1 * p1 + b0 * s0 + b1 * s1
-
-    return formula
+    found.append((b[-1], up * math.inf, Line(b[-1], p[-1], up * steep[-1])))
+    if not flat:
+        found.append((-up * math.inf, b[0], Ideal(b[0], p[0], up * steep[0])))
+    return [Piece(min(begin, end), max(begin, end), formula) for begin, end, formula in found]
