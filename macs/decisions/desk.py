@@ -21,7 +21,7 @@ from ..fronts.builders import OPTIMAL, certified, vectors_points
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
-from ..fronts.verified import VERIFY, objective_scales, verified
+from ..fronts.verified import VERIFY, objective_scales, unmarked, verified
 from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
@@ -87,7 +87,11 @@ class Desk:
                 self._end(str(reason))
             if self.stopped and not (self.known.status == CONVERGED).any():
                 self._end(self._reason())
-            self.ranges = Ranges.of(self.known) if self._given is None else self._given
+            if self._given is not None:
+                self.ranges = self._given
+            else:
+                # Without an end that its mesh makes a little too good, a payoff table would have no range.
+                self.ranges = Ranges.of(unmarked(self.known) if self._start is None else self.known)
             best, worst = self.ranges.ends(self.problem.goals)
             self._solver = StageSolver(self.problem, best, worst, self.solves, np.random.default_rng(self._seed))
             return task()

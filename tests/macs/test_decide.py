@@ -218,6 +218,12 @@ def test_goddard_between_time_and_speed() -> None:
     assert choice.value == pytest.approx((1 + 2e-4) * (T - 120) / 140, rel=1e-6)
 
 
+def test_an_end_that_its_mesh_makes_too_good_still_is_one() -> None:
+    # On this mesh the fastest ascent takes less than any real one, so that it is not verified.
+    choice = decide(load("goddard"), DFET(4, 6), WeightedSum({TIME: 1.0, SPEED: 1.0}))
+    assert choice.ranges.best[TIME] == pytest.approx(109.08, abs=0.01) and choice.ranges.worst[TIME] == pytest.approx(250.0)
+
+
 def test_peaks_of_the_user() -> None:
     # The front is (T, 16 / T^4), from 1 to 3.
     choice = decide(shuttle(), DFET(4, 2), ReferencePoint({"time": 1.5}))
