@@ -168,6 +168,10 @@ def test_figures_of_any_number_of_objectives(m, n):
     assert drawn(ranking.plot_degrees())
     limited = PhysicalProgramming({"f0": Smaller.even(-1.0, 0.5)}).rank(front)
     assert drawn(limited.plot())
+    doubtful = marked(front, [True] * (n - n // 2) + [False] * (n // 2))
+    ax = WeightedSum({"f0": 1.0}).rank(doubtful).plot()
+    assert drawn(ax)
+    assert ("not feasible or not verified" in ax.get_legend_handles_labels()[1]) == (n > 1)
 
 
 @pytest.mark.parametrize(
