@@ -6,6 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.optimize import brentq, minimize_scalar
 from smooth_problems import bryson_denham, corners, shuttle
 
@@ -14,12 +16,16 @@ from macs.decisions import (
     Around,
     Choice,
     FuzzyGoal,
+    FuzzyPhysicalProgramming,
     FuzzySatisfactory,
     GoalProgramming,
     Nimbus,
+    PhysicalProgramming,
     Preference,
+    Range,
     Ranges,
     ReferencePoint,
+    Smaller,
     WeightedSum,
     decide,
 )
@@ -136,6 +142,45 @@ def test_every_method_finds_its_optimum(preference: Preference, T: float, values
     # On the front, and known to be there.
     assert choice.objectives["effort"] == pytest.approx(effort(choice.objectives["time"]), rel=1e-7)
     assert choice.point.optimality < 1e-6 and choice.point.verified and choice.point.status == "converged"
+
+
+EFFORTS, TIMES = Smaller(5, 10, 15, 25, 50), Smaller(0.6, 0.8, 1.0, 1.3, 2.0)
+RANGED = Range(2, 5, 8, 10, 12, 14, 16, 20, 30, 40)
+PHYSICAL = [
+    PhysicalProgramming({"effort": EFFORTS, "time": TIMES}),
+    PhysicalProgramming({"effort": RANGED, "time": TIMES}),
+    FuzzyPhysicalProgramming({"effort": EFFORTS, "time": TIMES}, spread={"effort": 2.0, "time": 0.1}),
+]
+
+
+@pytest.mark.parametrize("preference", PHYSICAL, ids=["crisp", "range", "fuzzy"])
+def test_physical_programming_finds_its_optimum(preference: PhysicalProgramming) -> None:
+    (stage,) = preference.stages(cart().compile().goals, RANGES)
+    # On a grid, and then between its best neighbours: the value has several valleys.
+    T = np.linspace(0.62, 1.9, 2001)
+    k = int(np.argmin(stage.numbers(np.stack([12 / T**3, T], axis=1))))
+    truth = minimize_scalar(
+        lambda T: float(stage.numbers(np.array([[12 / T**3, T]]))[0]),
+        bounds=(T[k - 1], T[k + 1]),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
+    choice = decide(cart(), MESH, preference, start=ends(), ranges=RANGES)
+    assert choice.message == "" and choice.value == pytest.approx(truth.fun, rel=1e-6, abs=1e-9)
+    assert choice.objectives["time"] == pytest.approx(truth.x, rel=1e-5) and choice.point.optimality < 1e-6
+    # Neither end is within the hard limits: the first step finds a point that is.
+    assert [step.name for step in choice.history] == ["largest excess over hard limits", stage.name]
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(weight=st.floats(-3, 3), wide=st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
+def test_any_weights_in_any_ranges(weight: float, wide: tuple[float, float]) -> None:
+    e, t = WIDE_E * 10 ** wide[0], WIDE_T * 10 ** wide[1]
+    ranges = Ranges({"effort": 12 / 64, "time": 0.5}, {"effort": 12 / 64 + e, "time": 0.5 + t})
+    choice = decide(cart(), MESH, WeightedSum({"effort": 10**weight, "time": 1.0}), ranges=ranges, start=ends())
+    T = min(max(balanced(10**weight / e, 1 / t), 0.5), 4.0)
+    truth = 10**weight * (effort(T) - 12 / 64) / e + (T - 0.5) / t
+    assert choice.value == pytest.approx(truth, rel=1e-6, abs=1e-7 * (1 + 10**weight * WIDE_E / e + WIDE_T / t))
 
 
 @pytest.mark.parametrize("first", ["effort", "time"])
