@@ -111,6 +111,8 @@ class Valued:
     def lifted(self, variables: Sequence[Variable], places: Sequence[Variable], Z: np.ndarray, F: np.ndarray) -> np.ndarray:
         """Vectors (k, n') of the problem, of the variables `places`, from vectors Z (k, n) of the original, of `variables`, with objectives
         F (k, m), all minimised."""
+        if not len(Z):
+            return np.empty((0, len(places)))
         own = {v.name: column for v, column in zip(variables, np.asarray(Z).T, strict=True)}
         values = np.array(self.follow((F * self.original.signs).T)).reshape(len(self.further), len(Z))
         own |= {v.name: np.clip(row, v.lower, v.upper) for v, row in zip(self.further, values, strict=True)}

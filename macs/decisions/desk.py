@@ -17,7 +17,7 @@ from transcription.meshed import Meshed
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import OPTIMAL, certified, vectors_points
+from ..fronts.builders import OPTIMAL, certified, nearest_violation, vectors_points
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
@@ -85,8 +85,11 @@ class Desk:
                 self.known = self._ends() if self._start is None else self._start
             except Stopped as reason:
                 self._end(str(reason))
-            if self.stopped and not (self.known.status == CONVERGED).any():
-                self._end(self._reason())
+            if not (self.known.status == CONVERGED).any():
+                if self.stopped:
+                    self._end(self._reason())
+                if self._given is None and self.known.closest is not None:
+                    raise ValueError(f"no feasible point is known, and so no ranges; {nearest_violation(self.known.closest)}")
             if self._given is not None:
                 self.ranges = self._given
             else:
@@ -146,7 +149,7 @@ class Desk:
         said = [message]
         if chosen is not found and not message:
             said.append("no better point was found than the best that was known")
-        if chosen.verified is False:
+        if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
         if chosen is found and not message and (chosen.optimality or 0.0) > OPTIMAL:
             said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
@@ -194,7 +197,9 @@ class Desk:
             value = self._noted(preference, stage, reached, about)
             if reached.status != CONVERGED:
                 # What the stages before attained stands.
-                return self._point(outcome if kept and outcome is not None else reached), f"{stage.name}: {reached.note}"
+                point = self._point(outcome if kept and outcome is not None else reached)
+                missed = f"; {nearest_violation(point)}" if point.violation > self.solves.tolerance else ""
+                return point, f"{stage.name}: {reached.note}{missed}"
             outcome = reached
             kept.append(Kept(stage, value))
         assert outcome is not None

@@ -69,3 +69,14 @@ def test_black_boxes_and_other_problems_are_refused() -> None:
         decide(two_wells(), MESH, WeightedSum({"from left": 1.0}), start=ends())
     with pytest.raises(ValueError, match="satisfy takes a FuzzySatisfactory"):
         satisfy(cart(), MESH, TIME)  # type: ignore[arg-type]
+
+
+def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
+    problem = two_wells()
+    problem.constraint("beyond", problem.parameters["p"], lower=3.0)
+    with pytest.raises(ValueError, match="no ranges; the nearest violates constraint 'beyond'"):
+        decide(problem, MESH, WeightedSum({"from left": 1.0}))
+    both = {"from left": 0.0, "from right": 0.0}, {"from left": 1.0, "from right": 1.0}
+    choice = decide(problem, MESH, WeightedSum({"from left": 1.0}), ranges=Ranges(*both))
+    assert choice.point.status != "converged" and choice.history[0].status != "converged"
+    assert "the nearest violates constraint 'beyond'" in choice.message
