@@ -7,7 +7,7 @@ maximum, which constraints tie to what they stand for; the function is one of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, Protocol
@@ -110,12 +110,13 @@ class Valued:
 
     def lifted(self, variables: Sequence[Variable], places: Sequence[Variable], Z: np.ndarray, F: np.ndarray) -> np.ndarray:
         """Vectors (k, n') of the problem, of the variables `places`, from vectors Z (k, n) of the original, of `variables`, with objectives
-        F (k, m), all minimised."""
+        F (k, m), all minimised. What follows from an objective that is no number is in the middle of its range."""
         if not len(Z):
             return np.empty((0, len(places)))
         own = {v.name: column for v, column in zip(variables, np.asarray(Z).T, strict=True)}
         values = np.array(self.follow((F * self.original.signs).T)).reshape(len(self.further), len(Z))
-        own |= {v.name: np.clip(row, v.lower, v.upper) for v, row in zip(self.further, values, strict=True)}
+        for v, row in zip(self.further, values, strict=True):
+            own[v.name] = np.clip(np.where(np.isnan(row), 0.5 * (v.lower + v.upper), row), v.lower, v.upper)
         return np.array([own[v.name] for v in places]).T.reshape(len(Z), len(places))
 
     def dropped(self, places: Sequence[Variable], variables: Sequence[Variable], z: np.ndarray) -> np.ndarray:
@@ -224,13 +225,15 @@ class _Program:
         wide = WIDER * np.where(high > low, high - low, 1.0)
         self.names = tuple(problem.goals[i].name for i in used)
         self.exactly = [problem.goals[i].name for i in used if not rising[i]]
+        taken = {v.name for v in problem.parameters}
         self.further = (
             *(
-                Variable(f"value of {problem.goals[i].name}", box.lower[i], box.upper[i], problem.goals[i].unit, box.scales[i])
-                for i in used
+                Variable(_new(f"value of {goal.name}", taken), box.lower[i], box.upper[i], goal.unit, box.scales[i])
+                for i, goal in enumerate(problem.goals)
+                if i in used
             ),
             *(
-                Variable(f"maximum {k}", low[k] - wide[k], high[k] + wide[k], "", float(np.ptp(inner[k])) or wide[k])
+                Variable(_new(f"maximum {k}", taken), low[k] - wide[k], high[k] + wide[k], "", float(np.ptp(inner[k])) or wide[k])
                 for k in range(len(flat))
             ),
         )
@@ -274,6 +277,11 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
         peaks=widened(phase.peaks),
         sizes=widened(phase.sizes),
     )
+
+
+def _new(name: str, taken: Container[str]) -> str:
+    """A name that is not taken."""
+    return name if name not in taken else _new(f"{name}'", taken)
 
 
 def _rising(J: Sequence[ca.MX], rows: Sequence[ca.MX], box: Box, signs: np.ndarray) -> np.ndarray:

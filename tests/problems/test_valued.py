@@ -64,6 +64,19 @@ def test_vectors_go_there_and_back() -> None:
             assert violations["constraint 'limit of aim'"] == pytest.approx(max(f[1] - 5.0, 0.0))
 
 
+def test_names_and_numbers_of_the_user_are_no_obstacle() -> None:
+    problem = two_wells()
+    problem.parameter("value of from left", bounds=(-1, 1))
+    problem.parameter("maximum 0", bounds=(-1, 1))
+    derived = valued(problem.compile(), AIM, box([0.0, 0.0], [1.0, 1.0]))
+    names = [v.name for v in derived.problem.parameters]
+    assert len(set(names)) == len(names) == 7
+    own, nlp, Z, there = lifted(derived, DFET(2, 2), np.random.default_rng(0))
+    assert (derived.dropped(nlp.variables, own.variables, there[0]) == Z[0]).all()
+    assert np.isfinite(derived.lifted(own.variables, nlp.variables, Z, np.full((len(Z), 2), np.nan))).all()
+    assert derived.lifted(own.variables, nlp.variables, Z[:0], np.empty((0, 2))).shape == (0, len(nlp.variables))
+
+
 def test_what_rises_is_bounded_and_what_does_not_is_equal() -> None:
     rows = {limit.name: (limit.lower, limit.upper) for limit in two_wells_valued().problem.limits}
     assert rows["objective 'from left'"] == rows["objective 'from right'"] == (-np.inf, 0.0)
