@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rest_to_rest import MESH, RANGES, cart, ends
 from smooth_problems import two_wells
-from test_decide import MESH, RANGES, cart, ends
 
 from macs import MACS
 from macs.decisions import Nimbus, Ranges, ReferencePoint, WeightedSum, decide, satisfy

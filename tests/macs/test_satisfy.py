@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rest_to_rest import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, both, cart, ends
 from scipy.optimize import brentq
-from test_decide import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, both, cart, ends
 
 from macs.decisions import FuzzySatisfactory, Ranges, satisfy
 from problems import load
