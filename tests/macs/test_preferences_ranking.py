@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -200,6 +201,15 @@ def test_figures_of_any_preference(preference):
     heights = [patch.get_height() for patch in bars.patches if patch.get_width() < 0.8]
     shown = ranking.degrees[ranking.order[:2]]
     assert sorted(heights)[-1] == pytest.approx(np.nanmax(shown))
+
+
+def test_degrees_of_points_that_others_chose():
+    front, ranges = flights(4), Ranges.of(flights(4))
+    bars = EQUAL.plot_degrees({"first": front[0], "last": SimpleNamespace(point=front[3])}, ranges)
+    heights = [patch.get_height() for patch in bars.patches if patch.get_width() < 0.8]
+    assert heights == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert drawn(bars)
+    assert Nimbus(SimpleNamespace(point=front[1]), improve=["time"], free=["height"]).current == front[1].objectives
 
 
 def test_degrees_of_choices_are_of_one_problem():
