@@ -350,8 +350,8 @@ class MeshLoop:
         return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, near it and from others, and whether it is
-        an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it and from others, and whether it
+        is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
