@@ -1,0 +1,291 @@
+"""What a choice costs the others: how objectives trade off at one point of a front, to first order.
+
+The rates follow from the weights of the point, which are multipliers of its conditions of optimality. The matrix is that of Tappeta and
+others (AIAA Journal 38(5), 2000), eqs. (26)-(33) of Chai, Savvaris, Tsourdos and Xia (IEEE T. Aerospace and Electronic Systems 53(5),
+2017), where the outer product of eq. (31), which is singular, is replaced by dx = d_j (d_j'd_j)^-1 dJ_j, and the metric of the projection
+by one of the controls that does not depend on the mesh and on the scales of variables (`transcription.nlp.projection`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from problems.compiled import CompiledProblem, Objective
+from problems.derived import remembered
+from problems.problem import Problem
+from transcription import from_dict
+from transcription.nlp.projection import Projection, projection
+
+from ..fronts.point import Point
+from ..io.text import text_table
+from ..refinement.mesh_loop import Programs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OPTIMAL = 1e-2
+"""Largest part of the steepest gradient that the weighted sum of the gradients may keep at a point that is taken to be Pareto-optimal: then
+rates are right to about as much."""
+NOTHING = 1e-3
+"""Part of the steepest gradient below which an objective has none."""
+
+
+def trade_offs(point: Point, *, problem: Problem | CompiledProblem | None = None) -> TradeOffs:
+    """How the objectives trade off at a point of a front.
+
+    Parameters
+    ----------
+    point : Point
+        Of any solver; rates need its `weights`, or its problem, and the matrix its problem.
+    problem : Problem, optional
+        The problem of the point. Default: the one that its front knows, or finds when it is first needed.
+
+    Returns
+    -------
+    TradeOffs
+
+    Raises
+    ------
+    ValueError
+        If the point has neither weights nor a trajectory, as those of black boxes, or `problem` is another one.
+    """
+    if point.source is None:
+        raise ValueError(f"point {point.index} is of a black box: without derivatives there are no trade-offs")
+    if point.weights is None and (point.trajectory is None or not np.isfinite(point.F).all()):
+        raise ValueError(f"point {point.index} has no trajectory: its status is '{point.status}'")
+    if len(point.goals) < 2:
+        raise ValueError(f"point {point.index} has one objective, '{point.goals[0].name}': there is nothing to trade it for")
+    return TradeOffs(point, None if problem is None else point.source.check(problem, f"point {point.index}"))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TradeOffs:
+    """How the objectives trade off at one point, to first order. Numbers are in the user's units and senses; objectives are given by name
+    or by number.
+
+    What needs the problem is computed when it is first asked for.
+
+    Attributes
+    ----------
+    point : Point
+    problem : CompiledProblem or None
+        None: the one that the front of the point knows, or finds.
+    """
+
+    point: Point
+    problem: CompiledProblem | None = None
+
+    def __repr__(self) -> str:
+        return f"<TradeOffs of point {self.point.index}: {self.point.title}>"
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """The objectives."""
+        return self.point.goals
+
+    @cached_property
+    def weights(self) -> dict[str, float]:
+        """The weights of the objectives, all minimised, in the sum of which the point is a least: not negative, of sum 1 in their own units.
+
+        Those of the point, or where it has none those that leave least of the gradients.
+
+        Raises
+        ------
+        ValueError
+            Where the point has none and they cannot be computed, or it is not Pareto-optimal.
+        """
+        if self.point.weights is not None:
+            return self.point.weights
+        if self.left > OPTIMAL:
+            raise ValueError(f"point {self.point.index} is not on a front, so that there are no rates along one: {self._not_optimal}")
+        w = self._projection.weights / self._projection.scales
+        return dict(zip((goal.name for goal in self.goals), (w / w.sum()).tolist(), strict=True))
+
+    @property
+    def rates(self) -> np.ndarray:
+        """All rates (m, m), see `rate`."""
+        return rates(np.array(list(self.weights.values())), self._signs)
+
+    def rate(self, i: str | int, j: str | int) -> float:
+        """dJ_i/dJ_j along the front, the other objectives held: -w_j/w_i for minimised objectives. Of two, it is the front's slope.
+
+        It is infinite where objective i has weight 0, as the others have at the end of a front, and not a number where both have.
+
+        Raises
+        ------
+        ValueError
+            If there is no such objective, and as for `weights`.
+        """
+        return float(self.rates[self._number(i), self._number(j)])
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """The trade-off matrix (m, m): row i has dJ_k/dJ_i along the direction in which objective i gets better fastest while what is
+        active stays so.
+
+        Of two objectives it has the rates; of more, the others are not held, and the direction depends on how variations are measured: see
+        `transcription.nlp.projection`. For minimised objectives (signs of those in other senses are the user's) a negative entry says
+        that k gets worse while i gets better, a positive one that both get better. A row of an objective that can get no better along what
+        is active is not a number.
+
+        Raises
+        ------
+        ValueError
+            If the problem is not at hand, or the derivatives are no numbers.
+        """
+        return np.outer(self._signs, self._signs) * self._minimised
+
+    @property
+    def directions(self) -> np.ndarray:
+        """The directions (m, n) of the matrix: variations of the point's decision vector in the user's units, to first order, by which
+        objective i gets better by one unit. Not numbers where the row of the matrix is none.
+
+        Raises
+        ------
+        ValueError
+            As for `matrix`.
+        """
+        found = self._projection
+        size = np.where(self._fixed, np.nan, np.diag(found.gram) * found.scales)
+        return found.descents / size[:, None]
+
+    @property
+    def left(self) -> float:
+        """How much the weighted sum of the projected gradients keeps of the steepest one: 0 at a Pareto-optimal point.
+
+        Raises
+        ------
+        ValueError
+            As for `matrix`.
+        """
+        found = self._projection
+        if self.point.weights is None:
+            return found.left(found.weights)
+        weights = np.array(list(self.point.weights.values())) * found.scales
+        return found.left(weights / weights.sum())
+
+    @cached_property
+    def messages(self) -> tuple[str, ...]:
+        """What the projection says of the point: that it is not Pareto-optimal, which objectives can get better together with all others,
+        and which can get no better along what is active; or why there is none."""
+        try:
+            found = [f"not Pareto-optimal: {self._not_optimal}"] if self.left > OPTIMAL else []
+        except ValueError as reason:
+            return (f"no trade-off matrix: {reason}",)
+        names, fixed, m = [goal.name for goal in self.goals], self._fixed, len(self.goals)
+        for i in range(m):
+            if fixed[i]:
+                found.append(f"the row of '{names[i]}' is degenerate: along what is active it can get no better")
+            elif all(self._cosine(i, k) > OPTIMAL for k in range(m) if k != i):
+                found.append(f"the row of '{names[i]}' has no negative entry: it and all others can get better together")
+        return tuple(found)
+
+    def table(self) -> str:
+        """What all objectives change by when one gets better by one unit, as plain text: along the front with the others held, then where it
+        gets better fastest; and the `messages`."""
+        lines = [f"Trade-offs at point {self.point.index}: {self.point.title}", ""]
+        titles = ["one better in", *(goal.name for goal in self.goals)]
+        under = ["", *(f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in self.goals)]
+        flush = [True, *(False for _ in self.goals)]
+        try:
+            names, weights = list(self.weights), list(self.weights.values())
+            cells = [["weight", *(f"{value:.4g}" for value in weights)]]
+            cells += [[name, *row] for name, row in zip(names, _cells(self.rates.T, self._signs), strict=True)]
+            lines += ["Along the front, one other objective giving way and the rest held:", text_table([titles, under], cells, flush), ""]
+        except ValueError as reason:
+            lines += [f"No rates: {reason}", ""]
+        try:
+            rows = zip(self.goals, _cells(self.matrix, self._signs), strict=True)
+            table = text_table([titles, under], [[goal.name, *row] for goal, row in rows], flush)
+            lines += ["Where it gets better fastest, all others giving way:", table, ""]
+        except ValueError:
+            pass  # the messages have the reason
+        return "\n".join([*lines, *(f"{message[0].upper()}{message[1:]}." for message in self.messages)]).rstrip()
+
+    def plot(self, figure: object = None) -> Sequence[Axes]:
+        """Axes with what all objectives change by, in ranges of the front, when one gets better by a tenth of its own: along the front with
+        the others held; and, with the problem at hand, where it gets better fastest."""
+        from .trade_off_plots import draw_trade_offs
+
+        return draw_trade_offs(self, figure)
+
+    @property
+    def _signs(self) -> np.ndarray:
+        return np.array([goal.sign for goal in self.goals])
+
+    @property
+    def _minimised(self) -> np.ndarray:
+        """The matrix for minimised objectives."""
+        found = self._projection
+        gram = found.gram * np.outer(found.scales, found.scales)
+        T = gram / np.where(self._fixed, np.nan, np.diag(gram))[:, None]
+        np.fill_diagonal(T, 1.0)
+        return T
+
+    @property
+    def _fixed(self) -> np.ndarray:
+        """Mask (m,) of the objectives that can get no better along what is active."""
+        return self._projection.slopes <= NOTHING
+
+    @property
+    def _not_optimal(self) -> str:
+        share = f"{100 * self.left:.2g} % of the steepest gradient is left of the weighted sum of all (on a front less than {100 * OPTIMAL:g} %)"
+        violation = self.point.violation
+        return share + (f", and the point is not feasible (violation {violation:.1e})" if self.point.status != "converged" else "")
+
+    def _cosine(self, i: int, k: int) -> float:
+        """Of the angle between the projected gradients of two objectives; 0 where one has none."""
+        found = self._projection
+        size = found.slopes[i] * found.slopes[k] * found.steepest**2
+        return 0.0 if self._fixed[[i, k]].any() else float(found.gram[i, k] / size)
+
+    @cached_property
+    def _projection(self) -> Projection:
+        point = self.point
+        if point.trajectory is None or point.transcription is None:
+            raise ValueError(f"point {point.index} has no trajectory: its status is '{point.status}'")
+        try:
+            problem = self.problem or point.compiled()
+        except ValueError as reason:
+            raise ValueError(f"the gradients at point {point.index} need its problem, and {reason}") from None
+        nlp = _programs(problem)(from_dict(point.transcription))
+        found = projection(nlp, point.decision, point.ranges) if len(nlp.variables) == len(point.decision) else None
+        if found is None:
+            raise ValueError(f"the gradients of the objectives at point {point.index} are no numbers, or have no multipliers")
+        return found
+
+    def _number(self, objective: str | int) -> int:
+        names = [goal.name for goal in self.goals]
+        if isinstance(objective, str) and objective in names:
+            return names.index(objective)
+        if isinstance(objective, int | np.integer) and not isinstance(objective, bool) and 0 <= objective < len(names):
+            return int(objective)
+        raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
+
+
+def rates(weights: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """dJ_i/dJ_j (..., m, m) of objectives with weights (..., m), see `TradeOffs.rate`; `signs` (m,) are -1 for maximised ones."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = -np.outer(signs, signs) * (weights[..., None, :] / weights[..., :, None])
+    found[..., np.eye(len(signs), dtype=bool)] = 1.0
+    return found
+
+
+@remembered
+def _programs(problem: CompiledProblem) -> Programs:
+    """The NLPs of the latest points: those on meshes of their own have one each."""
+    return Programs(problem)
+
+
+def _cells(by_one: np.ndarray, signs: np.ndarray) -> list[list[str]]:
+    """What all objectives change by (m, m) as text, from derivatives by the objective of the row, when that gets better by one unit."""
+    return [[_signed(-sign * value) for value in row] for row, sign in zip(by_one, signs, strict=True)]
+
+
+def _signed(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value + 0.0:+.4g}"
