@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +13,12 @@ from problems.compiled import Objective
 from ..fronts.pictures.style import COLORS, GREY, STYLE, better, label, new_figure
 from ..fronts.points import Points
 
-if TYPE_CHECKING:
-    from .trade_offs import TradeOffs
-
 DASH = 0.05
 """Length of a dash that shows a slope, in widths of its axes."""
 WIDE = 30.0
 """Ratio of the largest and the smallest rate from which on they are drawn on a logarithmic axis."""
+BEYOND = 3.0
+"""Multiple of the largest slope of a chord up to which slopes at points are drawn."""
 STEPS = 0.1
 """How much better an objective gets, in ranges of the front, where a figure shows what that costs."""
 
@@ -31,7 +30,7 @@ def draw_rates(front: Points, rates: np.ndarray, figure: Any = None) -> Sequence
     m = len(front.goals)
     if m < 2:
         raise ValueError("a front of one objective has no trade-offs to draw")
-    if np.isnan(rates[:, 0, 1]).all() and m == 2 or not len(front):
+    if not len(front) or np.isnan(rates).all(axis=0)[0, 1]:
         raise ValueError("no point of the front has weights: those of gradient solves and of searches that use gradients have")
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         return _two(front, rates, figure) if m == 2 else _more(front, rates, figure)
@@ -49,14 +48,25 @@ def _two(front: Points, rates: np.ndarray, figure: Any) -> Sequence[Any]:
     distances = np.diff(x)
     chords = np.abs(np.diff(y) / np.where(distances > 0, distances, np.nan))
     below.step(x, np.append(chords, chords[-1:] if len(chords) else np.nan), where="post", color=GREY, lw=0.8, label="between neighbours")
-    sizes = np.where(np.isfinite(slopes) & (slopes != 0), np.abs(slopes), np.nan)
-    below.plot(x, sizes, "o", color=COLORS[1], ms=3.5, label="at the points")
-    if np.nanmax(sizes) > WIDE * np.nanmin(sizes):
-        below.set_yscale("log")
+    sizes = np.abs(slopes)
+    every = np.concatenate([chords, sizes])
+    usual = every[np.isfinite(every) & (every > 0)]
+    if len(usual):
+        wide = usual.max() > WIDE * usual.min()
+        # At the ends of a front slopes have no limit.
+        low, high = np.array([usual.min(), usual.max() if len(chords) < 2 else min(usual.max(), BEYOND * np.nanmax(chords))])
+        sizes = np.clip(sizes, low, high)
+        if wide:
+            below.set_yscale("log")
+    shown = np.abs(slopes) == sizes
+    below.plot(x[shown], sizes[shown], "o", color=COLORS[1], ms=3.5, label="at the points")
+    if (~shown & ~np.isnan(sizes)).any():
+        for marker, beyond in (("^", np.abs(slopes) > sizes), ("v", np.abs(slopes) < sizes)):
+            below.plot(x[beyond], sizes[beyond], marker, color=COLORS[1], ms=4.5, mfc="none", label="beyond" if marker == "^" else "")
     below.set_ylabel(_rate_label(goals[1], goals[0]))
     below.set_xlabel(better(goals[0]))
     below.legend(frameon=False)
-    above.set_title(_title(front), loc="left", color=GREY)
+    above.set_title(f"{_title(front)}; dashes: slopes at the points", loc="left", color=GREY)
     return [above, below]
 
 
@@ -93,23 +103,26 @@ def _dashes(ax: Any, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> None:
     ax.scatter(x[~known], y[~known], s=11, facecolors="none", edgecolors=GREY, linewidths=0.8, zorder=3)
 
 
-def draw_trade_offs(trade: TradeOffs, figure: Any = None) -> Sequence[Any]:
-    """See `TradeOffs.plot`."""
+def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapping[str, np.ndarray], figure: Any = None) -> Sequence[Any]:
+    """Axes with what all objectives change by when one gets better by a tenth of its range, or by one unit where it has none: a row for
+    each that gets better, darker where the change is more of a range; see `TradeOffs.plot`.
+
+    Parameters
+    ----------
+    goals, ranges : m objectives, array (m,)
+    tables : mapping
+        Derivatives (m, m) of all objectives by that of the row, by title.
+    figure : matplotlib Figure, optional
+    """
     import matplotlib
 
-    tables: list[tuple[str, np.ndarray]] = [("along the front, the rest held", trade.rates.T)]
-    try:
-        tables.append(("where it gets better fastest", trade.matrix))
-    except ValueError:
-        pass  # the problem is not at hand
-    goals, ranges = trade.goals, trade.point.ranges
-    steps = np.array([_round(STEPS * size) if size > 0 else 1.0 for size in np.nan_to_num(ranges)])
+    steps = np.array([_round(STEPS * size) if size > 0 else 1.0 for size in ranges])
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):  # type: ignore[arg-type]
         m = len(goals)
         figure = _sized(figure, 1.2 + len(tables) * (1.05 * m + 0.2) + 0.8, 0.55 * m + 1.3)
         axes = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
         signs = np.array([goal.sign for goal in goals])
-        for ax, (title, by_one) in zip(axes, tables, strict=True):
+        for ax, (title, by_one) in zip(axes, tables.items(), strict=True):
             changes = by_one * (-signs * steps)[:, None]
             worse = changes * signs / np.where(ranges > 0, ranges, np.abs(steps))
             ax.imshow(np.ma.masked_invalid(np.clip(worse, -0.5, 0.5)), cmap="PuOr_r", vmin=-0.5, vmax=0.5, aspect="auto", alpha=0.75)
@@ -133,7 +146,7 @@ def _round(value: float) -> float:
 
 
 def _rate_label(of: Objective, by: Objective) -> str:
-    units = f"{of.unit or '1'}/{by.unit or '1'}" if of.unit or by.unit else ""
+    units = f"{of.unit or '1'} per {by.unit or '1'}" if of.unit or by.unit else ""
     return label(f"rate of {of.name}\nby {by.name}", units)
 
 

@@ -9,6 +9,7 @@ by one of the controls that does not depend on the mesh and on the scales of var
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,7 +29,7 @@ from ..refinement.mesh_loop import Programs
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OPTIMAL = 1e-2
+OPTIMAL = 1e-3
 """Largest part of the steepest gradient that the weighted sum of the gradients may keep at a point that is taken to be Pareto-optimal: then
 rates are right to about as much."""
 NOTHING = 1e-3
@@ -90,7 +91,7 @@ class TradeOffs:
 
     @cached_property
     def weights(self) -> dict[str, float]:
-        """The weights of the objectives, all minimised, in the sum of which the point is a least: not negative, of sum 1 in their own units.
+        """The weights of the objectives, all minimised, of the sum that the point minimises: not negative, of sum 1 in their own units.
 
         Those of the point, or where it has none those that leave least of the gradients.
 
@@ -138,7 +139,9 @@ class TradeOffs:
         ValueError
             If the problem is not at hand, or the derivatives are no numbers.
         """
-        return np.outer(self._signs, self._signs) * self._minimised
+        falls = self._falls / np.where(self._fixed, np.nan, np.diag(self._falls))[:, None]
+        np.fill_diagonal(falls, 1.0)
+        return np.outer(self._signs, self._signs) * falls
 
     @property
     def directions(self) -> np.ndarray:
@@ -151,8 +154,8 @@ class TradeOffs:
             As for `matrix`.
         """
         found = self._projection
-        size = np.where(self._fixed, np.nan, np.diag(found.gram) * found.scales)
-        return found.descents / size[:, None]
+        size = np.where(self._fixed, np.nan, np.diag(self._falls))
+        return np.array([found.descent(one) for one in np.eye(len(size))]) / size[:, None]
 
     @property
     def left(self) -> float:
@@ -165,9 +168,9 @@ class TradeOffs:
         """
         found = self._projection
         if self.point.weights is None:
-            return found.left(found.weights)
+            return found.slope(found.weights)
         weights = np.array(list(self.point.weights.values())) * found.scales
-        return found.left(weights / weights.sum())
+        return found.slope(weights / weights.sum())
 
     @cached_property
     def messages(self) -> tuple[str, ...]:
@@ -177,17 +180,17 @@ class TradeOffs:
             found = [f"not Pareto-optimal: {self._not_optimal}"] if self.left > OPTIMAL else []
         except ValueError as reason:
             return (f"no trade-off matrix: {reason}",)
-        names, fixed, m = [goal.name for goal in self.goals], self._fixed, len(self.goals)
-        for i in range(m):
-            if fixed[i]:
-                found.append(f"the row of '{names[i]}' is degenerate: along what is active it can get no better")
-            elif all(self._cosine(i, k) > OPTIMAL for k in range(m) if k != i):
-                found.append(f"the row of '{names[i]}' has no negative entry: it and all others can get better together")
+        slopes, gains = self._slopes, self._falls / self._projection.scales / (self._projection.steepest or 1.0) ** 2
+        for i, goal in enumerate(self.goals):
+            if self._fixed[i]:
+                found.append(f"the row of '{goal.name}' is degenerate: within what is active it can get no better")
+            elif (np.delete(gains[i], i) > OPTIMAL * slopes[i]).all():
+                found.append(f"the row of '{goal.name}' has no negative entry: it and all others can get better together")
         return tuple(found)
 
     def table(self) -> str:
-        """What all objectives change by when one gets better by one unit, as plain text: along the front with the others held, then where it
-        gets better fastest; and the `messages`."""
+        """What all objectives change by when one gets better by one unit, as plain text: along the front with the others held; of more than
+        two, also where it gets better fastest; and the `messages`."""
         lines = [f"Trade-offs at point {self.point.index}: {self.point.title}", ""]
         titles = ["one better in", *(goal.name for goal in self.goals)]
         under = ["", *(f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in self.goals)]
@@ -199,50 +202,55 @@ class TradeOffs:
             lines += ["Along the front, one other objective giving way and the rest held:", text_table([titles, under], cells, flush), ""]
         except ValueError as reason:
             lines += [f"No rates: {reason}", ""]
-        try:
+        # Where there is none, the messages have the reason.
+        with suppress(ValueError):
             rows = zip(self.goals, _cells(self.matrix, self._signs), strict=True)
             table = text_table([titles, under], [[goal.name, *row] for goal, row in rows], flush)
-            lines += ["Where it gets better fastest, all others giving way:", table, ""]
-        except ValueError:
-            pass  # the messages have the reason
+            lines += ["Where it gets better fastest, all others giving way:", table, ""] if len(self.goals) > 2 else []
         return "\n".join([*lines, *(f"{message[0].upper()}{message[1:]}." for message in self.messages)]).rstrip()
 
     def plot(self, figure: object = None) -> Sequence[Axes]:
-        """Axes with what all objectives change by, in ranges of the front, when one gets better by a tenth of its own: along the front with
-        the others held; and, with the problem at hand, where it gets better fastest."""
+        """Axes with what all objectives change by when one gets better by a tenth of its range: along the front with the others held; of
+        more than two, with the problem at hand, also where it gets better fastest. Darker is more of a range.
+
+        Raises
+        ------
+        ValueError
+            As for `weights`.
+        """
         from .trade_off_plots import draw_trade_offs
 
-        return draw_trade_offs(self, figure)
+        tables = {"along the front, the rest held": self.rates.T}
+        if len(self.goals) > 2:
+            with suppress(ValueError):
+                tables["where it gets better fastest"] = self.matrix
+        return draw_trade_offs(self.goals, np.nan_to_num(self.point.ranges), tables, figure)
 
     @property
     def _signs(self) -> np.ndarray:
         return np.array([goal.sign for goal in self.goals])
 
-    @property
-    def _minimised(self) -> np.ndarray:
-        """The matrix for minimised objectives."""
+    @cached_property
+    def _falls(self) -> np.ndarray:
+        """By how much all objectives, minimised, fall (m, m) along the steepest descent of that of the row."""
         found = self._projection
-        gram = found.gram * np.outer(found.scales, found.scales)
-        T = gram / np.where(self._fixed, np.nan, np.diag(gram))[:, None]
-        np.fill_diagonal(T, 1.0)
-        return T
+        return np.array([found.fall(one) for one in np.eye(len(found.scales))]) * found.scales
+
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        """How fast each objective can fall (m,), as a part of the steepest gradient."""
+        return np.array([self._projection.slope(one) for one in np.eye(len(self.goals))])
 
     @property
     def _fixed(self) -> np.ndarray:
-        """Mask (m,) of the objectives that can get no better along what is active."""
-        return self._projection.slopes <= NOTHING
+        """Mask (m,) of the objectives that can get no better within what is active."""
+        return self._slopes <= NOTHING
 
     @property
     def _not_optimal(self) -> str:
-        share = f"{100 * self.left:.2g} % of the steepest gradient is left of the weighted sum of all (on a front less than {100 * OPTIMAL:g} %)"
-        violation = self.point.violation
-        return share + (f", and the point is not feasible (violation {violation:.1e})" if self.point.status != "converged" else "")
-
-    def _cosine(self, i: int, k: int) -> float:
-        """Of the angle between the projected gradients of two objectives; 0 where one has none."""
-        found = self._projection
-        size = found.slopes[i] * found.slopes[k] * found.steepest**2
-        return 0.0 if self._fixed[[i, k]].any() else float(found.gram[i, k] / size)
+        share, point = f"{100 * self.left:.2g} % of the steepest gradient (on a front at most {100 * OPTIMAL:g} %)", self.point
+        feasible = "" if point.violation <= NOTHING else f", and the point is not feasible: its violation is {point.violation:.1e}"
+        return f"the weighted sum of the gradients keeps {share}{feasible}"
 
     @cached_property
     def _projection(self) -> Projection:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, vstack
 
 from ..base import NLP
@@ -23,66 +24,100 @@ from ..numerics.polynomials import basis_matrix, gauss_legendre
 from ..trajectories.trajectory import Trajectory
 from .optimality import DEPENDENT, Conditions, Linearised, steepest, units
 
-TIGHT = 1e-6
-"""Inequalities with no more slack than this, in their scales, are active, whatever their multipliers."""
+TIGHT, CLOSE = 1e-6, 1e-4
+"""Inequalities with no more slack than the first, in their scales, are active; held are those with a multiplier larger than this and their
+slack, and no more slack than the second: where limits nearly depend on each other, multipliers are found for others nearby, too."""
 STEP = 1e-3
 """By how much coefficients of controls are moved, in spans, to see what they do: controls are linear in them."""
+DEPENDENT_ON_HELD = 1e-9
+"""Part of the largest eigenvalue below which others, of products of the gradients of what may be left, are round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """The objectives' gradients at a vector of an NLP, projected on the tangent space of what is active there.
+    """The objectives' gradients at a vector of an NLP, projected on what is active there: a tangent space where all of that has a
+    multiplier, else a cone, since what has none may be left.
 
     Attributes
     ----------
+    nlp : NLP
     scales : array (m,)
         Of the objectives.
     weights : array (m,)
         Multipliers of the objectives in these scales, not negative and of sum 1, that leave the least of their gradients.
-    gram : array (m, m)
-        Products of the projected gradients, in these scales: dF_i/dF_j along the steepest descent of F_j is gram_ij / gram_jj.
-    descents : array (m, n)
-        The steepest descent of each objective: variations of the vector, in the user's units, of squared length gram_ii, along which the
-        objective falls by gram_ii of its scales.
+    s : array (n, m + k)
+        The gradients of the objectives, and of the k inequalities c >= 0 that are active and may be left, projected on the tangent space of
+        what is held, as variations in units.
+    gram : array (m + k, m + k)
+        The products of these.
     steepest : float
-        The length of the longest of the objectives' gradients where only the equations are active: what others are compared with.
+        The length of the longest of the objectives' gradients where only the equations are held, and what bounds peaks: what others are
+        compared with.
     """
 
+    nlp: NLP
     scales: np.ndarray
     weights: np.ndarray
+    s: np.ndarray
     gram: np.ndarray
-    descents: np.ndarray
     steepest: float
 
-    @property
-    def slopes(self) -> np.ndarray:
-        """How fast each objective can fall (m,), as a part of `steepest`; 0 where none could."""
-        return np.sqrt(np.maximum(np.diag(self.gram), 0.0)) / (self.steepest or 1.0)
+    def fall(self, combination: np.ndarray) -> np.ndarray:
+        """By how much the objectives fall (m,), in their scales, along the steepest descent of a combination (m,) of them, of which the
+        length is its slope."""
+        return self.gram[: len(self.scales)] @ self._steepest(combination)
 
-    def left(self, weights: np.ndarray) -> float:
-        """The length of the weighted sum of the gradients, for weights (m,) in the scales, as a part of `steepest`: 0 where the point is a
-        least of that sum."""
-        return float(np.sqrt(max(weights @ self.gram @ weights, 0.0))) / (self.steepest or 1.0)
+    def descent(self, combination: np.ndarray) -> np.ndarray:
+        """That descent: a variation (n,) of the vector, in the user's units."""
+        return -units(self.nlp) * (self.s @ self._steepest(combination))
+
+    def slope(self, combination: np.ndarray) -> float:
+        """How fast a combination (m,) of the objectives can fall: its slope along its steepest descent, as a part of `steepest`; 0 where
+        none can."""
+        x = self._steepest(combination)
+        return float(np.sqrt(max(x @ self.gram @ x, 0.0))) / (self.steepest or 1.0)
+
+    def _steepest(self, combination: np.ndarray) -> np.ndarray:
+        """The coefficients (m + k,) of its gradient projected on the cone, of which multipliers of the inequalities, not negative, leave
+        least."""
+        m = len(self.scales)
+        if self.gram.shape[0] == m:
+            return np.asarray(combination, dtype=float)
+        values, vectors = np.linalg.eigh(self.gram[m:, m:])
+        some = values > DEPENDENT_ON_HELD * max(values.max(), self.steepest**2)
+        roots, across = np.sqrt(values[some]), vectors[:, some].T
+        right = across @ (self.gram[m:, :m] @ combination) / roots
+        multipliers = nnls(roots[:, None] * across, right, maxiter=10 * len(values))[0] if some.any() else np.zeros(len(values))
+        return np.concatenate([combination, -multipliers])
 
 
 def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Projection | None:
     """The projection at a feasible vector (n,), for objectives in `F_scales` (m,), see `optimality`; None where a derivative is no number,
     or no multipliers are found.
 
-    Active are the equations and those inequalities whose slack, in scales, is at most their multiplier or `TIGHT`.
+    The equations are held, and so are inequalities with a multiplier, and what bounds peaks and absolute values; other inequalities
+    without slack may be left.
     """
     conditions = Conditions.of(nlp, z, F_scales)
     if conditions is None or conditions.scaled is None:
         return None
     linear, (weights, multipliers) = conditions.linear, conditions.scaled
-    active, lengths, dF = linear.slack <= np.maximum(multipliers, TIGHT), metric(linear), linear.of_objectives
+    dF, sides, lengths = linear.of_objectives, linear.of_inequalities, metric(linear)
+    tight = linear.slack <= TIGHT
+    bounding = tight & sides[:, np.isinf(nlp.span)].any(axis=1)
+    held = ((multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE)) | bounding
+    every = np.vstack([dF, sides[tight & ~held]])
+
+    def along(active: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+        return steepest(lengths, vstack([linear.of_equations, csr_matrix(sides[active])]), gradients)[0]
+
     try:
-        free, _ = steepest(lengths, linear.of_equations, dF)
-        s, _ = steepest(lengths, vstack([linear.of_equations, csr_matrix(linear.of_inequalities[active])]), dF)
+        free, s = along(bounding, dF), along(held, every)
     except RuntimeError:
         return None
+    gram = every @ s
     longest = float(np.sqrt(np.diag(dF @ free).max(initial=0.0)))
-    return Projection(linear.scales, weights, dF @ s, -(s * units(nlp)[:, None]).T, longest)
+    return Projection(nlp, linear.scales, weights, s, 0.5 * (gram + gram.T), longest)
 
 
 def metric(linear: Linearised) -> csc_matrix:
@@ -93,7 +128,7 @@ def metric(linear: Linearised) -> csc_matrix:
     alone = np.setdiff1d(nlp.free, [nlp.free[column] for profile in nlp.profiles for column in profile.columns])
     edges = tuple(f"{phase.name}.edge[" for phase in nlp.problem.phases)
     # The bounds of an edge are those of its neighbours.
-    own[alone] = [nlp.span[k] ** 2 if nlp.variables[k].name.startswith(edges) else 1.0 for k in alone]
+    own[alone] = [nlp.span[one] ** 2 if nlp.variables[one].name.startswith(edges) else 1.0 for one in alone]
     return csc_matrix(of_controls.T @ of_controls + diags(own))
 
 
@@ -110,7 +145,9 @@ def _controls(nlp: NLP, z: np.ndarray) -> csr_matrix:
         control = phase.control
         degree = control.coefficients.shape[1] - 1
         nodes, weights = gauss_legendre(degree + 1)
-        basis, shares = basis_matrix(control.basis, degree, nodes), np.diff(control.edges) / (control.edges[-1] - control.edges[0])
+        basis, lengths = basis_matrix(control.basis, degree, nodes), np.diff(control.edges)
+        # In a phase of no duration all elements are alike.
+        shares = lengths / lengths.sum() if lengths.sum() > 0 else np.full(len(lengths), 1.0 / len(lengths))
         roots = np.sqrt(0.5 * weights * shares[:, None])
         for i, variable in enumerate(phase.control_variables):
             for trajectory, column in zip(moved, place.get(f"{phase.name}.{variable.name}", ()), strict=False):
@@ -121,8 +158,8 @@ def _controls(nlp: NLP, z: np.ndarray) -> csr_matrix:
                 columns.append(np.full(at.size, nlp.free[column]))
                 values.append(at.ravel())
             first += roots.size
-    i, j, v = (np.concatenate([np.empty(0, kind), *some]) for kind, some in ((int, rows), (int, columns), (float, values)))
-    return csr_matrix(coo_matrix((v, (i, j)), shape=(first, len(z))))
+    at, by, value = (np.concatenate([np.empty(0, kind), *some]) for kind, some in ((int, rows), (int, columns), (float, values)))
+    return csr_matrix(coo_matrix((value, (at, by)), shape=(first, len(z))))
 
 
 def _moved(nlp: NLP, z: np.ndarray, k: int) -> Trajectory:
