@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 def front_rates(front: Points) -> np.ndarray:
     """dJ_i/dJ_j (n, m, m) at all points of a front, the other objectives held, in the user's units and senses; see `TradeOffs.rate`. Not
     numbers at points without `weights`."""
-    nothing = np.full(len(front.goals), np.nan)
-    weights = [nothing if point.weights is None else np.array(list(point.weights.values())) for point in front]
-    return rates(np.array(weights).reshape(-1, len(front.goals)), front.signs)
+    m = len(front.goals)
+    weights = [np.full(m, np.nan) if point.weights is None else np.array(list(point.weights.values())) for point in front]
+    ranges = np.nan_to_num(np.ptp(front.F, axis=0)) if len(front) else np.zeros(m)
+    return rates(np.array(weights).reshape(-1, m), front.signs, ranges)
 
 
 def plot_rates(front: Points, figure: object = None) -> Sequence[Axes]:

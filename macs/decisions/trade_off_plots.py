@@ -119,7 +119,7 @@ def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapp
     steps = np.array([_round(STEPS * size) if size > 0 else 1.0 for size in ranges])
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):  # type: ignore[arg-type]
         m = len(goals)
-        figure = _sized(figure, 1.2 + len(tables) * (1.05 * m + 0.2) + 0.8, 0.55 * m + 1.3)
+        figure = _sized(figure, 1.2 + len(tables) * (1.05 * m + 0.2) + 0.8, 0.55 * m + 1.5)
         axes = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
         signs = np.array([goal.sign for goal in goals])
         for ax, (title, by_one) in zip(axes, tables.items(), strict=True):
@@ -134,6 +134,9 @@ def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapp
             ax.tick_params(length=0)
             for side in ax.spines.values():
                 side.set_visible(False)
+        figure.supxlabel(
+            "orange: worse, blue: better; darker: more of the range of the front", x=0.99, ha="right", color=GREY, fontsize=8.0
+        )
         axes[0].set_yticks(
             range(m), [f"{goal.name}\nbetter by {step:g} {goal.unit}".rstrip() for goal, step in zip(goals, steps, strict=True)]
         )

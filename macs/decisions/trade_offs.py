@@ -34,6 +34,8 @@ OPTIMAL = 1e-3
 rates are right to about as much."""
 NOTHING = 1e-3
 """Part of the steepest gradient below which an objective has none."""
+NEGLIGIBLE = 1e-6
+"""Part of the largest weight, in ranges of the front, below which others are round-off."""
 
 
 def trade_offs(point: Point, *, problem: Problem | CompiledProblem | None = None) -> TradeOffs:
@@ -110,7 +112,7 @@ class TradeOffs:
     @property
     def rates(self) -> np.ndarray:
         """All rates (m, m), see `rate`."""
-        return rates(np.array(list(self.weights.values())), self._signs)
+        return rates(np.array(list(self.weights.values())), self._signs, np.nan_to_num(self.point.ranges))
 
     def rate(self, i: str | int, j: str | int) -> float:
         """dJ_i/dJ_j along the front, the other objectives held: -w_j/w_i for minimised objectives. Of two, it is the front's slope.
@@ -276,8 +278,12 @@ class TradeOffs:
         raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
 
 
-def rates(weights: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """dJ_i/dJ_j (..., m, m) of objectives with weights (..., m), see `TradeOffs.rate`; `signs` (m,) are -1 for maximised ones."""
+def rates(weights: np.ndarray, signs: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """dJ_i/dJ_j (..., m, m) of objectives with weights (..., m), see `TradeOffs.rate`; `signs` (m,) are -1 for maximised ones. Weights
+    that are `NEGLIGIBLE` in `ranges` (m,), as far as these are known, are 0."""
+    worth = weights * np.where(ranges > 0, ranges, 0.0)
+    nothing = (ranges > 0) & (worth < NEGLIGIBLE * worth.max(axis=-1, keepdims=True))
+    weights = np.where(nothing, 0.0, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = -np.outer(signs, signs) * (weights[..., None, :] / weights[..., :, None])
     found[..., np.eye(len(signs), dtype=bool)] = 1.0

@@ -331,7 +331,11 @@ def test_weights_that_are_zero():
     assert abs(found.rate("from right", "from left")) > 1e6 and abs(found.rate("from left", "from right")) < 1e-6
     assert found.rate(0, 0) == found.rate(1, 1) == 1.0
     exact = np.array([[1, -np.inf, np.nan], [0, 1, 0], [np.nan, np.inf, 1]])
-    assert rates(np.array([0.0, 1.0, 0.0]), np.array([1.0, 1.0, -1.0])) == pytest.approx(exact, nan_ok=True)
+    signs = np.array([1.0, 1.0, -1.0])
+    assert rates(np.array([0.0, 1.0, 0.0]), signs, np.zeros(3)) == pytest.approx(exact, nan_ok=True)
+    # What is next to nothing beside the others over the range of the front is round-off, whatever its unit.
+    assert rates(np.array([1e-9, 1.0, 1e-3]), signs, np.array([1.0, 1.0, 1e-6])) == pytest.approx(exact, nan_ok=True)
+    assert np.isfinite(rates(np.array([1e-9, 1.0, 1e-3]), signs, np.array([1e6, 1.0, 1.0]))).all()
 
 
 # Without the problem, and where there is nothing to say.
