@@ -30,10 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 OPTIMAL = 1e-3
-"""Largest part of the steepest gradient that the weighted sum of the gradients may keep at a point that is taken to be Pareto-optimal: then
-rates are right to about as much."""
-NOTHING = 1e-3
-"""Part of the steepest gradient below which an objective has none."""
+"""Largest part of the longest of the weighted gradients that is left of their sum at a point that is taken to be Pareto-optimal."""
+NOTHING = 1e-4
+"""Part of its gradient below which nothing is left of it within what is active."""
 NEGLIGIBLE = 1e-6
 """Part of the largest weight, in ranges of the front, below which others are round-off."""
 
@@ -161,7 +160,7 @@ class TradeOffs:
 
     @property
     def left(self) -> float:
-        """How much the weighted sum of the projected gradients keeps of the steepest one: 0 at a Pareto-optimal point.
+        """How much the weighted sum of the projected gradients keeps of the longest one before the projection: 0 at a Pareto-optimal point.
 
         Raises
         ------
@@ -182,11 +181,11 @@ class TradeOffs:
             found = [f"not Pareto-optimal: {self._not_optimal}"] if self.left > OPTIMAL else []
         except ValueError as reason:
             return (f"no trade-off matrix: {reason}",)
-        slopes, gains = self._slopes, self._falls / self._projection.scales / (self._projection.steepest or 1.0) ** 2
+        gains = self._gains
         for i, goal in enumerate(self.goals):
             if self._fixed[i]:
                 found.append(f"the row of '{goal.name}' is degenerate: within what is active it can get no better")
-            elif (np.delete(gains[i], i) > OPTIMAL * slopes[i]).all():
+            elif (np.delete(gains[i], i) > OPTIMAL).all():
                 found.append(f"the row of '{goal.name}' has no negative entry: it and all others can get better together")
         return tuple(found)
 
@@ -240,8 +239,15 @@ class TradeOffs:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """How fast each objective can fall (m,), as a part of the steepest gradient."""
+        """How fast each objective can fall (m,), as a part of its own gradient."""
         return np.array([self._projection.slope(one) for one in np.eye(len(self.goals))])
+
+    @property
+    def _gains(self) -> np.ndarray:
+        """How fast all objectives fall (m, m) along the steepest descent of that of the row, as parts of their own gradients."""
+        falls, free = self._falls / self._projection.scales, self._projection.free
+        lengths = np.sqrt(np.maximum(np.diag(falls), 0.0))
+        return falls / np.maximum(np.outer(lengths, free), np.finfo(float).tiny)
 
     @property
     def _fixed(self) -> np.ndarray:
@@ -250,7 +256,7 @@ class TradeOffs:
 
     @property
     def _not_optimal(self) -> str:
-        share, point = f"{100 * self.left:.2g} % of the steepest gradient (on a front at most {100 * OPTIMAL:g} %)", self.point
+        share, point = f"{100 * self.left:.2g} % of the longest of them (on a front at most {100 * OPTIMAL:g} %)", self.point
         feasible = "" if point.violation <= NOTHING else f", and the point is not feasible: its violation is {point.violation:.1e}"
         return f"the weighted sum of the gradients keeps {share}{feasible}"
 

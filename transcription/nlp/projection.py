@@ -29,6 +29,8 @@ TIGHT, CLOSE = 1e-6, 1e-4
 slack, and no more slack than the second: where limits nearly depend on each other, multipliers are found for others nearby, too."""
 STEP = 1e-3
 """By how much coefficients of controls are moved, in spans, to see what they do: controls are linear in them."""
+FLOOR = 1e-4
+"""Part of the longest of all gradients that every gradient is taken to have."""
 DEPENDENT_ON_HELD = 1e-9
 """Part of the largest eigenvalue below which others, of products of the gradients of what may be left, are round-off."""
 
@@ -50,9 +52,8 @@ class Projection:
         what is held, as variations in units.
     gram : array (m + k, m + k)
         The products of these.
-    steepest : float
-        The length of the longest of the objectives' gradients where only the equations are held, and what bounds peaks: what others are
-        compared with.
+    free : array (m,)
+        The lengths of the objectives' gradients where only the equations are held, and what bounds peaks: what others are compared with.
     """
 
     nlp: NLP
@@ -60,7 +61,7 @@ class Projection:
     weights: np.ndarray
     s: np.ndarray
     gram: np.ndarray
-    steepest: float
+    free: np.ndarray
 
     def fall(self, combination: np.ndarray) -> np.ndarray:
         """By how much the objectives fall (m,), in their scales, along the steepest descent of a combination (m,) of them, of which the
@@ -72,10 +73,12 @@ class Projection:
         return -units(self.nlp) * (self.s @ self._steepest(combination))
 
     def slope(self, combination: np.ndarray) -> float:
-        """How fast a combination (m,) of the objectives can fall: its slope along its steepest descent, as a part of `steepest`; 0 where
-        none can."""
-        x = self._steepest(combination)
-        return float(np.sqrt(max(x @ self.gram @ x, 0.0))) / (self.steepest or 1.0)
+        """How fast a combination (m,) of the objectives can fall: its slope along its steepest descent, as a part of the longest of the
+        gradients that it combines; 0 where it cannot."""
+        x, shares = self._steepest(combination), np.abs(combination)
+        # Where that is next to nothing, at an optimum that nothing holds, the others'.
+        longest = (shares * self.free).max() + FLOOR * shares.sum() * self.free.max()
+        return float(np.sqrt(max(x @ self.gram @ x, 0.0))) / (longest or 1.0)
 
     def _steepest(self, combination: np.ndarray) -> np.ndarray:
         """The coefficients (m + k,) of its gradient projected on the cone, of which multipliers of the inequalities, not negative, leave
@@ -84,7 +87,7 @@ class Projection:
         if self.gram.shape[0] == m:
             return np.asarray(combination, dtype=float)
         values, vectors = np.linalg.eigh(self.gram[m:, m:])
-        some = values > DEPENDENT_ON_HELD * max(values.max(), self.steepest**2)
+        some = values > DEPENDENT_ON_HELD * max(values.max(), self.free.max() ** 2)
         roots, across = np.sqrt(values[some]), vectors[:, some].T
         right = across @ (self.gram[m:, :m] @ combination) / roots
         multipliers = nnls(roots[:, None] * across, right, maxiter=10 * len(values))[0] if some.any() else np.zeros(len(values))
@@ -102,22 +105,22 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
     if conditions is None or conditions.scaled is None:
         return None
     linear, (weights, multipliers) = conditions.linear, conditions.scaled
-    dF, sides, lengths = linear.of_objectives, linear.of_inequalities, metric(linear)
+    dF, sides, measure = linear.of_objectives, linear.of_inequalities, metric(linear)
     tight = linear.slack <= TIGHT
     bounding = tight & sides[:, np.isinf(nlp.span)].any(axis=1)
     held = ((multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE)) | bounding
     every = np.vstack([dF, sides[tight & ~held]])
 
     def along(active: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-        return steepest(lengths, vstack([linear.of_equations, csr_matrix(sides[active])]), gradients)[0]
+        return steepest(measure, vstack([linear.of_equations, csr_matrix(sides[active])]), gradients)[0]
 
     try:
         free, s = along(bounding, dF), along(held, every)
     except RuntimeError:
         return None
     gram = every @ s
-    longest = float(np.sqrt(np.diag(dF @ free).max(initial=0.0)))
-    return Projection(nlp, linear.scales, weights, s, 0.5 * (gram + gram.T), longest)
+    lengths = np.sqrt(np.maximum(np.diag(dF @ free), 0.0))
+    return Projection(nlp, linear.scales, weights, s, 0.5 * (gram + gram.T), lengths)
 
 
 def metric(linear: Linearised) -> csc_matrix:
