@@ -1,0 +1,147 @@
+"""NIMBUS: which objectives may change, and how, from a current point (Miettinen and Mäkelä 2006)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from problems.checks import check_interval, short_repr
+from problems.compiled import Objective
+
+from ..fronts.point import Point
+from .checks import named_numbers, names_of, places, shown
+from .preference import Preference, needed
+from .ranges import Ranges
+from .reference_point import AUGMENTATION
+from .stage import Operand, Stage
+
+
+@dataclass(frozen=True, repr=False)
+class Nimbus(Preference):
+    """Moves from a current point: each objective is in one of five classes.
+
+    The value is the largest of the normalised objectives of `improve`, counted from their best values, and of `to`, counted from the values
+    asked for, plus `augmentation` times the sum of all normalised objectives. Those of `improve`, `to` and `keep` may not become worse than
+    they are, those of `until` not worse than their limits: these are hard limits (the standard scalarisation of Miettinen and Mäkelä).
+
+    Degrees: for `improve` and `to` the part of the way, between 0 and 1, from the current value to the best one, or to the one asked for;
+    for `keep` and `until` 1 where the limit is met, else 0; NaN for `free`.
+
+    Parameters
+    ----------
+    current : Point or dict
+        The current point, or its objectives by name.
+    improve : names, optional
+        Objectives that are to improve as much as possible.
+    to : dict, optional
+        Objectives that are to improve to these values, which are better than the current ones.
+    keep : names, optional
+        Objectives that are good as they are.
+    until : dict, optional
+        Objectives that may become worse until these values, which are not better than the current ones.
+    free : names, optional
+        Objectives that may change as they will.
+    augmentation : float
+        See `ReferencePoint`.
+    """
+
+    current: Mapping[str, float]
+    improve: Sequence[str] = ()
+    to: Mapping[str, float] | None = None
+    keep: Sequence[str] = ()
+    until: Mapping[str, float] | None = None
+    free: Sequence[str] = ()
+    augmentation: float = AUGMENTATION
+
+    DEGREE: ClassVar[str] = "part of what was asked for"
+
+    def __post_init__(self) -> None:
+        given = self.current.objectives if isinstance(self.current, Point) else self.current
+        object.__setattr__(self, "current", named_numbers(given, "the current value"))
+        for name in ("improve", "keep", "free"):
+            object.__setattr__(self, name, names_of(getattr(self, name), name))
+        for name in ("to", "until"):
+            found = getattr(self, name)
+            object.__setattr__(self, name, named_numbers(found, f"'{name}'") if found else {})
+        check_interval("augmentation", self.augmentation, "[0, 1]")
+        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
+        for name in classes:
+            if classes.count(name) > 1:
+                raise ValueError(f"'{name}' is in two classes of Nimbus")
+        if not self.improve and not self._to:
+            raise ValueError("Nimbus needs an objective that is to become better, in `improve` or `to`")
+        if not self._until and not self.free:
+            raise ValueError("Nimbus needs an objective that may become worse, in `until` or `free`")
+
+    __repr__ = short_repr
+
+    @property
+    def _to(self) -> Mapping[str, float]:
+        return self.to or {}
+
+    @property
+    def _until(self) -> Mapping[str, float]:
+        return self.until or {}
+
+    def _check(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
+        """The ranges, if each objective is in a class whose values make sense."""
+        spans, known = needed(ranges, self), {goal.name: goal for goal in goals}
+        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
+        places([*self.current, *classes], goals)
+        for name, goal in known.items():
+            if name not in self.current:
+                raise ValueError(f"the current point of Nimbus has no '{name}'")
+            if name not in classes:
+                raise ValueError(f"'{name}' is in no class of Nimbus: improve, to, keep, until or free")
+            now = shown(self.current[name], goal)
+            if name in self._to:
+                spans.check(self._to[name], goal, "the value in `to`")
+                if goal.sign * (self._to[name] - self.current[name]) >= 0:
+                    raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
+            if name in self._until and goal.sign * (self._until[name] - self.current[name]) < 0:
+                raise ValueError(f"'{name}' may become worse until {shown(self._until[name], goal)}, which is better than {now}")
+        return spans
+
+    def _limits(self, goals: Sequence[Objective]) -> dict[int, float]:
+        """The value that each limited objective may not exceed, by place."""
+        values = {**{name: self.current[name] for name in (*self.improve, *self._to, *self.keep)}, **self._until}
+        found = places(values, goals)
+        return {found[name]: value for name, value in values.items()}
+
+    def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
+        spans = self._check(goals, ranges)
+        slopes = [goal.sign / span for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True)]
+        limited, asked = self._limits(goals), {**{name: spans.best[name] for name in self.improve}, **self._to}
+        found = places(asked, goals)
+
+        def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
+            return peaks[0] + self.augmentation * sum(spans.normalised(goals, J))
+
+        def groups(J: Sequence[Operand]) -> list[list[Operand]]:
+            return [[slopes[found[name]] * (J[found[name]] - target) for name, target in asked.items()]]
+
+        def limits(J: Sequence[Operand]) -> list[Operand]:
+            return [slopes[place] * (J[place] - limit) for place, limit in limited.items()]
+
+        words = [
+            f"{goals[place].name} {'at most' if goals[place].sign > 0 else 'at least'} {shown(limit, goals[place])}"
+            for place, limit in limited.items()
+        ]
+        return (Stage("achievement", value, groups, limits, tuple(words)),)
+
+    def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
+        spans, J = self._check(goals, ranges), np.asarray(objectives, dtype=float)
+        result = np.full(J.shape, np.nan)
+        for place, limit in self._limits(goals).items():
+            goal = goals[place]
+            asked = self._to.get(goal.name, spans.best[goal.name])
+            way = goal.sign * (self.current[goal.name] - asked)
+            if goal.name in self.improve or goal.name in self._to:
+                done = goal.sign * (self.current[goal.name] - J[:, place])
+                result[:, place] = np.clip(done / way, 0.0, 1.0) if way > 0 else 1.0
+            else:
+                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= 1e-9 * abs(limit), 1.0, 0.0)
+        return result

@@ -1,0 +1,117 @@
+"""Physical programming (Messac 1996): ranges of preference instead of weights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from problems.checks import check_interval, short_repr
+from problems.compiled import Objective
+
+from ..checks import named, places
+from ..operands import log10
+from ..preference import Preference
+from ..ranges import Ranges
+from ..stage import Operand, Stage
+from .classes import NAMES, ObjectiveClass
+from .spline import PreferenceFunction, preference_functions
+
+CRISP, FUZZY = "preference function", "fuzzy preference function"
+"""Words of legends."""
+
+
+@dataclass(frozen=True, repr=False)
+class PhysicalProgramming(Preference):
+    """Minimises log10 of the mean of preference functions, which say how ideal or tolerable each value of an objective is.
+
+    A preference function has the same value at the k-th boundary for every objective, rises steeper from range to range, and is once
+    continuously differentiable (eqs. 20-25 of Chai and others 2017, with the sign of eq. 23 mended). Below the first boundary it falls
+    exponentially and stays positive. The fifth boundary is a hard limit. Ranges of objectives are not needed, and units do not matter.
+
+    Degrees: k at the boundary J_k, linear between; below 1 the objective is ideal, above 5 unacceptable.
+
+    Parameters
+    ----------
+    classes : dict
+        By name: `Smaller`, `Larger`, `Value` or `Range`. An objective that is not named is free.
+    beta : float
+        Factor of the steps between the values at the boundaries, with one for other objectives. It is raised until each preference function
+        is convex, and so monotone, on each side: `functions[name].beta`.
+    """
+
+    classes: Mapping[str, ObjectiveClass]
+    beta: float = 1.5
+
+    DEGREE: ClassVar[str] = "degree"
+    SMALLER: ClassVar[bool] = True
+    MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(NAMES))
+
+    def __post_init__(self) -> None:
+        classes = named(self.classes, "classes")
+        for name, one in classes.items():
+            if not isinstance(one, ObjectiveClass) or type(one) is ObjectiveClass:
+                raise ValueError(f"the class of '{name}' must be Smaller, Larger, Value or Range, not {one!r}")
+        object.__setattr__(self, "classes", classes)
+        check_interval("beta", self.beta, "(1, inf)")
+
+    __repr__ = short_repr
+
+    @cached_property
+    def functions(self) -> dict[str, PreferenceFunction]:
+        """The preference function of each objective, by name.
+
+        Raises
+        ------
+        ValueError
+            If lengths of ranges differ by too many orders of magnitude.
+        """
+        return dict(zip(self.classes, preference_functions(list(self.classes.values()), self.beta), strict=True))
+
+    def minimised(self) -> dict[str, Callable[[Operand], Operand]]:
+        """What is averaged, by name."""
+        return dict(self.functions)
+
+    def _places(self, goals: Sequence[Objective]) -> dict[str, int]:
+        found = places(self.classes, goals)
+        for name, place in found.items():
+            self.classes[name].check(goals[place])
+        return found
+
+    def stages(self, goals: Sequence[Objective], ranges: Ranges | None = None) -> tuple[Stage, ...]:
+        found, functions = self._places(goals), self.minimised()
+
+        def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
+            return log10(sum(function(J[found[name]]) for name, function in functions.items()) / len(functions))
+
+        def limits(J: Sequence[Operand]) -> list[Operand]:
+            return [limit for name, one in self.classes.items() for limit in one.limits(J[found[name]])]
+
+        names = tuple(words for name, one in self.classes.items() for words in one.limit_names(goals[found[name]]))
+        return (Stage("log10 of preference", value, limits=limits, limit_names=names),)
+
+    def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
+        J = np.asarray(objectives, dtype=float)
+        result = np.full(J.shape, np.nan)
+        for name, place in self._places(goals).items():
+            result[:, place] = self.classes[name].degree(J[:, place])
+        return result
+
+    def _curve_label(self) -> str:
+        return "preference"
+
+    def _curves(self, goals: Sequence[Objective], ranges: Ranges) -> list[Any]:
+        from ..pictures.function_plot import Curve
+
+        found, minimised = self._places(goals), self.minimised()
+        curves = []
+        for name, crisp in self.functions.items():
+            marks = [boundary for boundary, _ in crisp.boundaries]
+            margin = 0.08 * (marks[-1] - marks[0])
+            shown = ((FUZZY, minimised[name]), (CRISP, crisp)) if minimised[name] is not crisp else ((CRISP, crisp),)
+            goal = goals[found[name]]
+            curves.append(Curve(goal, found[name], shown, marks[0] - margin, marks[-1] + margin, tuple(marks), self.classes[name].degree))
+        return curves

@@ -1,0 +1,103 @@
+"""Ranges of objectives: from the best to the worst value that matters of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..evaluation.evaluator import CONVERGED
+from ..fronts.points import Points
+from ..pareto.dominance import nondominated
+from .checks import ROUNDING, named_numbers, places, shown
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """The best and the worst value of each objective, by name, in the user's units and senses.
+
+    Preferences are normalised by them: 0 is the best, 1 the worst. An objective whose best and worst values are equal is divided by its
+    size instead, by 1 if that is zero.
+
+    Attributes
+    ----------
+    best, worst : dict
+    """
+
+    best: Mapping[str, float]
+    worst: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        for name in ("best", "worst"):
+            object.__setattr__(self, name, named_numbers(getattr(self, name), name))
+        for name in sorted({*self.best} ^ {*self.worst}):
+            raise ValueError(f"ranges need the best and the worst value of '{name}'")
+
+    @classmethod
+    def of(cls, front: Points) -> Ranges:
+        """The ranges of a front, or of a payoff table: the best and the worst values over its feasible, non-dominated points.
+
+        Points that a simulation did not confirm do not count, unless there are no others.
+
+        Raises
+        ------
+        ValueError
+            If no point is feasible.
+        """
+        if not isinstance(front, Points):
+            raise ValueError(f"ranges are those of a front or a payoff table, not of {front!r}")
+        feasible, confirmed = usable(front)
+        if not feasible.any():
+            raise ValueError(f"the front has no feasible point, so that it has no ranges{f': {front.message}' if front.message else ''}")
+        F = front.F[confirmed if confirmed.any() else feasible]
+        F = F[nondominated(F)]
+        best, worst = (F.min(axis=0) * front.signs + 0.0, F.max(axis=0) * front.signs + 0.0)
+        return cls(dict(zip(front.names, best.tolist(), strict=True)), dict(zip(front.names, worst.tolist(), strict=True)))
+
+    def ends(self, goals: Sequence[Objective]) -> tuple[np.ndarray, np.ndarray]:
+        """The best and the worst values (m,) of these goals.
+
+        Raises
+        ------
+        ValueError
+            If a goal has no range, if a range is of none of the goals, and if a worst value is better than the best.
+        """
+        places(self.best, goals)
+        for goal in goals:
+            if goal.name not in self.best:
+                raise ValueError(f"the ranges have no '{goal.name}'; they have {', '.join(self.best)}")
+            low, high = self.best[goal.name], self.worst[goal.name]
+            if (high - low) * goal.sign < 0:
+                raise ValueError(
+                    f"'{goal.name}' is {goal.sense}d, so that its best value, {shown(low, goal)}, cannot be worse than {shown(high, goal)}"
+                )
+        return np.array([self.best[goal.name] for goal in goals]), np.array([self.worst[goal.name] for goal in goals])
+
+    def spans(self, goals: Sequence[Objective]) -> np.ndarray:
+        """The widths (m,) of the ranges of these goals, all positive: that of a range without width is the size of its value, or 1."""
+        best, worst = self.ends(goals)
+        span, size = np.abs(worst - best), np.abs(best)
+        return np.where(span > 0.0, span, np.where(size > 0.0, size, 1.0))
+
+    def normalised(self, goals: Sequence[Objective], J: Sequence[Any]) -> list[Any]:
+        """The m objectives, numbers or symbols, scaled so that the best value of each is at 0 and the worst at 1."""
+        best, spans = self.ends(goals)[0], self.spans(goals)
+        return [(goal.sign / span) * (value - low) for goal, value, low, span in zip(goals, J, best.tolist(), spans.tolist(), strict=True)]
+
+    def check(self, value: float, goal: Objective, what: str) -> None:
+        """Raise ValueError if a value of a goal lies beyond its range. A range without width says nothing on this."""
+        low, high = sorted((self.best[goal.name], self.worst[goal.name]))
+        slack = ROUNDING * max(high - low, abs(low), abs(high))
+        if low < high and not low - slack <= value <= high + slack:
+            best, worst = shown(self.best[goal.name], goal), shown(self.worst[goal.name], goal)
+            raise ValueError(f"{what} of '{goal.name}', {shown(value, goal)}, lies beyond its range: best {best}, worst {worst}")
+
+
+def usable(front: Points) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (n,) of the feasible points, and of those among them that no simulation contradicts."""
+    feasible = (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)
+    return feasible, feasible & ~(front.was_simulated & ~front.verified)

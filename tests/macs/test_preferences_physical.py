@@ -1,0 +1,207 @@
+"""Physical programming: preference functions over all classes, boundaries and numbers of objectives."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+from choices import cart, turned_cart
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
+
+from macs.decisions import Larger, PhysicalProgramming, Range, Ranges, Smaller, Value
+from macs.preferences.physical.spline import PreferenceFunction
+from problems.compiled import Objective
+
+CLASSES = {Smaller: 5, Larger: 5, Value: 9, Range: 10}
+GAPS = st.floats(-2, 2).map(lambda power: 10.0**power)
+
+
+@st.composite
+def objective_class(draw):
+    """A class with boundaries at gaps that differ by up to four orders of magnitude, somewhere, in some unit."""
+    kind = draw(st.sampled_from([*CLASSES]))
+    gaps = np.array(draw(st.lists(GAPS, min_size=CLASSES[kind] - 1, max_size=CLASSES[kind] - 1)))
+    marks = np.concatenate([[0.0], np.cumsum(gaps)]) + draw(st.floats(-10, 10)) * gaps.sum()
+    marks = marks * 10.0 ** draw(st.integers(-6, 6))
+    return kind(*(marks[::-1] if kind is Larger else marks).tolist())
+
+
+def functions(classes) -> list[PreferenceFunction]:
+    return list(PhysicalProgramming({f"J{k}": one for k, one in enumerate(classes)}).functions.values())
+
+
+MANY = st.lists(objective_class(), min_size=1, max_size=6)
+
+
+def samples(function: PreferenceFunction) -> np.ndarray:
+    """Values all over an objective: many in each of its ranges, and beyond."""
+    marks = np.array([mark for mark, _ in function.boundaries])
+    wide = np.concatenate([[2 * marks[0] - marks[-1]], marks, [2 * marks[-1] - marks[0]]])
+    return np.unique(np.concatenate([np.linspace(low, high, 60) for low, high in pairwise(wide)]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(MANY)
+def test_exact_and_equal_at_boundaries(classes):
+    found = functions(classes)
+    z = found[0].z
+    assert z[0] == 0.1
+    # One objective that crosses a range costs more than all others that cross the one before.
+    assert np.all(np.diff(z)[1:] > max(len(classes) - 1, 1) * np.diff(z)[:-1])
+    for function, one in zip(found, classes, strict=True):
+        assert np.array_equal(function.z, z)
+        for side in one.sides:
+            assert np.array([float(function(J)) for J in side.boundaries]) == pytest.approx(z, rel=1e-14)
+
+
+@settings(max_examples=60, deadline=None)
+@given(MANY)
+def test_monotone_and_positive(classes):
+    for function, one in zip(functions(classes), classes, strict=True):
+        J = samples(function)
+        p = function(J)
+        assert np.all(p > 0)
+        for side in one.sides:
+            way = side.direction * (J - side.boundaries[0])
+            inside = way >= 0 if len(one.sides) > 1 else np.isfinite(way)
+            rising = p[inside][np.argsort(way[inside])]
+            assert np.all(np.diff(rising) >= -1e-14 * rising[1:])
+            # Between the first and the last boundary strictly so, each sample from the other.
+            between = np.sort(way[(way >= 0) & (side.direction * (J - side.boundaries[-1]) <= 0)])
+            values = function(side.boundaries[0] + side.direction * between)
+            assert values[-1] > values[len(values) // 2] > values[0]
+
+
+@settings(max_examples=40, deadline=None)
+@given(MANY)
+def test_once_continuously_differentiable(classes):
+    for function in functions(classes):
+        x = ca.SX.sym("x")
+        slope = ca.Function("slope", [x], [ca.gradient(function(x), x)])
+        marks = [mark for mark, _ in function.boundaries]
+        steepest = max(abs(float(slope(mark))) for mark in marks)
+        for k, mark in enumerate(marks):
+            here = float(slope(mark))
+            gap = min(abs(mark - other) for other in (*marks[:k], *marks[k + 1 :]))
+            for near in (mark - 1e-9 * gap, mark + 1e-9 * gap):
+                # Slopes change by at most their own size along a gap; beyond, what rounding of J makes of them.
+                rounding = 1e-15 * max(map(abs, marks)) / gap
+                neighbours = max(abs(float(slope(mark + side * gap))) for side in (-1, 1))
+                assert float(slope(near)) == pytest.approx(here, abs=(1e-7 + 100 * rounding) * max(neighbours, 1e-12 * steepest))
+
+
+@settings(max_examples=40, deadline=None)
+@given(objective_class())
+def test_least_where_ideal(one):
+    function = functions([one])[0]
+    if isinstance(one, Value):
+        assert function(one.boundaries[4]) == pytest.approx(0.1, rel=1e-15)
+        assert np.all(function(samples(function)) >= 0.1 * (1 - 1e-14))
+    elif isinstance(one, Range):
+        inside = np.linspace(one.boundaries[4], one.boundaries[5], 11)
+        assert function(inside) == pytest.approx(0.1, rel=1e-15)
+        assert np.all(function(samples(function)) >= 0.1 * (1 - 1e-14))
+    else:
+        side = one.sides[0]
+        first, second = side.boundaries[:2]
+        slope = 0.1 * (function.z[1] - function.z[0]) / abs(second - first)
+        for far in (1e-3, 0.3, 2.0):
+            J = first - far * (second - first)
+            exponent = -slope * abs(J - first) / 0.1
+            assert function(J) == pytest.approx(0.1 * np.exp(max(exponent, -600.0)), rel=1e-6)
+
+
+def test_the_spline_is_the_quartic_with_its_ends_and_slopes():
+    """p'' = a xi^2 + b (xi - 1)^2, with the values and slopes of Messac's rules at both ends, found as a linear system."""
+    marks, beta, count = np.array([1.0, 2.5, 3.0, 4.2, 6.0]), 1.5, 4
+    function = functions([Smaller(*marks), *(Smaller(1, 2, 3, 4, 5),) * (count - 1)])[0]
+    beta = function.beta
+    steps = 0.1 * (beta * (count - 1)) ** np.arange(5)
+    z, length = np.cumsum(steps), np.diff(marks)
+    slope = [0.1 * steps[1] / length[0]]
+    for k in range(4):
+        mean = steps[k + 1] / length[k]
+        least, most = (4 * mean - slope[-1]) / 3, 4 * mean - 3 * slope[-1]
+        slope.append(least + 0.1 * (most - least))
+        # p = a xi^4 / 12 + b (xi - 1)^4 / 12 + c xi + d.
+        rows = [[0, 1 / 12, 0, 1], [1 / 12, 0, 1, 1], [0, -1 / 3, 1, 0], [1 / 3, 0, 1, 0]]
+        a, b, c, d = np.linalg.solve(rows, [z[k], z[k + 1], slope[k] * length[k], slope[k + 1] * length[k]])
+        assert a > 0
+        assert b > 0
+        xi = np.linspace(0, 1, 11)
+        assert function(marks[k] + xi * length[k]) == pytest.approx(a * xi**4 / 12 + b * (xi - 1) ** 4 / 12 + c * xi + d, rel=1e-12)
+
+
+def test_with_a_fixed_factor_most_splines_were_not_monotone():
+    rng, raised = np.random.default_rng(0), 0
+    for _ in range(200):
+        marks = np.sort(rng.uniform(size=5))
+        raised += functions([Smaller(*marks), Smaller(1, 2, 3, 4, 5)])[0].beta > 1.5
+    assert raised > 100
+
+
+def test_degrees_are_the_numbers_of_boundaries():
+    one = Smaller(1, 2, 4, 5, 8)
+    assert one.degree(np.array([1, 2, 4, 5, 8])) == pytest.approx([1, 2, 3, 4, 5])
+    assert one.degree(np.array([1.5, 3.0, 6.5, 9.5])) == pytest.approx([1.5, 2.5, 4.5, 5.5])
+    below = one.degree(np.array([-5.0, 0.0, 0.9]))
+    assert np.all((below > 0) & (below < 1) & (np.diff(below, append=1) > 0))
+    assert Larger(8, 5, 4, 2, 1).degree(np.array([8, 5, 4, 2, 1, 0, 9])) == pytest.approx([1, 2, 3, 4, 5, 6, np.exp(-1 / 3)])
+    value = Value(0, 1, 2, 3, 4, 5, 6, 7, 8)
+    assert value.degree(np.arange(-1, 10.0)) == pytest.approx([6, 5, 4, 3, 2, 1, 2, 3, 4, 5, 6])
+    within = Range(0, 1, 2, 3, 4, 6, 7, 8, 9, 10)
+    assert within.degree(np.array([-1, 0, 3, 4, 4.5, 5, 6, 6.5, 10])) == pytest.approx([6, 5, 2, 1, 0.5, 0, 1, 1.5, 5])
+
+
+def test_equal_steps():
+    assert Smaller.even(1, 5) == Smaller(1, 2, 3, 4, 5)
+    assert Larger.even(5, 1) == Larger([5, 4, 3, 2, 1])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(GAPS, min_size=4, max_size=4), st.lists(GAPS, min_size=4, max_size=4))
+def test_units_and_senses_do_not_matter(first, second):
+    time = 1.0 + np.concatenate([[0.0], np.cumsum(first) * 3 / sum(first)])
+    effort = 0.2 + np.concatenate([[0.0], np.cumsum(second) * 7 / sum(second)])
+    one = PhysicalProgramming({"time": Smaller(*time), "effort": Smaller(*effort)}).rank(cart(101))
+    other = PhysicalProgramming({"time": Smaller(*(1e3 * time)), "effort": Larger(*(-1e10 * effort))}).rank(turned_cart(101))
+    assert other.values == pytest.approx(one.values, rel=1e-9, abs=1e-9)
+    assert other.degrees == pytest.approx(one.degrees, rel=1e-9)
+
+
+def test_the_value_is_the_logarithm_of_the_mean_and_the_last_boundary_a_hard_limit():
+    preference = PhysicalProgramming({"time": Smaller.even(1.5, 3.5), "effort": Smaller(0.3, 0.8, 1.6, 3.0, 6.0)})
+    front = cart(2001)
+    ranking = preference.rank(front)
+    T, E = front.objectives.T
+    met = (T <= 3.5) & (E <= 6.0)
+    assert np.array_equal(np.isfinite(ranking.values), met)
+    p = preference.functions
+    assert ranking.values[met] == pytest.approx(np.log10((p["time"](T[met]) + p["effort"](E[met])) / 2), rel=1e-12)
+    assert set(ranking.order[: met.sum()]) == set(np.flatnonzero(met))
+    least = minimize_scalar(lambda t: p["time"](t) + p["effort"](12 / t**3), bounds=(1.3, 3.5), method="bounded").x
+    assert ranking.best.objectives["time"] == pytest.approx(least, abs=2e-3)
+    assert ranking.message == ""
+
+
+def test_a_class_for_some_objectives_leaves_the_others_free():
+    ranking = PhysicalProgramming({"time": Value(1, 1.2, 1.5, 1.9, 2.0, 2.1, 2.5, 3, 3.5)}).rank(cart(2801))
+    assert ranking.best.objectives["time"] == pytest.approx(2.0, abs=1e-3)
+    assert np.isnan(ranking.degrees[:, 1]).all()
+
+
+def test_what_no_point_meets_is_named():
+    none = PhysicalProgramming({"time": Smaller(0.2, 0.4, 0.6, 0.8, 1.0), "effort": Smaller.even(1, 9)}).rank(cart(101))
+    assert none.message == "No point meets all hard limits; none has time at most 1 s."
+    assert none.best.objectives["time"] == 1.2
+
+
+def test_ranges_are_not_needed():
+    goals = [Objective("time")]
+    preference = PhysicalProgramming({"time": Smaller(1, 2, 3, 4, 5)})
+    J = np.array([[2.0]])
+    assert preference.stages(goals, None)[0].numbers(J) == preference.stages(goals, Ranges({"time": 0.0}, {"time": 9.0}))[0].numbers(J)

@@ -1,0 +1,205 @@
+"""Rankings of fronts that are not as they should be, their tables and figures, and black boxes."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+import pytest
+from choices import cart, plain_front
+from matplotlib.figure import Figure
+from synthetic_fronts import black_box, empty, flights, marked
+
+from macs import MACS
+from macs.decisions import (
+    Around,
+    FuzzyGoal,
+    FuzzyPhysicalProgramming,
+    FuzzySatisfactory,
+    GoalProgramming,
+    Larger,
+    Nimbus,
+    PhysicalProgramming,
+    Ranges,
+    ReferencePoint,
+    Smaller,
+    Value,
+    WeightedSum,
+)
+from problems.compiled import Objective
+
+EQUAL = WeightedSum({"time": 1.0, "height": 1.0})
+
+
+def drawn(axes) -> bytes:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        picture = io.BytesIO()
+        np.atleast_1d(axes)[0].figure.savefig(picture, format="png", dpi=50)
+    return picture.getvalue()
+
+
+def test_the_order_is_that_of_the_values():
+    ranking = EQUAL.rank(flights(40))
+    assert sorted(ranking.order) == list(range(40))
+    assert np.all(np.diff(ranking.values[ranking.order]) >= 0)
+    assert ranking.best.index == ranking.order[0] == np.argmin(ranking.values)
+    assert ranking.best.objectives == flights(40)[ranking.order[0]].objectives
+
+
+def test_points_that_are_not_feasible_are_last_and_count_in_no_range():
+    front = flights(5, status=["infeasible", "converged", "converged", "failed", "timeout"])
+    ranking = EQUAL.rank(front)
+    assert set(ranking.order[:2]) == {1, 2}
+    assert ranking.ranges == Ranges.of(front[1:3])
+    assert ranking.message == ""
+
+
+def test_points_that_were_not_confirmed_come_after_those_that_were():
+    front = marked(flights(5), [False, True, False, True, True])
+    ranking = EQUAL.rank(front)
+    assert set(ranking.order[:3]) == {1, 3, 4}
+    assert ranking.ranges == Ranges.of(front[[1, 3, 4]])
+    none = EQUAL.rank(marked(flights(5), [False] * 5))
+    assert none.message == "No point was confirmed by a simulation."
+    assert none.best.index == EQUAL.rank(flights(5)).best.index
+    # Points that were not simulated are neither confirmed nor contradicted.
+    some = EQUAL.rank(marked(flights(5), [False] * 5, seen=[True, False, False, False, False]))
+    assert some.order[-1] == 0
+
+
+def test_an_unconfirmed_point_is_not_best_even_where_only_it_meets_a_limit():
+    front = marked(cart(3), [True, False, True])
+    ranking = PhysicalProgramming({"time": Smaller.even(2.0, 3.0), "effort": Smaller.even(0.5, 1.0)}).rank(front)
+    assert list(np.isfinite(ranking.values)) == [False, True, False]
+    assert ranking.order[-1] == 1
+    assert ranking.message == "No point meets all hard limits together."
+
+
+def test_a_front_without_feasible_points_is_not_ranked():
+    with pytest.raises(ValueError, match=r"^the front has no feasible point to rank: no feasible point: 'climb.load' is violated most$"):
+        EQUAL.rank(empty())
+    with pytest.raises(ValueError, match=r"^the front has no feasible point to rank$"):
+        EQUAL.rank(flights(2, status=["failed", "infeasible"]))
+    with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges: no feasible point"):
+        Ranges.of(empty())
+
+
+def test_one_point_is_the_best_of_any_preference():
+    front = flights(1)
+    J = front[0].objectives
+    now = {name: 1.1 * value for name, value in J.items()}
+    for preference in (
+        EQUAL,
+        GoalProgramming(now),
+        FuzzyGoal(now),
+        FuzzyGoal({"time": Around(now["time"])}, aggregate="sum"),
+        FuzzySatisfactory({}, ["time", "height"]),
+        ReferencePoint(now),
+        PhysicalProgramming({"time": Smaller.even(1, 100)}),
+    ):
+        ranking = preference.rank(front)
+        assert list(ranking.order) == [0]
+        assert ranking.best.objectives == J
+        assert np.isfinite(ranking.values).all()
+    assert EQUAL.rank(front).values == pytest.approx([0.0])
+
+
+def test_an_objective_that_is_not_a_number_is_never_best():
+    front = plain_front([[np.nan, 0.0], [1.0, 2.0], [2.0, 1.0]], [Objective("a"), Objective("b")])
+    ranking = WeightedSum({"b": 1.0}).rank(front)
+    assert np.isnan(front.F[2, 0])
+    assert list(ranking.order) == [1, 0, 2]
+    assert ranking.values[2] == np.inf
+    assert ranking.ranges == Ranges({"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 2.0})
+
+
+def test_ranges_are_those_of_points_that_are_not_dominated():
+    front = plain_front([[1, 5], [2, 2], [3, 1], [9, 9]], [Objective("a"), Objective("b", "", "maximize")])
+    assert Ranges.of(front) == Ranges({"a": 1.0, "b": 9.0}, {"a": 9.0, "b": 5.0})
+    assert Ranges.of(plain_front([[1, 5], [2, 2], [3, 1], [9, 9]], [Objective("a"), Objective("b")])) == Ranges(
+        {"a": 1.0, "b": 1.0}, {"a": 3.0, "b": 5.0}
+    )
+
+
+def test_given_ranges_normalise():
+    front, wide = cart(11), Ranges({"time": 0.0, "effort": 0.0}, {"time": 10.0, "effort": 100.0})
+    ranking = WeightedSum({"time": 1.0, "effort": 1.0}).rank(front, wide)
+    assert ranking.values == pytest.approx(front.F[:, 0] / 10 + front.F[:, 1] / 100)
+    assert GoalProgramming({"time": 1.0}).rank(front, wide).values == pytest.approx((front.F[:, 0] - 1.0) / 10)
+
+
+def test_black_boxes_are_ranked():
+    def function(X):
+        return np.column_stack([X[:, 0] ** 2 + X[:, 1], (X[:, 0] - 2) ** 2 + X[:, 1]])
+
+    front = MACS(agents=6, archive=12).minimize(function, [(-1, 3), (0, 1)], evaluations=1500, seed=1, names=["a", "b"])
+    assert front.source is None
+    # The front is sqrt(a) + sqrt(b) = 2 between (0, 4) and (4, 0): aspirations that are alike are missed alike, at (1, 1).
+    ranking = ReferencePoint({"a": 0.5, "b": 0.5}).rank(front, Ranges({"a": 0, "b": 0}, {"a": 4, "b": 4}))
+    assert list(ranking.best.objectives.values()) == pytest.approx([1.0, 1.0], abs=0.4)
+    distance = np.abs(front.objectives - 1.0).max(axis=1)
+    assert distance[ranking.order[0]] == distance.min()
+    assert "a" in ranking.table()
+    assert drawn(ranking.plot())
+
+
+def test_a_table_shows_the_best_points_first():
+    ranking = FuzzyGoal({"time": 2.0, "effort": 1.0}, tolerances={"time": 1.0, "effort": 1.0}).rank(cart(30))
+    lines = ranking.table(5).splitlines()
+    assert lines[0] == repr(ranking.preference)
+    assert [line.split()[1] for line in lines[5:10]] == [str(i) for i in ranking.order[:5]]
+    assert lines[10] == "... 25 more points"
+    assert len(ranking.table(None).splitlines()) == 35
+    last = ranking.table(None).splitlines()[-1]
+    assert last.split()[4] == "-"
+    none = PhysicalProgramming({"time": Smaller.even(0.1, 1.0)}).rank(cart(3)).table()
+    assert none.splitlines()[-1] == "No point meets all hard limits; none has time at most 1 s."
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 5])
+@pytest.mark.parametrize("n", [1, 9])
+def test_figures_of_any_number_of_objectives(m, n):
+    front = black_box(n, m)
+    ranking = WeightedSum({"f0": 1.0}).rank(front)
+    assert drawn(ranking.plot())
+    assert drawn(ranking.plot_functions())
+    assert drawn(ranking.plot_degrees())
+    limited = PhysicalProgramming({"f0": Smaller.even(-1.0, 0.5)}).rank(front)
+    assert drawn(limited.plot())
+
+
+@pytest.mark.parametrize(
+    "preference",
+    [
+        WeightedSum({"time": 1.0}),
+        GoalProgramming({"time": 15.0, "height": Around(7.0)}),
+        FuzzyGoal({"time": 15.0}),
+        FuzzySatisfactory({}, ["time", "height"]),
+        ReferencePoint({"time": 15.0}),
+        Nimbus({"time": 15.0, "height": 7.0}, improve=["time"], free=["height"]),
+        PhysicalProgramming({"time": Smaller.even(10, 30), "height": Value(5, 5.5, 6, 6.5, 7, 7.5, 8, 8.5, 9)}),
+        FuzzyPhysicalProgramming({"height": Larger.even(9, 5)}),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_figures_of_any_preference(preference):
+    ranking = preference.rank(flights(8))
+    axes = ranking.plot_functions(Figure(layout="constrained"))
+    entering = int((~np.isnan(ranking.degrees).all(axis=0)).sum())
+    assert len(axes) == entering
+    assert drawn(axes)
+    bars = ranking.plot_degrees(2)
+    assert drawn(bars)
+    assert drawn(ranking.plot())
+    heights = [patch.get_height() for patch in bars.patches if patch.get_width() < 0.8]
+    shown = ranking.degrees[ranking.order[:2]]
+    assert sorted(heights)[-1] == pytest.approx(np.nanmax(shown))
+
+
+def test_degrees_of_choices_are_of_one_problem():
+    with pytest.raises(ValueError, match="'other' is a point of another problem"):
+        EQUAL.plot_degrees({"one": flights(2)[0], "other": black_box(2)[0]}, Ranges.of(flights(2)))
+    with pytest.raises(ValueError, match="choices must be a dict of points by name"):
+        EQUAL.plot_degrees([flights(2)[0]])

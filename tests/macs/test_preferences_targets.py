@@ -1,0 +1,202 @@
+"""Weighted sums, goals, fuzzy goals, reference points and NIMBUS on a front with closed forms: the cart's effort is 12 / T^3."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from choices import FASTEST, SLOWEST, cart, plain_front, turned_cart
+from scipy.optimize import brentq
+
+from macs.decisions import Around, FuzzyGoal, FuzzySatisfactory, GoalProgramming, Nimbus, Ranges, ReferencePoint, WeightedSum
+from problems.compiled import Objective
+
+FRONT = cart()
+STEP = (SLOWEST - FASTEST) / (len(FRONT) - 1)
+T0, T1, E0, E1 = FASTEST, SLOWEST, 12 / SLOWEST**3, 12 / FASTEST**3
+DT, DE = T1 - T0, E1 - E0
+
+
+def effort(T: float) -> float:
+    return 12 / T**3
+
+
+def balanced(time_weight: float, effort_weight: float) -> float:
+    """Where time_weight * T + effort_weight * 12 / T^3 is least."""
+    return (36 * effort_weight / time_weight) ** 0.25
+
+
+def chosen(preference, front=FRONT) -> float:
+    return preference.rank(front).best.objectives["time"]
+
+
+@pytest.mark.parametrize(("time", "other"), [(1.0, 1.0), (0.1, 0.9), (3.0, 7.0)])
+def test_weighted_sum_is_where_weighted_slopes_are_equal(time, other):
+    ranking = WeightedSum({"time": time, "effort": other}).rank(FRONT)
+    T = balanced(time / DT, other / DE)
+    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
+    assert ranking.values.min() == pytest.approx(time * (T - T0) / DT + other * (effort(T) - E0) / DE, rel=1e-6)
+
+
+def test_an_objective_without_a_weight_does_not_count():
+    assert chosen(WeightedSum({"time": 1.0})) == T0
+    assert chosen(WeightedSum({"effort": 1.0})) == T1
+
+
+def test_goals_between_their_targets_are_balanced():
+    both = GoalProgramming({"time": 1.5, "effort": 0.5}, weights={"time": 2.0, "effort": 5.0})
+    assert chosen(both) == pytest.approx(balanced(2 / DT, 5 / DE), abs=STEP)
+
+
+def test_a_goal_that_is_met_does_not_count_further():
+    # The balance would be at T = 2.5; the target of the time is met there, and the effort falls until it is not met.
+    T = balanced(1 / DT, 1 / DE)
+    assert chosen(GoalProgramming({"time": T + 0.3, "effort": E0})) == pytest.approx(T + 0.3, abs=STEP)
+    assert chosen(GoalProgramming({"time": T0, "effort": effort(T - 0.3)})) == pytest.approx(T - 0.3, abs=STEP)
+
+
+def test_where_all_goals_are_met_the_point_is_not_dominated():
+    ranking = GoalProgramming({"time": 3.5, "effort": 3.0}).rank(FRONT)
+    assert ranking.best.objectives["time"] == pytest.approx(balanced(1 / DT, 1 / DE), abs=STEP)
+    assert ranking.values[ranking.order[0]] == 0.0
+    dominated = plain_front([[2.5, 1.0], [2.4, 0.9], [1.2, 7.0], [4.0, 0.1]], list(FRONT.goals))
+    assert GoalProgramming({"time": 3.5, "effort": 3.0}).rank(dominated).best.index == 1
+
+
+def test_priorities_come_one_after_the_other():
+    first_time = GoalProgramming({"time": 2.0, "effort": 0.3}, priorities=["time", "effort"])
+    assert chosen(first_time) == pytest.approx(2.0, abs=STEP)
+    first_effort = GoalProgramming({"time": 2.0, "effort": 0.3}, priorities=["effort", "time"])
+    assert chosen(first_effort) == pytest.approx((12 / 0.3) ** (1 / 3), abs=STEP)
+    ranking = first_time.rank(FRONT)
+    assert ranking.stage_names == ("priority 1", "priority 2", "sum of all")
+    assert list(first_time.rank(FRONT).order) == list(np.lexsort([np.maximum(FRONT.F[:, 1] - 0.3, 0), np.maximum(FRONT.F[:, 0] - 2, 0)]))
+
+
+def test_a_target_on_both_sides():
+    assert chosen(GoalProgramming({"time": Around(2.7)})) == pytest.approx(2.7, abs=STEP)
+    either = GoalProgramming({"time": Around(2.7), "effort": E0}, priorities=["time", "effort"])
+    assert chosen(either) == pytest.approx(2.7, abs=STEP)
+
+
+def test_the_least_membership_is_best_where_both_are_equal():
+    wanted, hoped = 1.5, 0.5
+    T = brentq(lambda T: (T - wanted) / (T1 - wanted) - (effort(T) - hoped) / (E1 - hoped), T0, T1)
+    ranking = FuzzyGoal({"time": wanted, "effort": hoped}).rank(FRONT)
+    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
+    assert ranking.degrees[ranking.order[0]] == pytest.approx(1 - (T - wanted) / (T1 - wanted), abs=1e-3)
+    assert ranking.values[ranking.order[0]] == pytest.approx((T - wanted) / (T1 - wanted), abs=1e-3)
+
+
+def test_the_sum_of_memberships_is_balanced_between_tolerances():
+    T = balanced(1 / 1.5, 1 / 2.0)
+    assert 1.5 < T < 3.0
+    assert 0.4 < effort(T) < 2.4
+    preference = FuzzyGoal({"time": 1.5, "effort": 0.4}, tolerances={"time": 1.5, "effort": 2.0}, aggregate="sum")
+    assert chosen(preference) == pytest.approx(T, abs=STEP)
+
+
+def test_beyond_a_tolerance_no_point_is_acceptable():
+    ranking = FuzzyGoal({"time": 2.0, "effort": 1.0}, tolerances={"time": 0.5, "effort": 1.0}).rank(FRONT)
+    J = FRONT.objectives
+    met = (J[:, 0] <= 2.5 + 1e-6) & (J[:, 1] <= 2.0 + 1e-6)
+    assert np.array_equal(np.isfinite(ranking.values), met)
+    none = FuzzyGoal({"time": 1.3, "effort": 0.2}, tolerances={"time": 0.1, "effort": 0.1}).rank(FRONT)
+    assert np.isinf(none.values).all()
+    assert none.message == "No point meets all hard limits together."
+    # The excesses over 1.4 s and 0.3 are in units of the tolerances.
+    T = brentq(lambda T: (T - 1.4) / 0.1 - (effort(T) - 0.3) / 0.1, T0, T1)
+    assert none.best.objectives["time"] == pytest.approx(T, abs=STEP)
+
+
+@pytest.mark.parametrize("regulating", [0.0, 0.1, 0.3, 0.45])
+def test_eq_53_weighs_two_memberships(regulating):
+    preference = FuzzySatisfactory({}, ["effort", "time"], regulating=regulating)
+    T = balanced((0.5 - regulating) / DT, (0.5 + regulating) / DE)
+    assert chosen(preference) == pytest.approx(min(T, T1), abs=STEP)
+    d = np.column_stack([(FRONT.F[:, 1] - E0) / DE, (FRONT.F[:, 0] - T0) / DT])
+    value = (0.5 + regulating) * d[:, 0] + (0.5 - regulating) * d[:, 1]
+    assert preference.rank(FRONT).values == pytest.approx(value, abs=1e-12)
+    assert preference.kappa(FRONT.goals, Ranges.of(FRONT), FRONT.objectives) == pytest.approx(d[:, 0] - d[:, 1], abs=1e-12)
+
+
+def test_an_order_that_is_a_limit_is_kept():
+    free = FuzzySatisfactory({}, ["time", "effort"], regulating=0.0).rank(FRONT)
+    kept = FuzzySatisfactory({}, ["time", "effort"], regulating=0.0, ordered=True).rank(FRONT)
+    kappa = free.preference.kappa(FRONT.goals, free.ranges, FRONT.objectives)
+    assert kappa[free.order[0]] > 0
+    T = brentq(lambda T: (T - T0) / DT - (effort(T) - E0) / DE, T0 + 0.1, T1 - 0.1)
+    assert kept.best.objectives["time"] == pytest.approx(T, abs=STEP)
+    assert np.isinf(kept.values[kappa > 1e-5]).all()
+
+
+def test_aspirations_are_missed_alike():
+    preference = ReferencePoint({"time": 1.5, "effort": 0.5}, {"time": 2.5, "effort": 3.0}, augmentation=0.0)
+    T = brentq(lambda T: (T - 1.5) / 1.0 - (effort(T) - 0.5) / 2.5, T0, T1)
+    ranking = preference.rank(FRONT)
+    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
+    assert ranking.values.min() == pytest.approx(T - 1.5, abs=2 * STEP)
+    J = np.array([[1.5, 3.0], [2.5, 0.5], [0.5, 8.0]])
+    assert preference.degrees(FRONT.goals, Ranges.of(FRONT), J) == pytest.approx(np.array([[1.0, 0.0], [0.0, 1.0], [2.0, -2.0]]))
+
+
+def test_aspirations_that_can_be_met_are_surpassed_alike():
+    preference = ReferencePoint({"time": 3.5, "effort": 5.0}, augmentation=0.0)
+    T = brentq(lambda T: (T - 3.5) / DT - (effort(T) - 5.0) / DE, T0, T1)
+    assert chosen(preference) == pytest.approx(T, abs=STEP)
+
+
+def test_an_aspiration_of_one_objective_leaves_the_others_their_best():
+    T = brentq(lambda T: (T - 2.0) / DT - (effort(T) - E0) / DE, T0, T1)
+    assert chosen(ReferencePoint({"time": 2.0}, augmentation=0.0)) == pytest.approx(T, abs=STEP)
+
+
+def test_augmentation_prefers_the_point_that_is_not_dominated():
+    goals = [Objective("time"), Objective("effort")]
+    front = plain_front([[1.0, 0.0], [0.5, 1.0], [0.6, 1.0], [0.0, 2.0]], goals)
+    ranking = ReferencePoint({"time": 0.0, "effort": 0.0}).rank(front)
+    assert list(ranking.order[:2]) != [2, 1]
+    assert ranking.values[1] < ranking.values[2]
+
+
+def test_nimbus_moves_until_its_limit():
+    current = {"time": 2.0, "effort": 1.5}
+    T = (12 / 3.0) ** (1 / 3)
+    ranking = Nimbus(current, improve=["time"], until={"effort": 3.0}).rank(FRONT)
+    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
+    assert ranking.degrees[ranking.order[0]] == pytest.approx([(2.0 - T) / (2.0 - T0), 1.0], abs=1e-3)
+    assert np.isinf(ranking.values[FRONT.F[:, 0] > 2.0 + 1e-5]).all()
+    assert np.isinf(ranking.values[FRONT.F[:, 1] > 3.0 + 1e-4]).all()
+
+
+def test_nimbus_asks_for_a_value_and_keeps_others():
+    goals = [Objective("a"), Objective("b"), Objective("c", "", "maximize")]
+    J = [[0, 9, 5], [2, 4, 4], [3, 4, 9], [4, 3, 7], [5, 5, 8], [9, 0, 0]]
+    front = plain_front(np.array(J, dtype=float), goals)
+    ranking = Nimbus(front[1], to={"c": 6.0}, keep=["b"], free=["a"]).rank(front)
+    assert set(np.flatnonzero(np.isfinite(ranking.values))) == {1, 2, 3}
+    # In units of the ranges (0 to 9 each), c exceeds the value that was asked for by 3 and by 1.
+    assert ranking.values[[2, 3]] == pytest.approx([-3 / 9, -1 / 9], abs=1e-3)
+    assert ranking.best.index == 2
+    assert np.isnan(ranking.degrees[:, 0]).all()
+    assert ranking.degrees[[1, 2, 3], 2] == pytest.approx([0.0, 1.0, 1.0])
+
+
+WANTS = [
+    lambda t, e: WeightedSum({"time": 1.0, "effort": 2.0}),
+    lambda t, e: GoalProgramming({"time": t(1.5), "effort": e(0.5)}),
+    lambda t, e: GoalProgramming({"time": Around(t(1.9)), "effort": e(0.5)}, priorities=[("effort",), "time"]),
+    lambda t, e: FuzzyGoal({"time": t(1.5), "effort": e(0.5)}),
+    lambda t, e: FuzzyGoal({"time": t(1.5), "effort": e(0.5)}, aggregate="sum"),
+    lambda t, e: FuzzySatisfactory({"time": t(1.5)}, ["effort", "time"]),
+    lambda t, e: ReferencePoint({"time": t(1.5)}, {"time": t(2.0)}),
+    lambda t, e: Nimbus({"time": t(2.0), "effort": e(1.5)}, to={"time": t(1.6)}, until={"effort": e(2.9)}),
+]
+
+
+@pytest.mark.parametrize("want", WANTS)
+def test_units_and_senses_do_not_matter(want):
+    one = want(lambda t: t, lambda e: e).rank(cart(301))
+    other = want(lambda t: 1e3 * t, lambda e: -1e10 * e).rank(turned_cart(301))
+    assert other.stage_values == pytest.approx(one.stage_values, rel=1e-9, abs=1e-12, nan_ok=True)
+    assert other.degrees == pytest.approx(one.degrees, abs=1e-9, nan_ok=True)
+    assert other.best.index == one.best.index
