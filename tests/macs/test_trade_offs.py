@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import null_space
-from smooth_problems import nlp_of, shuttle, two_wells, vector
+from smooth_problems import nlp_of, shuttle, slide, two_wells, vector
 from synthetic_fronts import black_box
 
 from macs import Front, optimize, sweep
@@ -18,6 +18,8 @@ from problems.cases import goddard
 from transcription import DFET, NLP, Transcription, parse, stated
 from transcription.inner import inner_solver
 from transcription.nlp.derivatives import gradients
+from transcription.nlp.optimality import Linearised
+from transcription.nlp.projection import metric
 from transcription.nlp.scalarized import scalarize
 
 MESH = "dfet:4x4"
@@ -194,6 +196,19 @@ def test_a_peak_as_an_objective(method):
     assert trade_offs(point).matrix == pytest.approx(np.array([[1.0, -2.0], [-0.5, 1.0]]), rel=1e-3)
 
 
+@pytest.mark.parametrize("c", [0.05, 0.2, 0.4, 0.49])
+def test_a_peak_that_need_not_count_is_held_too(c):
+    """At a constant control c the effort is 2 c^2, the miss (2 c - 1)^2, the largest x 2 c, and gradients are constant: 4 c, 4 (2 c - 1)
+    and 2. The first two are enough for optimality."""
+    problem = slide()
+    run = problem.phases["run"]
+    problem.minimize("highest", run.peak(run["x"]))
+    nlp = nlp_of(problem)
+    found = trade_offs(as_front(nlp, nlp.tighten(vector(nlp, u=c)[None])[0])[0])
+    by_u = np.array([4 * c, 4 * (2 * c - 1), 2.0])
+    assert found.matrix == pytest.approx(by_u / by_u[:, None], rel=1e-6)
+
+
 def limited(time: float) -> dict[str, np.ndarray]:
     """The least of a second objective where the first is at most so much."""
     return {"reference": np.array([time, 0.0]), "weights": np.array([0.0, 1.0])}
@@ -219,6 +234,10 @@ def test_controls_that_switch_at_moving_edges():
     assert point.objectives == {"time": pytest.approx(2.5, rel=1e-6), "fuel": pytest.approx(1.0)}
     assert trade_offs(point).rate("time", "fuel") == pytest.approx(0.5 * (1 - 1 / 0.5**2), rel=1e-5)
     assert trade_offs(point).matrix == pytest.approx(np.array([[1.0, -1 / 1.5], [-1.5, 1.0]]), rel=1e-4)
+    # A variation of the place of a switch is as long as its part of the duration, however far the mesh lets it move.
+    lengths = metric(Linearised.of(nlp, found.z)).diagonal() / nlp.span**2
+    edges = [k for k, variable in enumerate(nlp.variables) if ".edge[" in variable.name]
+    assert len(edges) == 2 and lengths[edges] == pytest.approx(np.ones(2))
 
 
 # Against other optima.
