@@ -22,6 +22,7 @@ from problems.problem import Problem
 from transcription import from_dict
 from transcription.nlp.projection import Projection, projection
 
+from ..fronts.builders import OPTIMAL
 from ..fronts.point import Point
 from ..io.text import text_table
 from ..refinement.mesh_loop import Programs
@@ -29,7 +30,7 @@ from ..refinement.mesh_loop import Programs
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OPTIMAL = 1e-3
+LEFT = 1e-3
 """Largest part of the longest of the weighted gradients that is left of their sum at a point that is taken to be Pareto-optimal."""
 NOTHING = 1e-4
 """Part of its gradient below which nothing is left of it within what is active."""
@@ -103,7 +104,7 @@ class TradeOffs:
         """
         if self.point.weights is not None:
             return self.point.weights
-        if self.left > OPTIMAL:
+        if self.left > LEFT:
             raise ValueError(f"point {self.point.index} is not on a front, so that there are no rates along one: {self._not_optimal}")
         w = self._projection.weights / self._projection.scales
         return dict(zip((goal.name for goal in self.goals), (w / w.sum()).tolist(), strict=True))
@@ -177,15 +178,17 @@ class TradeOffs:
     def messages(self) -> tuple[str, ...]:
         """What the projection says of the point: that it is not Pareto-optimal, which objectives can get better together with all others,
         and which can get no better along what is active; or why there is none."""
+        violation = self.point.violation
+        found = [] if violation <= OPTIMAL else [f"not feasible: the violation is {violation:.1e}"]
         try:
-            found = [f"not Pareto-optimal: {self._not_optimal}"] if self.left > OPTIMAL else []
+            found += [f"not Pareto-optimal: {self._not_optimal}"] if self.left > LEFT else []
         except ValueError as reason:
-            return (f"no trade-off matrix: {reason}",)
+            return (*found, f"no trade-off matrix: {reason}")
         gains = self._gains
         for i, goal in enumerate(self.goals):
             if self._fixed[i]:
                 found.append(f"the row of '{goal.name}' is degenerate: within what is active it can get no better")
-            elif (np.delete(gains[i], i) > OPTIMAL).all():
+            elif (np.delete(gains[i], i) > LEFT).all():
                 found.append(f"the row of '{goal.name}' has no negative entry: it and all others can get better together")
         return tuple(found)
 
@@ -202,7 +205,7 @@ class TradeOffs:
             cells += [[name, *row] for name, row in zip(names, _cells(self.rates.T, self._signs), strict=True)]
             lines += ["Along the front, one other objective giving way and the rest held:", text_table([titles, under], cells, flush), ""]
         except ValueError as reason:
-            lines += [f"No rates: {reason}", ""]
+            lines += [f"No rates: {reason}.", ""]
         # Where there is none, the messages have the reason.
         with suppress(ValueError):
             rows = zip(self.goals, _cells(self.matrix, self._signs), strict=True)
@@ -256,9 +259,9 @@ class TradeOffs:
 
     @property
     def _not_optimal(self) -> str:
-        share, point = f"{100 * self.left:.2g} % of the longest of them (on a front at most {100 * OPTIMAL:g} %)", self.point
-        feasible = "" if point.violation <= NOTHING else f", and the point is not feasible: its violation is {point.violation:.1e}"
-        return f"the weighted sum of the gradients keeps {share}{feasible}"
+        return (
+            f"the weighted sum of the gradients keeps {100 * self.left:.2g} % of the longest of them (on a front at most {100 * LEFT:g} %)"
+        )
 
     @cached_property
     def _projection(self) -> Projection:

@@ -183,6 +183,7 @@ def test_what_is_active_is_held_and_what_has_no_multiplier_may_be_left():
     found = trade_offs(as_front(nlp, vector(nlp, p=0.3, q=0.0))[0])
     assert found.matrix == pytest.approx(np.array([[1.0, np.nan], [-0.3 / 0.7, 1.0]]), nan_ok=True)
     assert found.messages == ("the row of 'from left' is degenerate: within what is active it can get no better",)
+    assert trade_offs(as_front(nlp, vector(nlp, p=0.1, q=0.0))[0]).messages[0] == "not feasible: the violation is 2.0e-01"
 
 
 @pytest.mark.parametrize("method", [DFET(4, 4), parse("radau:6x3")], ids=str)
