@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 LEFT = 1e-3
 """Largest part of the longest of the weighted gradients that is left of their sum at a point that is taken to be Pareto-optimal."""
-NOTHING = 1e-4
+NOTHING = 1e-3
 """Part of its gradient below which nothing is left of it within what is active."""
 NEGLIGIBLE = 1e-6
 """Part of the largest weight, in ranges of the front, below which others are round-off."""

@@ -31,6 +31,8 @@ STEP = 1e-3
 """By how much coefficients of controls are moved, in spans, to see what they do: controls are linear in them."""
 FLOOR = 1e-4
 """Part of the longest of all gradients that every gradient is taken to have."""
+FOLLOWS = 1e-8
+"""Change of an inequality, by a variation of length one of what is not held, below which it follows from what is held."""
 DEPENDENT_ON_HELD = 1e-9
 """Part of the largest eigenvalue below which others, of products of the gradients of what may be left, are round-off."""
 
@@ -109,13 +111,20 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
     tight = linear.slack <= TIGHT
     bounding = tight & sides[:, np.isinf(nlp.span)].any(axis=1)
     held = ((multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE)) | bounding
-    every = np.vstack([dF, sides[tight & ~held]])
 
     def along(active: np.ndarray, gradients: np.ndarray) -> np.ndarray:
         return steepest(measure, vstack([linear.of_equations, csr_matrix(sides[active])]), gradients)[0]
 
     try:
-        free, s = along(bounding, dF), along(held, every)
+        free = along(bounding, dF)
+        # Most of what may be left follows from what is held, as a mass does from a thrust that is off: a variation at random shows that.
+        anywhere = np.random.default_rng(0).normal(size=(1, len(z)))
+        anywhere[:, ~np.isin(np.arange(len(z)), nlp.free)] = 0.0
+        s = along(held, np.vstack([dF, anywhere]))
+        loose = tight & ~held
+        loose[loose] = np.abs(sides[loose] @ s[:, -1]) > FOLLOWS * np.sqrt(max(anywhere[0] @ s[:, -1], 0.0))
+        every = np.vstack([dF, sides[loose]])
+        s = np.hstack([s[:, : len(dF)], along(held, sides[loose])]) if loose.any() else s[:, : len(dF)]
     except RuntimeError:
         return None
     gram = every @ s
