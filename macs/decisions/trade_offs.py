@@ -117,7 +117,9 @@ class TradeOffs:
     def rate(self, i: str | int, j: str | int) -> float:
         """dJ_i/dJ_j along the front, the other objectives held: -w_j/w_i for minimised objectives. Of two, it is the front's slope.
 
-        It is infinite where objective i has weight 0, as the others have at the end of a front, and not a number where both have.
+        It is infinite where objective i has weight 0, as the others have at the end of a front, and not a number where both have. At a
+        corner, as at an end of a front where limits hold all that could vary, several weights do as well, and the rates are those of one of
+        them.
 
         Raises
         ------
@@ -128,13 +130,14 @@ class TradeOffs:
 
     @property
     def matrix(self) -> np.ndarray:
-        """The trade-off matrix (m, m): row i has dJ_k/dJ_i along the direction in which objective i gets better fastest while what is
-        active stays so.
+        """The trade-off matrix (m, m): row i has dJ_k/dJ_i along the direction in which objective i gets better fastest within what is
+        active. Active constraints with a multiplier stay so; others may be left.
 
         Of two objectives it has the rates; of more, the others are not held, and the direction depends on how variations are measured: see
-        `transcription.nlp.projection`. For minimised objectives (signs of those in other senses are the user's) a negative entry says
-        that k gets worse while i gets better, a positive one that both get better. A row of an objective that can get no better along what
-        is active is not a number.
+        `transcription.nlp.projection`. Where controls are on their bounds for a while, it is known to about an element of the mesh.
+
+        For minimised objectives a negative entry says that k gets worse while i gets better, a positive one that both get better; where one
+        of the two is maximised the sign is the other one. A row of an objective that can get no better within what is active is not a number.
 
         Raises
         ------
