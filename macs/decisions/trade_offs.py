@@ -137,7 +137,7 @@ class TradeOffs:
         `transcription.nlp.projection`. Where controls are on their bounds for a while, it is known to about an element of the mesh.
 
         For minimised objectives a negative entry says that k gets worse while i gets better, a positive one that both get better; where one
-        of the two is maximised the sign is the other one. A row of an objective that can get no better within what is active is not a number.
+        of the two is maximised the sign is the other one. A row of an objective that can get no better within what is active is no number.
 
         Raises
         ------
