@@ -173,9 +173,9 @@ class TradeOffs:
         """
         found = self._projection
         if self.point.weights is None:
-            return found.slope(found.weights)
+            return found.left(found.weights)
         weights = np.array(list(self.point.weights.values())) * found.scales
-        return found.slope(weights / weights.sum())
+        return found.left(weights / weights.sum())
 
     @cached_property
     def messages(self) -> tuple[str, ...]:

@@ -14,10 +14,11 @@ states follow from these.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, vstack
+from scipy.sparse import coo_matrix, csr_matrix, diags, vstack
 
 from ..base import NLP
 from ..numerics.polynomials import basis_matrix, gauss_legendre
@@ -31,10 +32,9 @@ STEP = 1e-3
 """By how much coefficients of controls are moved, in spans, to see what they do: controls are linear in them."""
 FLOOR = 1e-4
 """Part of the longest of all gradients that every gradient is taken to have."""
-FOLLOWS = 1e-8
-"""Change of an inequality, by a variation of length one of what is not held, below which it follows from what is held."""
-DEPENDENT_ON_HELD = 1e-9
-"""Part of the largest eigenvalue below which others, of products of the gradients of what may be left, are round-off."""
+RELEASED, EXACT = 1e-4, 1e-6
+"""Change of what is active, in its scales, by a variation of length one, below which it need not stay so: a hundredth of that length is
+still a large step, and points are feasible to 1e-6; and where it is asked what is left of gradients at an optimum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,51 +49,84 @@ class Projection:
         Of the objectives.
     weights : array (m,)
         Multipliers of the objectives in these scales, not negative and of sum 1, that leave the least of their gradients.
-    s : array (n, m + k)
-        The gradients of the objectives, and of the k inequalities c >= 0 that are active and may be left, projected on the tangent space of
-        what is held, as variations in units.
-    gram : array (m + k, m + k)
-        The products of these.
-    free : array (m,)
-        The lengths of the objectives' gradients where only the equations are held, and what bounds peaks: what others are compared with.
+    variations : array (n, k)
+        Gradients of the objectives, of the inequalities that are held, and of those that may be left, in the metric: variations in units
+        along which the equations stay satisfied, and so does what bounds peaks.
+    columns : array (q, k)
+        The same in coordinates in which the metric is Euclid's.
+    held : int
+        How many inequalities are held.
     """
 
     nlp: NLP
     scales: np.ndarray
     weights: np.ndarray
-    s: np.ndarray
-    gram: np.ndarray
-    free: np.ndarray
+    variations: np.ndarray
+    columns: np.ndarray
+    held: int
+
+    @cached_property
+    def free(self) -> np.ndarray:
+        """The lengths (m,) of the objectives' gradients where no inequality is held: what is left of them is compared with these."""
+        return np.linalg.norm(self.columns[:, : len(self.scales)], axis=0)
 
     def fall(self, combination: np.ndarray) -> np.ndarray:
         """By how much the objectives fall (m,), in their scales, along the steepest descent of a combination (m,) of them, of which the
         length is its slope."""
-        return self.gram[: len(self.scales)] @ self._steepest(combination)
+        return self._nearly[0].T @ _on_cone(combination, self._nearly)[0]
 
     def descent(self, combination: np.ndarray) -> np.ndarray:
         """That descent: a variation (n,) of the vector, in the user's units."""
-        return -units(self.nlp) * (self.s @ self._steepest(combination))
+        m, (_, of_loose) = len(self.scales), _on_cone(combination, self._nearly)
+        beside = self.columns[:, :m] @ combination - self.columns[:, m + self.held :] @ of_loose
+        U, sizes, V = _held(self.columns[:, m : m + self.held], RELEASED)
+        of_held = V.T @ ((U.T @ beside) / sizes)
+        return -units(self.nlp) * (self.variations @ np.concatenate([combination, -of_held, -of_loose]))
 
     def slope(self, combination: np.ndarray) -> float:
         """How fast a combination (m,) of the objectives can fall: its slope along its steepest descent, as a part of the longest of the
         gradients that it combines; 0 where it cannot."""
-        x, shares = self._steepest(combination), np.abs(combination)
-        # Where that is next to nothing, at an optimum that nothing holds, the others'.
-        longest = (shares * self.free).max() + FLOOR * shares.sum() * self.free.max()
-        return float(np.sqrt(max(x @ self.gram @ x, 0.0))) / (longest or 1.0)
+        return self._part(combination, self._nearly)
 
-    def _steepest(self, combination: np.ndarray) -> np.ndarray:
-        """The coefficients (m + k,) of its gradient projected on the cone, of which multipliers of the inequalities, not negative, leave
-        least."""
+    def left(self, weights: np.ndarray) -> float:
+        """What is left of the sum of the gradients, each times its weight (m,), as a part of the longest: 0 at a Pareto optimum with these
+        weights."""
+        return self._part(weights, self._exactly)
+
+    @cached_property
+    def _nearly(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._beside(RELEASED)
+
+    @cached_property
+    def _exactly(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._beside(EXACT)
+
+    def _beside(self, released: float) -> tuple[np.ndarray, np.ndarray]:
+        """The gradients of the objectives (q, m) and of what may be left (q, l) beside what is held."""
         m = len(self.scales)
-        if self.gram.shape[0] == m:
-            return np.asarray(combination, dtype=float)
-        values, vectors = np.linalg.eigh(self.gram[m:, m:])
-        some = values > DEPENDENT_ON_HELD * max(values.max(), self.free.max() ** 2)
-        roots, across = np.sqrt(values[some]), vectors[:, some].T
-        right = across @ (self.gram[m:, :m] @ combination) / roots
-        multipliers = nnls(roots[:, None] * across, right, maxiter=10 * len(values))[0] if some.any() else np.zeros(len(values))
-        return np.concatenate([combination, -multipliers])
+        U = _held(self.columns[:, m : m + self.held], released)[0]
+        others = np.delete(self.columns, slice(m, m + self.held), axis=1)
+        left = others - U @ (U.T @ others)
+        left -= U @ (U.T @ left)
+        loose = np.where(np.linalg.norm(left[:, m:], axis=0) > released, left[:, m:], 0.0)
+        return left[:, :m], loose
+
+    def _part(self, combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> float:
+        shares = np.abs(combination)
+        # Where the gradients are next to nothing, at an optimum that nothing holds, the others'.
+        longest = (shares * self.free).max() + FLOOR * shares.sum() * self.free.max()
+        return float(np.linalg.norm(_on_cone(combination, beside)[0])) / (longest or 1.0)
+
+
+def _on_cone(combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """What is left (q,) of the gradient of a combination on the cone, and the multipliers (l,) of what may be left: not negative, they take
+    the most of it."""
+    objectives, loose = beside
+    target, lengths = objectives @ combination, np.linalg.norm(loose, axis=0)
+    used, multipliers = lengths > 0, np.zeros(len(lengths))
+    if used.any():
+        multipliers[used] = nnls(loose[:, used] / lengths[used], target, maxiter=10 * len(lengths))[0] / lengths[used]
+    return target - loose @ multipliers, multipliers
 
 
 def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Projection | None:
@@ -107,41 +140,37 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
     if conditions is None or conditions.scaled is None:
         return None
     linear, (weights, multipliers) = conditions.linear, conditions.scaled
-    dF, sides, measure = linear.of_objectives, linear.of_inequalities, metric(linear)
+    dF, sides, roots = linear.of_objectives, linear.of_inequalities, metric_roots(linear)
     tight = linear.slack <= TIGHT
     bounding = tight & sides[:, np.isinf(nlp.span)].any(axis=1)
-    held = ((multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE)) | bounding
-
-    def along(active: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-        return steepest(measure, vstack([linear.of_equations, csr_matrix(sides[active])]), gradients)[0]
-
+    held = (multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE) & ~bounding
+    loose = tight & ~held & ~bounding
+    every = np.vstack([dF, sides[held], sides[loose]])
     try:
-        free = along(bounding, dF)
-        # Most of what may be left follows from what is held, as a mass does from a thrust that is off: a variation at random shows that.
-        anywhere = np.random.default_rng(0).normal(size=(1, len(z)))
-        anywhere[:, ~np.isin(np.arange(len(z)), nlp.free)] = 0.0
-        s = along(held, np.vstack([dF, anywhere]))
-        loose = tight & ~held
-        loose[loose] = np.abs(sides[loose] @ s[:, -1]) > FOLLOWS * np.sqrt(max(anywhere[0] @ s[:, -1], 0.0))
-        every = np.vstack([dF, sides[loose]])
-        s = np.hstack([s[:, : len(dF)], along(held, sides[loose])]) if loose.any() else s[:, : len(dF)]
+        # Next to no length is given to what follows from the rest.
+        measure, equations = roots.T @ roots + diags(np.full(len(z), DEPENDENT)), vstack([linear.of_equations, csr_matrix(sides[bounding])])
+        s, _ = steepest(measure, equations, every)
     except RuntimeError:
         return None
-    gram = every @ s
-    lengths = np.sqrt(np.maximum(np.diag(dF @ free), 0.0))
-    return Projection(nlp, linear.scales, weights, s, 0.5 * (gram + gram.T), lengths)
+    return Projection(nlp, linear.scales, weights, s, roots @ s, int(np.count_nonzero(held)))
 
 
-def metric(linear: Linearised) -> csc_matrix:
-    """The metric (n, n) of variations of a vector in `units`; what follows from the rest has next to none."""
+def _held(columns: np.ndarray, released: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The singular vectors (q, r), values (r,) and vectors (r, k) of the gradients of what is held, without those that need not be."""
+    U, sizes, V = np.linalg.svd(columns, full_matrices=False)
+    some = sizes > released
+    return U[:, some], sizes[some], V[some]
+
+
+def metric_roots(linear: Linearised) -> csr_matrix:
+    """Matrix (q, n) of which the product with a variation of a vector, in `units`, has the length of that variation."""
     nlp = linear.nlp
-    of_controls = _controls(nlp, linear.z)
-    own = np.full(len(nlp.variables), DEPENDENT)
     alone = np.setdiff1d(nlp.free, [nlp.free[column] for profile in nlp.profiles for column in profile.columns])
     edges = tuple(f"{phase.name}.edge[" for phase in nlp.problem.phases)
     # The bounds of an edge are those of its neighbours.
-    own[alone] = [nlp.span[one] ** 2 if nlp.variables[one].name.startswith(edges) else 1.0 for one in alone]
-    return csc_matrix(of_controls.T @ of_controls + diags(own))
+    own = [nlp.span[one] if nlp.variables[one].name.startswith(edges) else 1.0 for one in alone]
+    of_others = csr_matrix((own, (np.arange(len(alone)), alone)), shape=(len(alone), len(nlp.variables)))
+    return csr_matrix(vstack([_controls(nlp, linear.z), of_others]))
 
 
 def _controls(nlp: NLP, z: np.ndarray) -> csr_matrix:
