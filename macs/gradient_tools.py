@@ -208,6 +208,16 @@ def sweep(
     return job.run(lambda: job.swept(points, method), mended)
 
 
+def meshes_to_begin_on(problem: Problem | CompiledProblem, compiled: CompiledProblem) -> list[Meshed]:
+    """Meshes from which one that suits an optimum is found, in the order in which they are tried."""
+    own = default_transcription(problem)
+    coarse = [own, *COARSE] if isinstance(own, Meshed) else list(COARSE)
+    elements = guessed_elements(compiled)
+    if elements > coarse[0].elements:
+        coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
+    return coarse
+
+
 @dataclass(frozen=True)
 class Terms:
     """The arguments that all gradient tools have; see `optimize`."""
@@ -295,11 +305,7 @@ class _Job:
             return self.run(lambda: self.front([self.solver.solve(reference, weights)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
         limits = PART * (verify or VERIFY)
-        own = default_transcription(self._statement)
-        coarse = [own, *COARSE] if isinstance(own, Meshed) else list(COARSE)
-        elements = guessed_elements(self.problem)
-        if elements > coarse[0].elements:
-            coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
+        coarse = meshes_to_begin_on(self._statement, self.problem)
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)

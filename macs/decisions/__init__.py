@@ -19,11 +19,15 @@ from ..preferences import (
     Value,
     WeightedSum,
 )
+from .choice import Choice, Step
+from .decide import decide
 from .front_rates import front_rates, plot_rates
+from .satisfy import satisfy
 from .trade_offs import TradeOffs, trade_offs
 
 __all__ = [
     "Around",
+    "Choice",
     "FuzzyGoal",
     "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",
@@ -38,10 +42,13 @@ __all__ = [
     "ReferencePoint",
     "Smaller",
     "Stage",
+    "Step",
     "TradeOffs",
     "Value",
     "WeightedSum",
+    "decide",
     "front_rates",
     "plot_rates",
+    "satisfy",
     "trade_offs",
 ]

@@ -60,7 +60,7 @@ class GradientSolves:
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts, self._persistent = Counts(), True
+        self.counts, self._persistent, self._near = Counts(), True, False
         self.before: Callable[[], None] = lambda: None
 
     def __call__(
@@ -69,7 +69,7 @@ class GradientSolves:
         """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
         self.before()
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
-        solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, **limits)
+        solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, near=self._near, **limits)
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
 
@@ -82,6 +82,15 @@ class GradientSolves:
             yield
         finally:
             self.max_iterations, self._persistent = usual, True
+
+    @contextmanager
+    def nearby(self) -> Iterator[None]:
+        """Solves within look near their starts only; see `scalarize`."""
+        self._near = True
+        try:
+            yield
+        finally:
+            self._near = False
 
 
 class MultistartSolver:

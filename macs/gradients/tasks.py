@@ -70,22 +70,45 @@ class Along(Task):
         return self.reference < np.inf
 
 
+ROOM = 0.05
+"""How much worse the other objectives of an end may become on another mesh, in units, before the end is sought anywhere."""
+AT_ROOM = 1e-4
+"""Distance to that limit, in units, at which it counts as what stops the one objective."""
+
+
 @dataclass(frozen=True, eq=False)
 class End(Task):
-    """The least value of one objective, and for that the least values of the others."""
+    """The least value of one objective, and for that the least values of the others.
+
+    Parameters
+    ----------
+    objective : int
+    units : array (m,)
+    known : array (m,)
+        Objectives of the end on another mesh. Many points may have the least value of the one objective, such as its bound: those with the
+        others near these are looked at first.
+    """
 
     objective: int
     units: np.ndarray
+    known: np.ndarray
 
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:
         """See `Task.solve`."""
         mine = np.arange(len(self.units)) == self.objective
-        first = solves(nlp, start, np.where(mine, 0.0, np.inf), self.units)
-        if first.status != CONVERGED or len(self.units) == 1:
+        alone = np.where(mine, 0.0, np.inf)
+        if len(self.units) == 1:
+            return solves(nlp, start, alone, self.units)
+        near = np.where(mine, np.inf, self.known + ROOM * self.units)
+        first = solves(nlp, start, alone, self.units, near)
+        if first.status != CONVERGED or (near - AT_ROOM * self.units < first.F).any():
+            free = solves(nlp, first.z if first.status == CONVERGED else start, alone, self.units)
+            first = free if free.status == CONVERGED else first
+        if first.status != CONVERGED:
             return first
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         ceiling = np.where(mine, first.F, np.inf)
-        second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
+        second = solves(nlp, first.z, np.where(mine, np.inf, self.known), self.units, ceiling)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 

@@ -33,7 +33,7 @@ class GoalProgramming(Preference):
     targets : dict
         By name: a number, or `Around(value)`. An objective that is not named has no target.
     weights : dict, optional
-        By name of those that have targets, not negative. Default: 1 for each.
+        By name of those that have targets, not negative. One that is not named has weight 1.
     priorities : sequence, optional
         Names of those that have targets, most important first; a tuple of names is one level.
     """

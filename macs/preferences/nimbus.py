@@ -33,7 +33,7 @@ class Nimbus(Preference):
     Parameters
     ----------
     current : Point or dict
-        The current point, or its objectives by name.
+        The current point, what `decide` returned, or the objectives by name.
     improve : names, optional
         Objectives that are to improve as much as possible.
     to : dict, optional
@@ -59,7 +59,8 @@ class Nimbus(Preference):
     DEGREE: ClassVar[str] = "part of what was asked for"
 
     def __post_init__(self) -> None:
-        given = self.current.objectives if isinstance(self.current, Point) else self.current
+        point = getattr(self.current, "point", self.current)
+        given = point.objectives if isinstance(point, Point) else point
         object.__setattr__(self, "current", named_numbers(given, "the current value"))
         for name in ("improve", "keep", "free"):
             object.__setattr__(self, name, names_of(getattr(self, name), name))

@@ -83,13 +83,14 @@ class Preference(ABC):
         """
         return ranked(self, front, ranges)
 
-    def plot_degrees(self, choices: Mapping[str, Point], ranges: Ranges | None = None, ax: Axes | None = None) -> Axes:
+    def plot_degrees(self, choices: Mapping[str, Any], ranges: Ranges | None = None, ax: Axes | None = None) -> Axes:
         """Axes with the degrees of several choices as bars side by side, a group of bars for each objective.
 
         Parameters
         ----------
         choices : dict
-            Points by the name that the legend shows, of the same problem. They need not be chosen by this preference.
+            Points, or what `decide` returns, by the name that the legend shows, of the same problem. They need not be chosen by this
+            preference.
         ranges : Ranges, optional
             Needed by all but physical programming.
         ax : Axes, optional
@@ -97,14 +98,15 @@ class Preference(ABC):
         """
         from .pictures.degree_plot import draw_degrees
 
-        if not isinstance(choices, Mapping) or not choices or not all(isinstance(point, Point) for point in choices.values()):
+        points: dict[str, Any] = {name: getattr(one, "point", one) for name, one in choices.items()} if isinstance(choices, Mapping) else {}
+        if not points or not all(isinstance(point, Point) for point in points.values()):
             raise ValueError(f"choices must be a dict of points by name, not {choices!r}")
-        goals = next(iter(choices.values())).goals
-        for name, point in choices.items():
+        goals = next(iter(points.values())).goals
+        for name, point in points.items():
             if point.goals != goals:
                 raise ValueError(f"'{name}' is a point of another problem: its objectives are {', '.join(point.objectives)}")
-        J = np.array([[*point.objectives.values()] for point in choices.values()])
-        found = dict(zip(choices, self.degrees(goals, ranges, J), strict=True))
+        J = np.array([[*point.objectives.values()] for point in points.values()])
+        found = dict(zip(points, self.degrees(goals, ranges, J), strict=True))
         return draw_degrees(found, goals, self.DEGREE, self.MARKS, self.SMALLER, ax=ax)
 
     def plot_functions(self, front: Any, ranges: Ranges | None = None, best: int | None = None, figure: Any = None) -> np.ndarray:

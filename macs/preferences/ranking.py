@@ -99,10 +99,12 @@ class Ranking:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Axes with the front, its points coloured by rank, and the best marked: two objectives as a scatter plot, more as parallel
-        coordinates. Points that exceed a hard limit are hollow, or broken lines."""
+        coordinates. Points that exceed a hard limit, are not feasible or not verified are hollow, or broken lines."""
         from .pictures.ranking_plot import draw_ranking
 
-        return draw_ranking(self.front, self.order, self.values, self.preference.title, ax)
+        doubtful = ~usable(self.front)[1]
+        apart = {"exceeds a hard limit": ~np.isfinite(self.values) & ~doubtful, "not feasible or not verified": doubtful}
+        return draw_ranking(self.front, self.order, apart, self.preference.title, ax)
 
     def plot_degrees(self, count: int = 3, ax: Axes | None = None) -> Axes:
         """Axes with the degrees of the best points as bars side by side."""

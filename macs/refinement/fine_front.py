@@ -70,7 +70,7 @@ class _FineFront:
         F, ends = self.front.F, {}
         for objective, k in enumerate(extremes(F[self.rows])):
             if self.rows[k] not in ends:
-                ends[self.rows[k]] = End(objective, self.units)
+                ends[self.rows[k]] = End(objective, self.units, F[self.rows[k]])
         for i, end in ends.items():
             self._solve(i, end, show)
         known = [i for i in ends if i in self.done]

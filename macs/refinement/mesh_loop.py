@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -349,14 +350,16 @@ class MeshLoop:
         return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, from others, and whether it is an
-        optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it and from others, and whether it
+        is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
         best = None
-        for trajectory in (present.trajectory, *others):
-            solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))
+        attempts = [(present.trajectory, False), (present.trajectory, True), *((other, False) for other in others)]
+        for trajectory, near in attempts:
+            with self.solves.nearby() if near else nullcontext():
+                solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))
             if best is None or (solved.status != CONVERGED, task.loss(solved.F)) < (best.status != CONVERGED, task.loss(best.F)):
                 best = solved
             if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + DRIFT):

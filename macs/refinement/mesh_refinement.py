@@ -175,7 +175,7 @@ class FrontRefinement:
             if i not in self.methods or i in ends or stopping():
                 continue
             if len(self.units) == 1 or self._is_end(i, np.arange(len(self.units)) == objective):
-                ends[i] = End(objective, self.units)
+                ends[i] = End(objective, self.units, self.front.F[i])
         return ends
 
     def _is_end(self, i: int, mine: np.ndarray) -> bool:

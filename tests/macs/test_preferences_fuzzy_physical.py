@@ -103,6 +103,15 @@ def test_tends_to_the_crisp_one_with_the_square_of_the_spread(one):
     assert off[2] < 1e-3
 
 
+@pytest.mark.parametrize("printed", [False, True])
+def test_the_number_of_values_does_not_matter(printed):
+    fuzzy = FuzzyPhysicalProgramming({"J": CLASSES[1]}, printed=printed).fuzzy_functions["J"]
+    J = np.linspace(0, 6, 101)
+    together = fuzzy(J)
+    assert [float(fuzzy(float(value))) for value in J] == together.tolist()
+    assert np.concatenate([fuzzy(J[:1]), fuzzy(J[1:4]), fuzzy(J[4:])]).tolist() == together.tolist()
+
+
 @pytest.mark.parametrize("one", CLASSES, ids=repr)
 def test_derivatives_agree_with_differences(one):
     fuzzy = FuzzyPhysicalProgramming({"J": one}, spread=0.3).fuzzy_functions["J"]

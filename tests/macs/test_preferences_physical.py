@@ -82,16 +82,15 @@ def test_once_continuously_differentiable(classes):
     for function in functions(classes):
         x = ca.SX.sym("x")
         slope = ca.Function("slope", [x], [ca.gradient(function(x), x)])
+        curvature = ca.Function("curvature", [x], [ca.hessian(function(x), x)[0]])
         marks = [mark for mark, _ in function.boundaries]
-        steepest = max(abs(float(slope(mark))) for mark in marks)
         for k, mark in enumerate(marks):
-            here = float(slope(mark))
-            gap = min(abs(mark - other) for other in (*marks[:k], *marks[k + 1 :]))
-            for near in (mark - 1e-9 * gap, mark + 1e-9 * gap):
-                # Slopes change by at most their own size along a gap; beyond, what rounding of J makes of them.
-                rounding = 1e-15 * max(map(abs, marks)) / gap
-                neighbours = max(abs(float(slope(mark + side * gap))) for side in (-1, 1))
-                assert float(slope(near)) == pytest.approx(here, abs=(1e-7 + 100 * rounding) * max(neighbours, 1e-12 * steepest))
+            step = 1e-9 * min(abs(mark - other) for other in (*marks[:k], *marks[k + 1 :]))
+            here, near = float(slope(mark)), (mark - step, mark + step)
+            # What the second derivative on either side, which is bounded, changes over the step and over the rounding of J.
+            change = max(float(curvature(one)) for one in near) * (step + 1e-15 * max(map(abs, marks)))
+            for one in near:
+                assert float(slope(one)) == pytest.approx(here, rel=1e-9, abs=2 * change)
 
 
 @settings(max_examples=40, deadline=None)

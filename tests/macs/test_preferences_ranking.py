@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -168,6 +169,10 @@ def test_figures_of_any_number_of_objectives(m, n):
     assert drawn(ranking.plot_degrees())
     limited = PhysicalProgramming({"f0": Smaller.even(-1.0, 0.5)}).rank(front)
     assert drawn(limited.plot())
+    doubtful = marked(front, [True] * (n - n // 2) + [False] * (n // 2))
+    ax = WeightedSum({"f0": 1.0}).rank(doubtful).plot()
+    assert drawn(ax)
+    assert ("not feasible or not verified" in ax.get_legend_handles_labels()[1]) == (n > 1)
 
 
 @pytest.mark.parametrize(
@@ -196,6 +201,15 @@ def test_figures_of_any_preference(preference):
     heights = [patch.get_height() for patch in bars.patches if patch.get_width() < 0.8]
     shown = ranking.degrees[ranking.order[:2]]
     assert sorted(heights)[-1] == pytest.approx(np.nanmax(shown))
+
+
+def test_degrees_of_points_that_others_chose():
+    front, ranges = flights(4), Ranges.of(flights(4))
+    bars = EQUAL.plot_degrees({"first": front[0], "last": SimpleNamespace(point=front[3])}, ranges)
+    heights = [patch.get_height() for patch in bars.patches if patch.get_width() < 0.8]
+    assert heights == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert drawn(bars)
+    assert Nimbus(SimpleNamespace(point=front[1]), improve=["time"], free=["height"]).current == front[1].objectives
 
 
 def test_degrees_of_choices_are_of_one_problem():

@@ -58,6 +58,8 @@ def test_where_all_goals_are_met_the_point_is_not_dominated():
     ranking = GoalProgramming({"time": 3.5, "effort": 3.0}).rank(FRONT)
     assert ranking.best.objectives["time"] == pytest.approx(balanced(1 / DT, 1 / DE), abs=STEP)
     assert ranking.values[ranking.order[0]] == 0.0
+    # The second stage follows only where the first is zero.
+    assert np.array_equal(np.isnan(ranking.stage_values[:, 1]), ranking.values > 0)
     dominated = plain_front([[2.5, 1.0], [2.4, 0.9], [1.2, 7.0], [4.0, 0.1]], list(FRONT.goals))
     assert GoalProgramming({"time": 3.5, "effort": 3.0}).rank(dominated).best.index == 1
 
@@ -76,6 +78,17 @@ def test_a_target_on_both_sides():
     assert chosen(GoalProgramming({"time": Around(2.7)})) == pytest.approx(2.7, abs=STEP)
     either = GoalProgramming({"time": Around(2.7), "effort": E0}, priorities=["time", "effort"])
     assert chosen(either) == pytest.approx(2.7, abs=STEP)
+
+
+def test_memberships_on_both_sides():
+    J = np.array([[2.0, 0.3], [2.4, 1.0], [2.5, 2.0], [3.0, 3.0], [3.6, 7.0], [1.9, 0.5]])
+    found = FuzzyGoal({"time": Around(2.4, (0.4, 1.2)), "effort": 1.0}).degrees(FRONT.goals, Ranges.of(FRONT), J)
+    assert found[:, 0] == pytest.approx([0.0, 1.0, 1 - 0.1 / 1.2, 0.5, 0.0, 0.0])
+    assert found[:, 1] == pytest.approx([1.0, 1.0, 1 - 1 / (E1 - 1), 1 - 2 / (E1 - 1), 0.0, 1.0], abs=1e-12)
+    # Eq. (4): by default memberships are zero at the ends of the range.
+    open_ended = FuzzyGoal({"time": Around(2.4)}).degrees(FRONT.goals, Ranges.of(FRONT), J)
+    assert open_ended[:, 0] == pytest.approx([1 - 0.4 / 1.2, 1.0, 1 - 0.1 / 1.6, 1 - 0.6 / 1.6, 1 - 1.2 / 1.6, 1 - 0.5 / 1.2])
+    assert np.isnan(open_ended[:, 1]).all()
 
 
 def test_the_least_membership_is_best_where_both_are_equal():
@@ -152,10 +165,11 @@ def test_an_aspiration_of_one_objective_leaves_the_others_their_best():
 
 def test_augmentation_prefers_the_point_that_is_not_dominated():
     goals = [Objective("time"), Objective("effort")]
-    front = plain_front([[1.0, 0.0], [0.5, 1.0], [0.6, 1.0], [0.0, 2.0]], goals)
-    ranking = ReferencePoint({"time": 0.0, "effort": 0.0}).rank(front)
-    assert list(ranking.order[:2]) != [2, 1]
-    assert ranking.values[1] < ranking.values[2]
+    front = plain_front([[0.0, 2.0], [0.4, 1.2], [0.5, 1.2], [1.0, 0.0]], goals)
+    ranking = ReferencePoint({"time": 0.0, "effort": 0.0}, augmentation=1e-3).rank(front)
+    assert ranking.values == pytest.approx([1.001, 0.601, 0.6011, 1.001])
+    nimbus = Nimbus({"time": 0.6, "effort": 1.0}, improve=["time"], free=["effort"], augmentation=1e-3).rank(front)
+    assert nimbus.values[1:3] == pytest.approx([0.401, 0.5011])
 
 
 def test_nimbus_moves_until_its_limit():

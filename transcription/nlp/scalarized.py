@@ -59,11 +59,12 @@ COMMON: Options = (
     ("nlp_scaling_method", "none"),
     ("bound_relax_factor", 0.0),
     ("fast_step_computation", "yes"),
-    ("mumps_scaling", 0),
+    ("mumps_scaling", 77),
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
 )
-"""Options of all strategies: what is scaled already needs neither scaling nor refinement."""
+"""Options of all strategies: what is scaled already needs neither scaling by IPOPT nor refinement. The matrices are scaled: near limits
+that leave nothing strictly inside, those that are not make iterations up to thirty times as long."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -73,6 +74,8 @@ NEAR = _Strategy(
     held=True,
 )
 """Stays in the basin of a feasible start."""
+INSIDE = _Strategy(NEAR.options, share=0.3)
+"""From the optimum of almost the same: little has to change."""
 UNSCALED = _Strategy((("mu_strategy", "adaptive"),), share=0.3, equilibrated=False)
 """In the scales of the problem, where the derivatives at the start say little about those at the optimum."""
 MONOTONE = _Strategy((("mu_init", 0.1),), share=0.46)
@@ -169,6 +172,7 @@ def scalarize(
     max_iterations: int = 500,
     seconds: float = 600.0,
     persistent: bool = True,
+    near: bool = False,
 ) -> Solved:
     """Go down from a point to the front: least alpha with F - reference <= alpha weights.
 
@@ -192,6 +196,8 @@ def scalarize(
         reproducible.
     persistent : bool
         Give each strategy a share of the iterations. Otherwise the first may take them all, and others what is left where it ended badly.
+    near : bool
+        Look near the start only, though it is not feasible yet: it is the optimum of almost the same, as on another mesh.
 
     Returns
     -------
@@ -217,7 +223,7 @@ def scalarize(
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     found: list[Solved] = []
-    for strategy in (ADAPTIVE, NEAR, MONOTONE) if feasible else (ADAPTIVE, UNSCALED, MONOTONE):
+    for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
         if sum(solved.iterations for solved in found) + share > max_iterations:
             break
@@ -237,6 +243,11 @@ def scalarize(
         if residual <= USEFUL:
             best, message = replace(best, status=CONVERGED), f"{message}; the conditions of optimality hold to {residual:.0e}"
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
+
+
+def _strategies(feasible: bool, tightened: bool) -> tuple[_Strategy, ...]:
+    """What is tried, one after the other, from a start that is feasible or not, or that only misses margins."""
+    return (INSIDE, ADAPTIVE, MONOTONE) if tightened else (ADAPTIVE, NEAR if feasible else UNSCALED, MONOTONE)
 
 
 def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:

@@ -20,8 +20,8 @@ from ..stage import Operand, Stage
 from .classes import NAMES, ObjectiveClass
 from .spline import PreferenceFunction, preference_functions
 
-CRISP, FUZZY = "preference function", "fuzzy preference function"
-"""Words of legends."""
+CRISP = "preference function"
+"""Word of legends."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,6 +48,7 @@ class PhysicalProgramming(Preference):
 
     DEGREE: ClassVar[str] = "degree"
     SMALLER: ClassVar[bool] = True
+    FUZZY: ClassVar[str] = "fuzzy preference function"
     MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(NAMES))
 
     def __post_init__(self) -> None:
@@ -108,10 +109,12 @@ class PhysicalProgramming(Preference):
 
         found, minimised = self._places(goals), self.minimised()
         curves = []
-        for name, crisp in self.functions.items():
+        for name, one in self.classes.items():
+            crisp = self.functions[name]
             marks = [boundary for boundary, _ in crisp.boundaries]
             margin = 0.08 * (marks[-1] - marks[0])
-            shown = ((FUZZY, minimised[name]), (CRISP, crisp)) if minimised[name] is not crisp else ((CRISP, crisp),)
-            goal = goals[found[name]]
-            curves.append(Curve(goal, found[name], shown, marks[0] - margin, marks[-1] + margin, tuple(marks), self.classes[name].degree))
+            fuzzy = () if minimised[name] is crisp else ((self.FUZZY, minimised[name]),)
+            low, high, goal = marks[0] - margin, marks[-1] + margin, goals[found[name]]
+            directed = one.SENSE is not None
+            curves.append(Curve(goal, found[name], (*fuzzy, (CRISP, crisp)), low, high, tuple(marks), one.degree, directed))
         return curves

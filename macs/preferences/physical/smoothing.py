@@ -8,12 +8,15 @@ quadrature.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from ..operands import clipped, exp, greatest, least
+from ..operands import NUMERIC, clipped, exp, greatest, least
 from ..stage import Operand
 from .spline import Ideal, PreferenceFunction
 
@@ -68,12 +71,15 @@ class FuzzyFunction:
                 depth = DEEP / steepness
                 begin, end = (greatest(begin, end - depth), end) if math.isinf(piece.lower) else (begin, least(end, begin + depth))
                 panels += int(min(DEEP, 2.0 * WIDTH * self.spread * steepness) / PANEL)
-            for place, part in _nodes(panels):
+
+            def mass(place: Any, begin: Operand = begin, end: Operand = end, formula: Any = piece.formula) -> Operand:
                 t = begin + (end - begin) * place
-                total = total + part * (end - begin) / self.spread * weight((t - J) / self.spread) * piece.formula(t)
+                return weight((t - J) / self.spread) * formula(t)
+
+            total = total + (end - begin) / self.spread * _mean(mass, panels, J)
         if not self.printed:
             return total / MASS
-        return total / sum(part * (high - low) * weight(low + (high - low) * place) for place, part in _nodes(3))
+        return total / ((high - low) * _mean(lambda place: weight(low + (high - low) * place), 3, J))
 
     def _shift(self, x: Operand) -> Operand:
         """Distance of x from the nearest boundary, in spreads."""
@@ -82,7 +88,18 @@ class FuzzyFunction:
         return (x - nearest) / self.spread
 
 
-def _nodes(panels: int) -> list[tuple[float, float]]:
+def _mean(function: Callable[[Any], Operand], panels: int, J: Operand) -> Operand:
+    """The mean over [0, 1] of a function that gives an operand like J, by quadrature on equal panels; all nodes at once for numbers."""
+    places, parts = _nodes(panels)
+    if isinstance(J, NUMERIC):
+        shape = (-1, *(1,) * np.ndim(J))
+        # Summed in the same order whatever the number of values is.
+        return (parts.reshape(shape) * function(places.reshape(shape))).cumsum(axis=0)[-1]
+    return sum(part * function(place) for place, part in zip(places.tolist(), parts.tolist(), strict=True))
+
+
+@lru_cache(maxsize=64)
+def _nodes(panels: int) -> tuple[np.ndarray, np.ndarray]:
     """Nodes and weights on [0, 1], in equal panels."""
     x, w = np.polynomial.legendre.leggauss(NODES)
-    return [(float((k + 0.5 + 0.5 * a) / panels), float(0.5 * b / panels)) for k in range(panels) for a, b in zip(x, w, strict=True)]
+    return ((np.arange(panels)[:, None] + 0.5 + 0.5 * x) / panels).ravel(), np.tile(0.5 * w / panels, panels)

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ...fronts.pictures.style import COLORS, GREY, STYLE, better, new_figure
+from ...fronts.pictures.style import COLORS, GREY, STYLE, better, label, new_figure
 from .bands import shade_ranges
 
 SAMPLES = 801
@@ -29,7 +29,9 @@ class Curve:
         Between which it is drawn.
     boundaries : tuple of float
         Between ranges of preference; shaded by `degree`.
-    degree : callable or None
+    degree : callable, optional
+    directed : bool
+        Whether the objective's sense says what is better.
     """
 
     goal: Objective
@@ -39,17 +41,18 @@ class Curve:
     high: float
     boundaries: tuple[float, ...] = ()
     degree: Callable[[np.ndarray], np.ndarray] | None = None
+    directed: bool = True
 
 
 def draw_functions(
-    curves: Sequence[Curve], title: str, label: str, logarithmic: bool, points: np.ndarray, best: int | None, figure: Any = None
+    curves: Sequence[Curve], title: str, heights: str, logarithmic: bool, points: np.ndarray, best: int | None, figure: Any = None
 ) -> np.ndarray:
     """Axes, one for each objective, with functions of it, the points (n, m) of a front on them, and the best of these marked.
 
     Parameters
     ----------
     curves : sequence of Curve
-    title, label : str
+    title, heights : str
         Of the figure, and of the vertical axes.
     logarithmic : bool
         Whether these are logarithmic.
@@ -70,7 +73,7 @@ def draw_functions(
         for k, (curve, ax) in enumerate(zip(curves, axes.flat, strict=False)):
             _draw(curve, ax, points, best, logarithmic)
             if k % columns == 0:
-                ax.set_ylabel(label)
+                ax.set_ylabel(heights)
         for ax in axes.flat[len(curves) :]:
             ax.set_visible(False)
         handles, names = axes.flat[0].get_legend_handles_labels()
@@ -98,4 +101,4 @@ def _draw(curve: Curve, ax: Any, points: np.ndarray, best: int | None, logarithm
     if logarithmic:
         ax.set_yscale("log")
     ax.set_xlim(curve.low, curve.high)
-    ax.set_xlabel(better(curve.goal))
+    ax.set_xlabel(better(curve.goal) if curve.directed else label(curve.goal.name, curve.goal.unit))

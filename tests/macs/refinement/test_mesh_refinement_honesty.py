@@ -167,7 +167,7 @@ def begun_on(method: DFET, problem: Problem, wanted: Wanted):
     nlp = loop.programs(method)
     solved = loop.solves(nlp, nlp.first_guess(np.zeros((1, len(nlp.free))))[0], np.zeros(1), np.ones(1))
     units = loop.units(solved.F[None], nlp, solved.z)
-    return loop, loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), End(0, units)
+    return loop, loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), End(0, units, solved.F)
 
 
 def test_what_is_worse_than_it_was_when_simulated_is_no_success():

@@ -1,0 +1,133 @@
+"""Choice: the point that was chosen, how well it satisfies each objective, and the steps that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..fronts.point import Point
+from ..io.text import text_table
+from ..preferences import Preference, Ranges
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step on the way to a choice: a gradient solve of one stage of a preference.
+
+    Attributes
+    ----------
+    name : str
+        Of the stage.
+    value : float
+        What the stage attained; infinite where a hard limit is exceeded.
+    objectives, degrees : dict
+        By name, in the user's units and senses; how well each is satisfied.
+    status : str
+        "converged", or why not.
+    about : dict
+        Further numbers by name, such as lambda and kappa.
+    message : str
+        What is to be known of the step.
+    """
+
+    name: str
+    value: float
+    objectives: Mapping[str, float]
+    degrees: Mapping[str, float]
+    status: str
+    about: Mapping[str, float] = field(default_factory=dict)
+    message: str = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice:
+    """The point that was chosen.
+
+    Attributes
+    ----------
+    point : Point
+        Of the problem itself: simulated, with its `optimality`, and `costates` and `weights` where it is optimal.
+    values : tuple of float
+        Of the stages of the preference, smaller is better; infinite where a hard limit is exceeded.
+    degrees : dict
+        How well each objective is satisfied, by name; see the class of the preference.
+    history : tuple of Step
+        The steps that led to it, in their order.
+    preference : Preference
+    ranges : Ranges
+        By which objectives were normalised.
+    trade_offs : TradeOffs or None
+        What more of one objective would cost the others.
+    message : str
+        What is to be known of the choice; usually empty.
+    """
+
+    point: Point
+    values: tuple[float, ...]
+    degrees: Mapping[str, float]
+    history: tuple[Step, ...]
+    preference: Preference
+    ranges: Ranges
+    trade_offs: Any = None
+    message: str = ""
+
+    @property
+    def value(self) -> float:
+        """The value of the preference, of its first stage if there are several."""
+        return self.values[0]
+
+    @property
+    def objectives(self) -> dict[str, float]:
+        """Objectives of the point by name, in the user's units and senses."""
+        return self.point.objectives
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Costs, those of the payoff table included if it was found on the way; the seed, and more, as of a front."""
+        return dict(self.point.alone().stats)
+
+    def __repr__(self) -> str:
+        return f"<Choice by {self.preference!r}: {self.point.title}; value {self.value:.6g}>"
+
+    def table(self) -> str:
+        """The choice as plain text: each objective with its range and its degree, the steps, and the message."""
+        goals, chosen = self.point.goals, self.point.objectives
+        ends = [[f"{side[goal.name]:.6g}" for goal in goals] for side in (self.ranges.best, self.ranges.worst)]
+        columns = [
+            [goal.name for goal in goals],
+            [f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in goals],
+            [f"{value:.6g}" for value in chosen.values()],
+            *ends,
+            [_shown(self.degrees[goal.name]) for goal in goals],
+        ]
+        titles = ["objective", "", "chosen", "best", "worst", "degree"]
+        lines = [repr(self.preference), "", text_table([titles], list(zip(*columns, strict=True)), [True, True, *[False] * 4])]
+        lines += ["", *self._steps(goals)]
+        return "\n".join([*lines, *(["", self.message] if self.message else [])])
+
+    def _steps(self, goals: Sequence[Objective]) -> list[str]:
+        about = list(dict.fromkeys(name for step in self.history for name in step.about))
+        titles = ["step", "status", "value", *about, *(goal.name for goal in goals), *["degree"] * len(goals)]
+        units = [*[""] * (3 + len(about)), *(f"[{goal.unit or '-'}]" for goal in goals), *(goal.name for goal in goals)]
+        rows = [
+            [
+                step.name,
+                step.status,
+                f"{step.value:.6g}",
+                *(f"{step.about[name]:.6g}" if name in step.about else "-" for name in about),
+                *(f"{step.objectives[goal.name]:.6g}" for goal in goals),
+                *(_shown(step.degrees[goal.name]) for goal in goals),
+            ]
+            for step in self.history
+        ]
+        said = [f"{step.name}: {step.message}" for step in self.history if step.message]
+        return [text_table([titles, units], rows, [True, True, *[False] * (len(titles) - 2)]), *said] if rows else []
+
+
+def _shown(degree: float) -> str:
+    return "-" if np.isnan(degree) else f"{degree + 0.0:.3f}"

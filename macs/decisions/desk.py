@@ -1,0 +1,304 @@
+"""The work of one call of `decide`: what is known of a problem, and the solves that lead to a choice."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.problem import Problem
+from transcription.base import Transcription, check_freedom
+from transcription.catalogue import from_dict
+from transcription.meshed import Meshed
+from transcription.stopping import Stopped
+
+from ..evaluation.evaluator import CONVERGED
+from ..fronts.builders import OPTIMAL, certified, nearest_violation, vectors_points
+from ..fronts.point import Point
+from ..fronts.points import Points
+from ..fronts.provenance import costs, more_costs
+from ..fronts.verified import VERIFY, objective_scales, unmarked, verified
+from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
+from ..gradients.multistart import GradientSolves
+from ..io.console import working
+from ..preferences import Preference, Ranges, Stage
+from ..preferences.stage import SLACK
+from ..solvers.start import beginning
+from .choice import Choice, Step
+from .judging import Merit, excess_stage, meets, stage_values, unmet, with_all_limits
+from .stages import SAME, Kept, Known, Outcome, StageSolver
+
+BEST = 3
+"""Points of `start` that solves begin at by default, the best-ranked."""
+Result = TypeVar("Result")
+
+
+class Desk:
+    """What is known of a problem, and the solves made so far.
+
+    Parameters
+    ----------
+    statement : Problem or CompiledProblem
+    transcription : Transcription or None
+    ranges : Ranges or None
+        None: those of the points that are known.
+    terms : Terms
+        The other arguments of `decide`.
+
+    Attributes
+    ----------
+    known : Points
+        The points of `start`, or of the payoff table.
+    ranges : Ranges
+    history : list of Step
+    """
+
+    known: Points
+    ranges: Ranges
+
+    def __init__(
+        self, statement: Problem | CompiledProblem, transcription: Transcription | None, ranges: Ranges | None, terms: Terms
+    ) -> None:
+        self.problem = statement.compile()
+        self._statement, self._transcription, self._given, self._terms = statement, transcription, ranges, terms
+        self._start: Points | None = terms.start.alone() if isinstance(terms.start, Point) else terms.start
+        if self._start is not None:
+            _check_start(self._start, self.problem)
+        if ranges is not None:
+            ranges.ends(self.problem.goals)
+        self.history: list[Step] = []
+        self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
+        self._seed = secrets.randbits(63) if terms.seed is None else int(terms.seed)
+        self._reason: Callable[[], str] = str
+        self._began, self._costs = time.perf_counter(), dict[str, Any]()
+
+    def work(self, task: Callable[[], Result]) -> Result:
+        """What a task returns for which points and ranges are known, and which Ctrl-C and the time limit ask to end."""
+        with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
+            self._reason = lambda: interrupts.reason
+            self.solves.before = lambda: show(f"decide: {self.solves.counts.gradient_solves} gradient solves done")
+            try:
+                self.known = self._ends() if self._start is None else self._start
+            except Stopped as reason:
+                self._end(str(reason))
+            if not (self.known.status == CONVERGED).any():
+                if self.stopped:
+                    self._end(self._reason())
+                if self._given is None and self.known.closest is not None:
+                    raise ValueError(f"no feasible point is known, and so no ranges; {nearest_violation(self.known.closest)}")
+            if self._given is not None:
+                self.ranges = self._given
+            else:
+                # Without an end that its mesh makes a little too good, a payoff table would have no range.
+                self.ranges = Ranges.of(unmarked(self.known) if self._start is None else self.known)
+            best, worst = self.ranges.ends(self.problem.goals)
+            self._solver = StageSolver(self.problem, best, worst, self.solves, np.random.default_rng(self._seed))
+            return task()
+
+    def _ends(self) -> Points:
+        """The payoff table."""
+        terms = self._terms
+        ends = payoff(
+            self._statement,
+            self._transcription,
+            seed=self._seed,
+            tolerance=terms.tolerance,
+            verify=terms.verify,
+            max_iterations=terms.max_iterations,
+            progress=terms.progress,
+        )
+        self._costs = dict(ends.stats)
+        return ends
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the work is to end."""
+        return bool(self._reason())
+
+    @staticmethod
+    def _end(reason: str) -> NoReturn:
+        """Raise what says that there is no result."""
+        words = f"decide: {reason} before the first solve"
+        raise (KeyboardInterrupt(words) if reason == "interrupted" else TimeoutError(words)) from None
+
+    def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
+        """The choice by a preference, never worse than a known point.
+
+        Parameters
+        ----------
+        preference : Preference
+        about : mapping, optional
+            Further numbers of each of its steps.
+        also : sequence of Point
+            Points to begin at, before those that are known.
+        """
+        stages = preference.stages(self.problem.goals, self.ranges)
+        candidates = [*also, *self._ranked(preference)]
+        try:
+            found, message = self._solved(preference, stages, candidates, about or {})
+        except Stopped as reason:
+            found, message = None, f"{reason}: no stage was solved to its end"
+            if not candidates:
+                self._end(str(reason))
+        points = [*([] if found is None else [found]), *candidates]
+        chosen = min(points, key=Merit(stages, points))
+        said = [message]
+        if chosen is not found and not message:
+            said.append("no better point was found than the best that was known")
+        if chosen.verified is False and chosen.status == CONVERGED:
+            said.append(f"not confirmed by a simulation: {chosen.note}")
+        if chosen is found and not message and (chosen.optimality or 0.0) > OPTIMAL:
+            said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
+        message = "; ".join(filter(None, said))
+        J = np.array([list(chosen.objectives.values())])
+        values = stage_values(stages, J)[0].tolist()
+        return Choice(chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message=message)
+
+    def _degrees(self, preference: Preference, J: np.ndarray) -> dict[str, float]:
+        """Degrees by name at objectives (1, m)."""
+        degrees = preference.degrees(self.problem.goals, self.ranges, J)[0]
+        return dict(zip((goal.name for goal in self.problem.goals), degrees.tolist(), strict=True))
+
+    def _ranked(self, preference: Preference) -> list[Point]:
+        """The feasible points that are known, the best first; of a `start` no more than solves begin at."""
+        feasible = self.known.status == CONVERGED
+        if not feasible.any():
+            return []
+        order = [int(i) for i in preference.rank(self.known, self.ranges).order if feasible[int(i)]]
+        most = len(order) if self._start is None else BEST if self._terms.starts == AUTO else int(self._terms.starts)
+        chosen, verify = self.known[order[:most]], self._terms.verify
+        # Compared with what is found and simulated.
+        return list(chosen if chosen.was_simulated.all() or verify is None else verified(chosen, verify, objective_scales(self.known)))
+
+    def _solved(
+        self, preference: Preference, stages: Sequence[Stage], candidates: Sequence[Point], about: Mapping[str, float]
+    ) -> tuple[Point, str]:
+        """The point that solves of all stages lead to, and what is to be said of it."""
+        stages = with_all_limits(stages, len(self.problem.goals))
+        limits = stages[0]
+        outcome: Outcome | None = None
+        if limits.limit_names and not any(meets(limits, point) for point in candidates):
+            outcome = self._within_limits(preference, limits, candidates, about)
+            J = outcome.F * self.problem.signs
+            if outcome.status == CONVERGED and limits.excess(J[None])[0] > SLACK:
+                return self._point(outcome), unmet(limits, self.problem.goals, J)
+        kept: list[Kept] = []
+        for stage in stages:
+            if stage.after_zero and kept and kept[-1].value > SAME:
+                break
+            if kept and outcome is not None:
+                reached = self._solver.on_mesh(stage, kept, outcome.known, 1)
+            else:
+                reached = self._first(stage, candidates, outcome)
+            value = self._noted(preference, stage, reached, about)
+            if reached.status != CONVERGED:
+                # What the stages before attained stands.
+                point = self._point(outcome if kept and outcome is not None else reached)
+                missed = f"; {nearest_violation(point)}" if point.violation > self.solves.tolerance else ""
+                return point, f"{stage.name}: {reached.note}{missed}"
+            outcome = reached
+            kept.append(Kept(stage, value))
+        assert outcome is not None
+        return self._point(outcome), ""
+
+    def _noted(self, preference: Preference, stage: Stage, outcome: Outcome, about: Mapping[str, float]) -> float:
+        """The value of a stage, of which the step becomes a part of the history."""
+        J = (outcome.F * self.problem.signs)[None]
+        value = float(stage.numbers(J)[0])
+        objectives = dict(zip((goal.name for goal in self.problem.goals), J[0].tolist(), strict=True))
+        note = outcome.note if outcome.status != CONVERGED else ""
+        self.history.append(Step(stage.name, value, objectives, self._degrees(preference, J), outcome.status, dict(about), note))
+        return value
+
+    def _within_limits(self, preference: Preference, limits: Stage, candidates: Sequence[Point], about: Mapping[str, float]) -> Outcome:
+        """The least excess over the hard limits, on the first mesh."""
+        known = self._known(self._meshes(candidates, None)[0], candidates, None)
+        stage = excess_stage(limits)
+        outcome = self._solver.on_mesh(stage, (), known, self._count(known, candidates))
+        self._noted(preference, stage, outcome, about)
+        return outcome
+
+    def _first(self, stage: Stage, candidates: Sequence[Point], begun: Outcome | None) -> Outcome:
+        """A stage solved from what is known, or from a vector that was begun."""
+        methods = self._meshes(candidates, begun)
+        found: dict[Transcription, Known] = {}
+
+        def known_on(method: Transcription) -> Known:
+            if method not in found:
+                found[method] = self._known(method, candidates, begun)
+            return found[method]
+
+        known = known_on(methods[0])
+        check_freedom(known.nlp)
+        count = 1 if begun is not None else self._count(known, candidates)
+        if self._transcription is not None:
+            return self._solver.on_mesh(stage, (), known, count)
+        meshes = [method for method in methods if isinstance(method, Meshed)]
+        return self._solver.on_found_mesh(stage, meshes, known_on, count, self._terms.verify or VERIFY)
+
+    def _meshes(self, candidates: Sequence[Point], begun: Outcome | None) -> list[Transcription]:
+        """The transcription that was given, or those to begin on: first that of the vector that was begun, or of the best point."""
+        if self._transcription is not None:
+            return [self._transcription]
+        own = [from_dict(point.transcription) for point in candidates[:1] if point.transcription is not None]
+        first = own if begun is None else [begun.nlp.transcription]
+        usual = meshes_to_begin_on(self._statement, self.problem)
+        return list(dict.fromkeys([*(method for method in first if isinstance(method, Meshed)), *usual]))
+
+    def _count(self, known: Known, candidates: Sequence[Point]) -> int:
+        """Number of starts."""
+        if self._terms.starts != AUTO:
+            return int(self._terms.starts)
+        # The guess is the last of those known.
+        return max(1, len(known.Z) if self._start is None else len(candidates))
+
+    def _known(self, method: Transcription, candidates: Sequence[Point], begun: Outcome | None) -> Known:
+        """The vectors to begin at, on a transcription: candidates, best first, then the guess; or alone that which was begun."""
+        if begun is not None and begun.nlp.transcription == method:
+            return begun.known
+        nlp = method.nlp(self.problem)
+        if begun is not None:
+            Z = nlp.interpolate(begun.nlp.unpack(begun.z))[None]
+        else:
+            rows = [*(beginning(point, nlp, guess=False) for point in candidates), beginning(None, nlp)]
+            Z = np.vstack([np.empty((0, len(nlp.variables))), *(row for row in rows if row is not None)])
+        return Known(nlp, Z, nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(self.problem.goals))))
+
+    def _point(self, outcome: Outcome) -> Point:
+        """What was found, as a point of the problem: certified and simulated."""
+        scales = objective_scales(self.known) if len(self.known) else None
+        points = vectors_points(
+            outcome.nlp,
+            outcome.z[None],
+            {"name": "decide", "settings": {"starts": self._terms.starts}},
+            self._stats(),
+            status=[outcome.status],
+            notes=[outcome.note],
+            **certified(outcome.nlp, outcome.z[None], scales),
+        )
+        return verified(points, self._terms.verify, scales)[0]
+
+    def _stats(self) -> dict[str, Any]:
+        counts, elapsed, stopped = self.solves.counts, time.perf_counter() - self._began, self._reason()
+        if self._costs:
+            return more_costs(self._costs, counts, elapsed - self._costs["wall_time"], stopped)
+        return costs(
+            counts,
+            wall_time=elapsed,
+            seed=self._seed,
+            tolerance=self.solves.tolerance,
+            reproducible=not (counts.clocked or stopped),
+            **({"stopped": stopped} if stopped else {}),
+        )
+
+
+def _check_start(start: Points, problem: CompiledProblem) -> None:
+    """Raise ValueError if points are not of a problem."""
+    if start.source is None:
+        raise ValueError("start is a front of a black box, which has no derivatives; preference.rank(front) needs none")
+    if start.source.fingerprint != problem.fingerprint:
+        raise ValueError(f"start: these are points of another problem, '{start.source.name}', not of '{problem.name}'")

@@ -1,0 +1,176 @@
+"""Gradient solves of one stage of a preference: on a transcription that is given, and on a mesh that is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.valued import Box, Valued, valued
+from transcription.base import NLP
+from transcription.meshed import Meshed
+from transcription.meshes.verdict import Wanted
+from transcription.nlp.scalarized import Solved
+from transcription.stopping import Stopped
+
+from ..evaluation.evaluator import CONVERGED
+from ..gradient_tools import MESHES, MOST_WORK, PART
+from ..gradients.multistart import GradientSolves, MultistartSolver
+from ..preferences import Stage
+from ..refinement.found_optimum import found_optimum
+from ..refinement.mesh_loop import MeshLoop, Programs
+
+REFERENCE, WEIGHTS = np.zeros(1), np.ones(1)
+"""Of a problem with one objective, which is minimised; see `scalarize`."""
+ROOM = 10.0
+"""By how many times their ranges objectives may leave these, and all values that are known, at first."""
+WIDENED = 3
+"""Most times that this is made ten times as wide for an objective that is at an end of it."""
+FEASIBLE = 1e-2
+"""Largest violation of a vector whose objectives say where others may lie."""
+KEEPS, SAME = 1e-7, 1e-6
+"""What a stage attained may be exceeded by in the stages after it, and by how much values may differ that are as good as each other: these
+parts of its size, and of 1 at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Vectors to begin at, of the problem itself on one transcription: Z (k, n), best first, and their objectives F (k, m), minimised."""
+
+    nlp: NLP
+    Z: np.ndarray
+    F: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A stage solved: the vector z of the NLP of the problem itself, its objectives F (m,), minimised, and what is to be said of it."""
+
+    nlp: NLP
+    z: np.ndarray
+    F: np.ndarray
+    status: str
+    note: str = ""
+
+    @property
+    def known(self) -> Known:
+        """Itself as a vector to begin at."""
+        return Known(self.nlp, self.z[None], self.F[None])
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A stage and what it attained, which those after it keep."""
+
+    stage: Stage
+    value: float
+
+    @property
+    def most(self) -> float:
+        """The largest value that it may have."""
+        return self.value + KEEPS * max(abs(self.value), 1.0)
+
+
+class StageSolver:
+    """Solves stages of a preference of one problem.
+
+    Parameters
+    ----------
+    problem : CompiledProblem
+    best, worst : arrays (m,)
+        The ranges of the objectives, in the user's units.
+    solves : GradientSolves
+        Makes and counts the solves.
+    rng : numpy.random.Generator
+        Of random starts.
+    """
+
+    def __init__(
+        self, problem: CompiledProblem, best: np.ndarray, worst: np.ndarray, solves: GradientSolves, rng: np.random.Generator
+    ) -> None:
+        self.problem, self.solves, self.rng = problem, solves, rng
+        self._box = Box(best, worst, np.minimum(best, worst), np.maximum(best, worst))
+        self._room = np.full(len(best), ROOM)
+
+    def on_mesh(self, stage: Stage, kept: Sequence[Kept], known: Known, starts: int) -> Outcome:
+        """The best result of so many starts on the transcription of the known vectors; the first are these, others are random."""
+        for widened in range(WIDENED + 1):
+            derived = self._derived(stage, kept, known)
+            nlp = known.nlp.transcription.transcribe(derived.problem)
+            solved = self._multistart(derived, nlp, known, starts)
+            outcome = self._outcome(derived, nlp, known.nlp, solved.z, solved.status, solved.message)
+            if widened == WIDENED or solved.status != CONVERGED or not self._widened(derived, nlp, solved.z):
+                break
+            known = outcome.known
+        return outcome
+
+    def on_found_mesh(
+        self, stage: Stage, meshes: Sequence[Meshed], known_on: Callable[[Meshed], Known], starts: int, verify: float
+    ) -> Outcome:
+        """The optimum on a mesh that is found for it, from the first of these `meshes` on, where all starts are solved; the next is tried
+        where that leads nowhere. `known_on` has the vectors to begin at on each."""
+        limits = PART * verify
+        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
+        for widened in range(WIDENED + 1):
+            known = known_on(meshes[0])
+            derived = self._derived(stage, (), known)
+            loop = MeshLoop(Programs(derived.problem), self.solves, wanted, MESHES, MOST_WORK)
+            first = loop.programs(meshes[0])
+            begun = self._multistart(derived, first, known, starts)
+
+            def given(nlp: NLP, derived: Valued = derived, first: NLP = first, begun: Solved = begun) -> np.ndarray:
+                if nlp is first and begun.status == CONVERGED:
+                    return begun.z[None]
+                one = known_on(nlp.transcription)  # type: ignore[arg-type]
+                return derived.lifted(one.nlp.variables, nlp.variables, one.Z, one.F)
+
+            found = found_optimum(loop, REFERENCE, WEIGHTS, given, 1, self.rng, meshes)
+            own = found.nlp.transcription.transcribe(self.problem)
+            outcome = self._outcome(derived, found.nlp, own, found.z, found.status, found.note)
+            if widened == WIDENED or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
+                break
+        return outcome
+
+    def _derived(self, stage: Stage, kept: Sequence[Kept], known: Known) -> Valued:
+        """The problem with the value of the stage as its objective."""
+        feasible = np.isfinite(known.F).all(axis=1) & (known.nlp.evaluate(known.Z)[1] <= FEASIBLE)
+        J = known.F[feasible] * self.problem.signs
+        ends = np.vstack([self._box.best, self._box.worst, J])
+        room = self._room * self._box.scales
+        box = replace(self._box, lower=ends.min(axis=0) - room, upper=ends.max(axis=0) + room)
+        # Without its limits: a start may exceed them.
+        values = replace(stage, limits=_none).numbers(J)
+        values = values[np.isfinite(values)]
+        limits = [(one.stage, one.most) for one in kept]
+        return valued(self.problem, stage, box, kept=limits, zero=float(values[0]) if len(values) else 0.0)
+
+    def _widened(self, derived: Valued, nlp: NLP, z: np.ndarray) -> bool:
+        """Whether objectives are at ends of ranges that the problem does not have; these are wider from now on."""
+        ends = derived.at_ends(dict(zip((v.name for v in nlp.variables), z.tolist(), strict=True)))
+        self._room = np.where([goal.name in ends for goal in self.problem.goals], 10.0 * self._room, self._room)
+        return bool(ends)
+
+    def _multistart(self, derived: Valued, nlp: NLP, known: Known, starts: int) -> Solved:
+        """The best of so many solves: from known vectors, then from random ones."""
+        Z = derived.lifted(known.nlp.variables, nlp.variables, known.Z, known.F)
+        solver = MultistartSolver(nlp, Z, 1, self.rng, self.solves)
+        found: list[Solved] = []
+        for k in range(starts):
+            try:
+                found.append(solver.from_vector(Z[k], REFERENCE, WEIGHTS) if k < len(Z) else solver.from_random(REFERENCE, WEIGHTS))
+            except Stopped:
+                if not found:
+                    raise
+                break
+        return solver.better(found, REFERENCE, WEIGHTS)
+
+    def _outcome(self, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
+        """What was found, as a vector of the problem itself."""
+        z = own.tighten(derived.dropped(nlp.variables, own.variables, z)[None])
+        return Outcome(own, z[0], own.evaluate(z)[0][0], status, note)
+
+
+def _none(J: Sequence[object]) -> list[object]:
+    return []

@@ -1,0 +1,323 @@
+"""decide: the optimum of every preference on fronts that are known in closed form, and what it makes of other problems."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rest_to_rest import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, both, cart, crossing, effort, ends, in_time
+from scipy.optimize import brentq, minimize_scalar
+from smooth_problems import bryson_denham, corners, shuttle
+
+from macs import Front, sweep
+from macs.decisions import (
+    Around,
+    Choice,
+    FuzzyGoal,
+    FuzzyPhysicalProgramming,
+    FuzzySatisfactory,
+    GoalProgramming,
+    Nimbus,
+    PhysicalProgramming,
+    Preference,
+    Range,
+    Ranges,
+    ReferencePoint,
+    Smaller,
+    WeightedSum,
+    decide,
+)
+from problems import Problem, load
+from problems.cases.goddard import optimal_flight
+from transcription import DFET
+from transcription.catalogue import parse
+
+NOW = {"effort": 10.0, "time": in_time(10.0)}
+HOPED = crossing((10, WIDE_E), (0.7, WIDE_T))
+RESERVED = crossing((10, 20), (0.7, 1.3))
+LEVEL = crossing((10, 86), (0.7, 3.3))
+CLOSE = crossing((10, 20), (0.7, 0.3))
+NEARBY = crossing((30, 5), (0.7, 3.3))
+KNOWN: list[tuple[Preference, float, tuple[float, ...]]] = [
+    (WeightedSum({"effort": 1.0, "time": 2.0}), (T := balanced(1 / WIDE_E, 2 / WIDE_T)), (both(T)[0] + 2 * both(T)[1],)),
+    (GoalProgramming({"effort": 10.0, "time": 0.7}), NOW["time"], ((NOW["time"] - 0.7) / WIDE_T, 0.0)),
+    (
+        GoalProgramming({"effort": 10.0, "time": 0.7}, {"effort": 1.0, "time": 3.0}),
+        (T := balanced(1 / WIDE_E, 3 / WIDE_T)),
+        ((effort(T) - 10) / WIDE_E + 3 * (T - 0.7) / WIDE_T, 0.0),
+    ),
+    # All targets are met: the least sum among those who meet them.
+    (GoalProgramming({"effort": 40.0, "time": 2.0}), (T := balanced(1 / WIDE_E, 1 / WIDE_T)), (0.0, sum(both(T)))),
+    (FuzzyGoal({"effort": 40.0, "time": 2.0}), T, (0.0, sum(both(T)))),
+    (FuzzyGoal({"effort": 10.0, "time": 0.7}), LEVEL, ((LEVEL - 0.7) / 3.3, 0.0)),
+    (FuzzyGoal({"effort": 10.0, "time": 0.7}, {"effort": 20.0, "time": 0.3}), CLOSE, ((CLOSE - 0.7) / 0.3, 0.0)),
+    (FuzzyGoal({"effort": 10.0, "time": 0.7}, aggregate="sum"), NOW["time"], ((NOW["time"] - 0.7) / 3.3, 0.0)),
+    (FuzzyGoal({"effort": Around(30.0, 5.0), "time": 0.7}), NEARBY, ((NEARBY - 0.7) / 3.3, 0.0)),
+    (ReferencePoint({"effort": 10.0, "time": 0.7}), HOPED, ((1 + 2e-4) * (HOPED - 0.7) / WIDE_T,)),
+    (
+        ReferencePoint({"effort": 40.0, "time": 2.0}),
+        (T := crossing((40, WIDE_E), (2, WIDE_T))),
+        ((1 + 2e-4) * (T - 2) / WIDE_T,),
+    ),
+    (
+        ReferencePoint({"effort": 10.0, "time": 0.7}, {"effort": 30.0, "time": 2.0}),
+        RESERVED,
+        ((1 + 2e-4) * (RESERVED - 0.7) / 1.3,),
+    ),
+    (
+        Nimbus(NOW, improve=["time"], until={"effort": 20.0}),
+        (T := in_time(20)),
+        ((T - 0.5) / WIDE_T + 1e-4 * sum(both(T)),),
+    ),
+    (Nimbus(NOW, to={"effort": 8.0}, free=["time"]), 4.0, ((12 / 64 - 8) / WIDE_E + 1e-4,)),
+    # (1/2 + lambda) d_1 + (1/2 - lambda) d_2 where the order is not kept, and everywhere else: kappa is d_1 - d_2 of either sign.
+    (
+        FuzzySatisfactory({}, ["effort", "time"], 0.1),
+        (T := balanced(0.6 / WIDE_E, 0.4 / WIDE_T)),
+        (0.6 * both(T)[0] + 0.4 * both(T)[1],),
+    ),
+    (FuzzySatisfactory({}, ["time", "effort"], 0.0, ordered=True), DIAGONAL, (both(DIAGONAL)[1],)),
+]
+"""Preferences, the time of their optimum, and its values, all derived by hand from the front."""
+
+
+@pytest.mark.parametrize(("preference", "T", "values"), KNOWN, ids=[repr(one[0]) for one in KNOWN])
+def test_every_method_finds_its_optimum(preference: Preference, T: float, values: tuple[float, ...]) -> None:
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends())
+    assert choice.message == "" and choice.values == pytest.approx(values, rel=1e-6, abs=1e-7)
+    assert choice.objectives["time"] == pytest.approx(T, rel=3e-6)
+    # On the front, and known to be there.
+    assert choice.objectives["effort"] == pytest.approx(effort(choice.objectives["time"]), rel=1e-7)
+    assert choice.point.optimality < 1e-6 and choice.point.verified and choice.point.status == "converged"
+
+
+EFFORTS, TIMES = Smaller(5, 10, 15, 25, 50), Smaller(0.6, 0.8, 1.0, 1.3, 2.0)
+RANGED = Range(2, 5, 8, 10, 12, 14, 16, 20, 30, 40)
+PHYSICAL = [
+    PhysicalProgramming({"effort": EFFORTS, "time": TIMES}),
+    PhysicalProgramming({"effort": RANGED, "time": TIMES}),
+    FuzzyPhysicalProgramming({"effort": EFFORTS, "time": TIMES}, spread={"effort": 2.0, "time": 0.1}),
+]
+
+
+@pytest.mark.parametrize("preference", PHYSICAL, ids=["crisp", "range", "fuzzy"])
+def test_physical_programming_finds_its_optimum(preference: PhysicalProgramming) -> None:
+    (stage,) = preference.stages(cart().compile().goals, RANGES)
+    # On a grid, and then between its best neighbours: the value has several valleys.
+    T = np.linspace(0.62, 1.9, 2001)
+    k = int(np.argmin(stage.numbers(np.stack([12 / T**3, T], axis=1))))
+    truth = minimize_scalar(
+        lambda T: float(stage.numbers(np.array([[12 / T**3, T]]))[0]),
+        bounds=(T[k - 1], T[k + 1]),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
+    choice = decide(cart(), MESH, preference, start=ends(), ranges=RANGES)
+    assert choice.message == "" and choice.value == pytest.approx(truth.fun, rel=1e-6, abs=1e-9)
+    assert choice.objectives["time"] == pytest.approx(truth.x, rel=1e-5) and choice.point.optimality < 1e-6
+    # Neither end is within the hard limits: the first step finds a point that is.
+    assert [step.name for step in choice.history] == ["largest excess over hard limits", stage.name]
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(weight=st.floats(-3, 3), wide=st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
+def test_any_weights_in_any_ranges(weight: float, wide: tuple[float, float]) -> None:
+    e, t = WIDE_E * 10 ** wide[0], WIDE_T * 10 ** wide[1]
+    ranges = Ranges({"effort": 12 / 64, "time": 0.5}, {"effort": 12 / 64 + e, "time": 0.5 + t})
+    choice = decide(cart(), MESH, WeightedSum({"effort": 10**weight, "time": 1.0}), ranges=ranges, start=ends())
+    T = min(max(balanced(10**weight / e, 1 / t), 0.5), 4.0)
+    truth = 10**weight * (effort(T) - 12 / 64) / e + (T - 0.5) / t
+    assert choice.value == pytest.approx(truth, rel=1e-6, abs=1e-7 * (1 + 10**weight * WIDE_E / e + WIDE_T / t))
+
+
+@pytest.mark.parametrize("first", ["effort", "time"])
+def test_priorities_are_lexicographic(first: str) -> None:
+    preference = GoalProgramming({"effort": 10.0, "time": 0.7}, priorities=[first, "time" if first == "effort" else "effort"])
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends())
+    # The first target is met, but for 1e-7 of a range; what that is worth to the second is at most six times as much.
+    second = (in_time(10.0) - 0.7) / WIDE_T if first == "effort" else (effort(0.7) - 10) / WIDE_E
+    assert choice.values[0] <= 1.5e-7 and choice.values[1:] == pytest.approx((second, 0.0), abs=1e-6)
+    assert [step.name for step in choice.history] == ["priority 1", "priority 2"]
+    assert choice.point.optimality < 1e-6
+
+
+def test_weights_are_those_of_the_sum() -> None:
+    # Where a weighted sum of normalised objectives is least, the multipliers are its weights over the ranges.
+    choice = decide(cart(), MESH, WeightedSum({"effort": 1.0, "time": 2.0}), ranges=RANGES, start=ends())
+    assert choice.point.weights is not None
+    assert choice.point.weights["effort"] / choice.point.weights["time"] == pytest.approx(WIDE_T / WIDE_E / 2, rel=1e-5)
+    assert choice.degrees == pytest.approx(
+        {"effort": 1 - both(choice.objectives["time"])[0], "time": 1 - both(choice.objectives["time"])[1]}
+    )
+
+
+def test_without_anything_but_a_preference() -> None:
+    choice = decide(cart(), ReferencePoint({"effort": 10.0, "time": 0.7}))
+    assert choice.ranges.best["time"] == pytest.approx(0.5, abs=1e-6) and choice.ranges.worst["effort"] == pytest.approx(96.0, rel=1e-4)
+    assert choice.objectives["time"] == pytest.approx(HOPED, rel=1e-4) and choice.point.verified
+    assert choice.stats["gradient_solves"] > 2 and "effort" in choice.table() and "achievement" in choice.table()
+
+
+def test_stages_after_the_first_stay_on_the_mesh_that_was_found() -> None:
+    choice = decide(cart(), GoalProgramming({"effort": 40.0, "time": 2.0}), start=ends(), ranges=RANGES)
+    assert choice.values == pytest.approx((0.0, sum(both(balanced(1 / WIDE_E, 1 / WIDE_T)))), rel=1e-5) and choice.point.verified
+
+
+@pytest.mark.parametrize("word", ["radau:6x3", "gauss:4x3"])
+def test_other_transcriptions(word: str) -> None:
+    choice = decide(cart(), parse(word), ReferencePoint({"effort": 10.0, "time": 0.7}), ranges=RANGES)
+    assert choice.objectives["time"] == pytest.approx(HOPED, rel=1e-6) and choice.point.optimality < 1e-6
+
+
+def test_units_and_senses_do_not_matter() -> None:
+    problem = Problem("cart, the other way round")
+    trip = problem.phase("trip", t0=0, tf=(0.5, 4.0))
+    x, v = trip.state("x", bounds=(-1, 2), initial=0, final=1), trip.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = trip.control("u", bounds=(-60, 60))
+    trip.dynamics(x=v, v=u + 0 * x)
+    problem.maximize("savings", 1e5 - 1e3 * trip.integral(u**2))
+    problem.maximize("haste", -1e-6 * trip.tf)
+    ranges = Ranges({"savings": 1e5 - 187.5, "haste": -0.5e-6}, {"savings": 4e3, "haste": -4e-6})
+    choice = decide(problem, MESH, ReferencePoint({"savings": 9e4, "haste": -0.7e-6}), ranges=ranges)
+    assert choice.objectives["haste"] == pytest.approx(-1e-6 * HOPED, rel=1e-6)
+    assert choice.value == pytest.approx((1 + 2e-4) * (HOPED - 0.7) / WIDE_T, rel=1e-6)
+
+
+# Other problems
+
+
+TIME, SPEED = "flight time", "horizontal speed"
+
+
+def goddard(preference: Preference) -> Choice:
+    ranges = Ranges({TIME: 110.0, SPEED: 0.9}, {TIME: 250.0, SPEED: 0.0})
+    return decide(load("goddard"), DFET(4, 6), preference, ranges=ranges)
+
+
+def speed(T: float) -> float:
+    return float(optimal_flight(T, 2)["vx"][-1])
+
+
+def test_goddard_between_time_and_speed() -> None:
+    choice = goddard(WeightedSum({"flight time": 1.0, "horizontal speed": 0.5}))
+    truth = minimize_scalar(
+        lambda T: (T - 110) / 140 + 0.5 * (0.9 - speed(T)) / 0.9, bounds=(110, 250), method="bounded", options={"xatol": 1e-6}
+    )
+    assert 112 < truth.x < 249 and choice.value == pytest.approx(truth.fun, rel=1e-6) and choice.point.optimality < 1e-6
+    choice = goddard(ReferencePoint({"flight time": 120.0, "horizontal speed": 0.8}))
+    T = brentq(lambda T: (T - 120) / 140 - (0.8 - speed(T)) / 0.9, 112, 250, xtol=1e-10)
+    assert choice.objectives == pytest.approx({"flight time": T, "horizontal speed": speed(T)}, rel=1e-5)
+    assert choice.value == pytest.approx((1 + 2e-4) * (T - 120) / 140, rel=1e-6)
+
+
+def test_an_end_that_its_mesh_makes_too_good_still_is_one() -> None:
+    # On this mesh the fastest ascent takes less than any real one, so that it is not verified.
+    choice = decide(load("goddard"), DFET(4, 6), WeightedSum({TIME: 1.0, SPEED: 1.0}))
+    assert choice.ranges.best[TIME] == pytest.approx(109.08, abs=0.01) and choice.ranges.worst[TIME] == pytest.approx(250.0)
+
+
+def test_peaks_of_the_user() -> None:
+    # The front is (T, 16 / T^4), from 1 to 3.
+    choice = decide(shuttle(), DFET(4, 2), ReferencePoint({"time": 1.5}))
+    T = brentq(lambda T: (T - 1.5) / 2 - (16 / T**4 - 16 / 81) / (16 - 16 / 81), 1, 3)
+    assert choice.objectives["time"] == pytest.approx(T, rel=1e-5) and choice.point.optimality < 1e-6
+    # The order of priority asks for a lower thrust only: it may be relaxed, as long as a rise of the peak is no gain.
+    choice = decide(shuttle(), DFET(4, 2), FuzzySatisfactory({}, ["time", "largest thrust squared"]))
+    wide = 16 - 16 / 81
+    T = minimize_scalar(lambda T: 0.6 * (T - 1) / 2 + 0.4 * (16 / T**4 - 16 / 81) / wide, bounds=(1, 3), method="bounded").x
+    assert choice.objectives["time"] == pytest.approx(T, rel=1e-4)
+    with pytest.raises(ValueError, match="may ask for a worse value of 'largest thrust squared'"):
+        decide(shuttle(), DFET(4, 2), GoalProgramming({"largest thrust squared": Around(5.0)}))
+
+
+def test_three_objectives_and_one_that_does_not_matter() -> None:
+    choice = decide(corners(), MESH, WeightedSum({"from 0": 1.0, "from 2": 3.0}))
+    # Squared distances from two unit vectors, one thrice as heavy: a quarter of the way from the other.
+    assert list(choice.point.parameters.values()) == pytest.approx([0.25, 0.0, 0.75], abs=1e-6)
+    choice = decide(corners(), MESH, ReferencePoint({"from 0": 0.0, "from 1": 0.0, "from 2": 0.0}), ranges=_unit())
+    assert list(choice.point.parameters.values()) == pytest.approx([1 / 3] * 3, abs=1e-5)
+
+
+def _unit() -> Ranges:
+    return Ranges({f"from {i}": 0.0 for i in range(3)}, {f"from {i}": 2.0 for i in range(3)})
+
+
+def test_where_a_state_is_limited() -> None:
+    choice = decide(bryson_denham(), DFET(8, 3), ReferencePoint({"highest": 0.1}))
+    assert choice.point.optimality < 1e-6 and choice.point.verified
+    a, b = (1 - degree for degree in choice.degrees.values())
+    assert a == pytest.approx(b, abs=1e-6)
+
+
+def test_ranges_that_say_nothing_of_where_the_front_is() -> None:
+    # The optimum is thirty times the ranges away: what the derived problem looks for is not confined to these.
+    narrow = Ranges({"effort": 50.0, "time": 0.6}, {"effort": 51.0, "time": 0.61})
+    choice = decide(
+        cart(), MESH, WeightedSum({"effort": 1.0, "time": 1e-9}), ranges=narrow, start=decide(cart(), MESH, _fast(), ranges=RANGES).point
+    )
+    assert choice.objectives["effort"] == pytest.approx(12 / 64, rel=1e-6)
+
+
+def _fast() -> Preference:
+    return WeightedSum({"time": 1.0})
+
+
+# Never worse than what is known
+
+
+@cache
+def front() -> Front:
+    return sweep(cart(), MESH, points=31)
+
+
+@pytest.mark.parametrize("preference", [one[0] for one in KNOWN], ids=[repr(one[0]) for one in KNOWN])
+def test_never_worse_than_the_best_ranked(preference: Preference) -> None:
+    ranking = preference.rank(front(), RANGES)
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=front())
+    known = ranking.stage_values[ranking.order[0]]
+    assert choice.value <= known[0] + 1e-6
+
+
+@cache
+def dense() -> Front:
+    """Points of the front in closed form, in steps of 2e-4."""
+    T = np.linspace(0.5, 4.0, 17_501)
+    goals = cart().compile().goals
+    F = np.stack([12 / T**3, T], axis=1)
+    return Front(F=F, decision=np.empty((len(T), 0)), violation=np.zeros(len(T)), status=["converged"] * len(T), goals=goals)
+
+
+@pytest.mark.parametrize("preference", [one[0] for one in KNOWN], ids=[repr(one[0]) for one in KNOWN])
+def test_a_ranked_dense_front_agrees(preference: Preference) -> None:
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends())
+    assert preference.rank(dense(), RANGES).best.objectives["time"] == pytest.approx(choice.objectives["time"], abs=4e-4)
+
+
+def test_the_best_that_is_known_stands_where_solves_fail() -> None:
+    preference = ReferencePoint({"effort": 10.0, "time": 0.7})
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=front(), max_iterations=1)
+    best = preference.rank(front(), RANGES).best
+    assert choice.objectives == best.objectives and "the limit of 1 iterations was reached" in choice.message
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=front(), time_limit=1e-9)
+    assert choice.objectives == best.objectives and "time limit" in choice.message
+    with pytest.raises(TimeoutError, match="time limit"):
+        decide(cart(), MESH, preference, time_limit=1e-9)
+
+
+def test_same_seed_same_bits() -> None:
+    preference = ReferencePoint({"effort": 10.0, "time": 0.7})
+    one, other = (decide(cart(), MESH, preference, ranges=RANGES, starts=4, seed=5) for _ in range(2))
+    assert one.point.decision.tobytes() == other.point.decision.tobytes() and one.value == other.value
+
+
+@pytest.mark.slow
+def test_two_phases_of_a_skip_entry() -> None:
+    problem = load("skip")
+    choice = decide(problem, ReferencePoint({"terminal mass": 60000.0}))
+    assert choice.message == "" and choice.point.verified and choice.point.optimality < 1e-6
+    a, b = (1 - degree for degree in choice.degrees.values())
+    # The kink of the largest distance: both are equal there.
+    assert a == pytest.approx(b, abs=1e-6) and np.isfinite(choice.value)

@@ -1,0 +1,82 @@
+"""decide: hard limits that cannot be met, and arguments that make no sense, each in one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from rest_to_rest import MESH, RANGES, cart, ends
+from smooth_problems import two_wells
+
+from macs import MACS
+from macs.decisions import Nimbus, Ranges, ReferencePoint, WeightedSum, decide, satisfy
+
+TIME = WeightedSum({"time": 1.0})
+
+
+def test_limits_that_cannot_be_met_together_are_named() -> None:
+    # An effort of 11 takes (12 / 11)^(1/3) = 1.029.
+    choice = decide(
+        cart(), MESH, Nimbus({"effort": 10.0, "time": 1.0}, improve=["time"], until={"effort": 11.0}), ranges=RANGES, start=ends()
+    )
+    assert np.isinf(choice.value) and "\n" not in choice.message
+    assert "time at most 1" in choice.message and "effort at most 11" in choice.message
+    # The nearest exceeds both by the same part of their ranges.
+    over = [(choice.objectives["time"] - 1.0) / 3.5, (choice.objectives["effort"] - 11.0) / (96 - 12 / 64)]
+    assert over[0] == pytest.approx(over[1], rel=1e-4) and over[0] > 1e-3
+    assert choice.history[0].value == pytest.approx(over[0], rel=1e-6)
+
+
+def test_limits_that_no_known_point_meets_can_be_met() -> None:
+    # Neither end of the front is within them.
+    choice = decide(cart(), MESH, _within(), ranges=RANGES, start=ends())
+    assert choice.message == "" and choice.objectives["effort"] == pytest.approx(11.0, rel=1e-6)
+    assert [step.name for step in choice.history] == ["largest excess over hard limits", "achievement"]
+
+
+def _within() -> Nimbus:
+    return Nimbus({"effort": 10.0, "time": 1.1}, improve=["time"], until={"effort": 11.0})
+
+
+BAD: list[tuple[Any, dict[str, Any], str]] = [
+    ((lambda x: x, TIME), {}, "needs derivatives.*preference.rank"),
+    ((cart(), MESH), {}, "preference must be a Preference"),
+    ((cart(), 3, TIME), {}, "transcription must be a Transcription"),
+    ((cart(), MESH, TIME), {"start": 3}, "start must be a Front or a Point"),
+    ((cart(), MESH, TIME), {"starts": 0}, "starts"),
+    ((cart(), MESH, TIME), {"seed": -1}, "seed"),
+    ((cart(), MESH, WeightedSum({"tyme": 1.0})), {"ranges": RANGES}, "unknown objective 'tyme'"),
+    ((cart(), MESH, TIME), {"ranges": Ranges({"effort": 1.0}, {"effort": 2.0})}, "the ranges have no 'time'"),
+    ((cart(), MESH, ReferencePoint({"time": 9.0})), {"ranges": RANGES}, "beyond its range"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "more", "words"), BAD, ids=[one[2] for one in BAD])
+def test_bad_arguments_are_one_line_before_any_work(arguments: Any, more: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words) as caught:
+        decide(*arguments, **more)
+    assert "\n" not in str(caught.value)
+
+
+def test_black_boxes_and_other_problems_are_refused() -> None:
+    box = MACS().minimize(lambda X: np.stack([X[:, 0], 1 - X[:, 0]], axis=1), [(0.0, 1.0)] * 2, evaluations=60, seed=1)
+    with pytest.raises(ValueError, match="black box"):
+        decide(cart(), MESH, TIME, start=box)
+    with pytest.raises(ValueError, match="needs derivatives"):
+        decide(box, TIME)
+    with pytest.raises(ValueError, match="another problem, 'cart'"):
+        decide(two_wells(), MESH, WeightedSum({"from left": 1.0}), start=ends())
+    with pytest.raises(ValueError, match="satisfy takes a FuzzySatisfactory"):
+        satisfy(cart(), MESH, TIME)  # type: ignore[arg-type]
+
+
+def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
+    problem = two_wells()
+    problem.constraint("beyond", problem.parameters["p"], lower=3.0)
+    with pytest.raises(ValueError, match="no ranges; the nearest violates constraint 'beyond'"):
+        decide(problem, MESH, WeightedSum({"from left": 1.0}))
+    both = {"from left": 0.0, "from right": 0.0}, {"from left": 1.0, "from right": 1.0}
+    choice = decide(problem, MESH, WeightedSum({"from left": 1.0}), ranges=Ranges(*both))
+    assert choice.point.status != "converged" and choice.history[0].status != "converged"
+    assert "the nearest violates constraint 'beyond'" in choice.message
