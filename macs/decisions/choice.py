@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from problems.compiled import Objective
 from ..fronts.point import Point
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
+from .trade_offs import TradeOffs, trade_offs
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,6 @@ class Choice:
     preference : Preference
     ranges : Ranges
         By which objectives were normalised.
-    trade_offs : TradeOffs or None
-        What more of one objective would cost the others.
     message : str
         What is to be known of the choice; usually empty.
     """
@@ -73,13 +73,17 @@ class Choice:
     history: tuple[Step, ...]
     preference: Preference
     ranges: Ranges
-    trade_offs: Any = None
     message: str = ""
 
     @property
     def value(self) -> float:
         """The value of the preference, of its first stage if there are several."""
         return self.values[0]
+
+    @cached_property
+    def trade_offs(self) -> TradeOffs | None:
+        """What more of one objective would cost the others; None for a single objective, and for a point without a trajectory."""
+        return trade_offs(self.point) if len(self.point.goals) > 1 and self.point.trajectory is not None else None
 
     @property
     def objectives(self) -> dict[str, float]:
