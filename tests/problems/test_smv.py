@@ -232,8 +232,10 @@ def reversals(phase) -> np.ndarray:
 
 @pytest.mark.slow
 def test_the_four_ends_are_flights():
-    """Each is verified; flown by code of its own it ends at 79.248 km within 20 m, keeps its limits, and its commands do not chatter. No end
-    is worse than what was found before, less what moving it inside its limits may cost."""
+    """Each is verified. Flown by code of its own it ends at 79.248 km within 20 m and keeps its limits, and its commands do not chatter.
+
+    No end is worse than what was found before, less what moving it inside its limits may cost.
+    """
     from macs import payoff
 
     front = payoff(load("smv"), progress=False)
