@@ -18,6 +18,7 @@ specific impulse of 300 s, and 0.2 1/s for the gains of all three lags.
 from __future__ import annotations
 
 from math import degrees
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,9 @@ from ..winged import FOOT, SLUG, Winged
 from .figures import plot, track
 from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
 
-__all__ = ["plot", "problem", "track"]
+__all__ = ["REFERENCE", "plot", "problem", "reference", "track"]
+
+REFERENCE = "the front that gradients and MACS found"
 
 HEATING = 200.0
 """Btu/ft2/s."""
@@ -118,3 +121,9 @@ def problem(
     problem.default_evaluations = 700
     problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem
+
+
+def reference() -> np.ndarray:
+    """The front (k, 4): flight time, s, heat load, kBtu/ft2, terminal speed, m/s, and terminal mass, kg; how it was found is in the file.
+    `python -m runs.truths.skip_entry smv` makes one by gradients alone."""
+    return np.loadtxt(Path(__file__).with_name("smv.csv"), delimiter=",", ndmin=2)
