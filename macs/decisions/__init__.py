@@ -21,7 +21,9 @@ from ..preferences import (
 )
 from .choice import Choice, Step
 from .decide import decide
+from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
+from .trade_offs import TradeOffs, trade_offs
 
 __all__ = [
     "Around",
@@ -41,8 +43,12 @@ __all__ = [
     "Smaller",
     "Stage",
     "Step",
+    "TradeOffs",
     "Value",
     "WeightedSum",
     "decide",
+    "front_rates",
+    "plot_rates",
     "satisfy",
+    "trade_offs",
 ]
