@@ -18,6 +18,8 @@ from ..preferences import (
     Stage,
     Value,
     WeightedSum,
+    from_dict,
+    to_dict,
 )
 from .choice import Choice, Step
 from .decide import decide
@@ -47,8 +49,10 @@ __all__ = [
     "Value",
     "WeightedSum",
     "decide",
+    "from_dict",
     "front_rates",
     "plot_rates",
     "satisfy",
+    "to_dict",
     "trade_offs",
 ]

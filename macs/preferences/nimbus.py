@@ -66,11 +66,10 @@ class Nimbus(Preference):
             object.__setattr__(self, name, names_of(getattr(self, name), name))
         for name in ("to", "until"):
             found = getattr(self, name)
-            object.__setattr__(self, name, named_numbers(found, f"'{name}'") if found else {})
+            object.__setattr__(self, name, {} if found is None or found == {} else named_numbers(found, f"'{name}'"))
         check_interval("augmentation", self.augmentation, "[0, 1]")
-        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
-        for name in classes:
-            if classes.count(name) > 1:
+        for name in self.names:
+            if self.names.count(name) > 1:
                 raise ValueError(f"'{name}' is in two classes of Nimbus")
         if not self.improve and not self._to:
             raise ValueError("Nimbus needs an objective that is to become better, in `improve` or `to`")
@@ -80,6 +79,10 @@ class Nimbus(Preference):
     __repr__ = short_repr
 
     @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.improve, *self._to, *self.keep, *self._until, *self.free)
+
+    @property
     def _to(self) -> Mapping[str, float]:
         return self.to or {}
 
@@ -87,23 +90,28 @@ class Nimbus(Preference):
     def _until(self) -> Mapping[str, float]:
         return self.until or {}
 
-    def _check(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
-        """The ranges, if each objective is in a class whose values make sense."""
-        spans, known = needed(ranges, self), {goal.name: goal for goal in goals}
-        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
-        places([*self.current, *classes], goals)
-        for name, goal in known.items():
+    def check(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError if an objective is in no class, one that is none is in a class, or the values of a class make no sense."""
+        places([*self.current, *self.names], goals)
+        for goal in goals:
+            name = goal.name
             if name not in self.current:
                 raise ValueError(f"the current point of Nimbus has no '{name}'")
-            if name not in classes:
+            if name not in self.names:
                 raise ValueError(f"'{name}' is in no class of Nimbus: improve, to, keep, until or free")
             now = shown(self.current[name], goal)
-            if name in self._to:
-                spans.check(self._to[name], goal, "the value in `to`")
-                if goal.sign * (self._to[name] - self.current[name]) >= 0:
-                    raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
+            if name in self._to and goal.sign * (self._to[name] - self.current[name]) >= 0:
+                raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
             if name in self._until and goal.sign * (self._until[name] - self.current[name]) < 0:
                 raise ValueError(f"'{name}' may become worse until {shown(self._until[name], goal)}, which is better than {now}")
+
+    def _checked(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
+        """The ranges, if each objective is in a class whose values make sense, and what is asked for lies in them."""
+        spans = needed(ranges, self)
+        self.check(goals)
+        for goal in goals:
+            if goal.name in self._to:
+                spans.check(self._to[goal.name], goal, "the value in `to`")
         return spans
 
     def _limits(self, goals: Sequence[Objective]) -> dict[int, float]:
@@ -113,7 +121,7 @@ class Nimbus(Preference):
         return {found[name]: value for name, value in values.items()}
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
-        spans = self._check(goals, ranges)
+        spans = self._checked(goals, ranges)
         slopes = [goal.sign / span for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True)]
         limited, asked = self._limits(goals), {**{name: spans.best[name] for name in self.improve}, **self._to}
         found = places(asked, goals)
@@ -134,7 +142,7 @@ class Nimbus(Preference):
         return (Stage("achievement", value, groups, limits, tuple(words)),)
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
-        spans, J = self._check(goals, ranges), np.asarray(objectives, dtype=float)
+        spans, J = self._checked(goals, ranges), np.asarray(objectives, dtype=float)
         result = np.full(J.shape, np.nan)
         for place, limit in self._limits(goals).items():
             goal = goals[place]

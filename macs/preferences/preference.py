@@ -12,6 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
+from .checks import places
 from .ranges import Ranges
 from .ranking import Ranking, ranked
 from .stage import Stage
@@ -38,6 +39,15 @@ class Preference(ABC):
     def title(self) -> str:
         """The name of the method, for figures."""
         return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the objectives that it speaks of."""
+
+    def check(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError for what can be told to be wrong without ranges: names that are none of these goals'."""
+        places(self.names, goals)
 
     @abstractmethod
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
