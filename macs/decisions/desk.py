@@ -145,7 +145,7 @@ class Desk:
             found, message = None, f"{reason}: no stage was solved to its end"
             if not candidates:
                 self._end(str(reason))
-        points = [*([] if found is None else [found]), *candidates]
+        points: list[Point] = [*([] if found is None else [found]), *candidates]
         order = ordering(
             stages,
             np.array([list(point.objectives.values()) for point in points]),
@@ -153,12 +153,12 @@ class Desk:
             same=SAME,
         )
         chosen = points[order.order[0]]
-        said = [message]
-        if chosen is not found and not message:
+        said, is_new = [message], chosen is found
+        if not is_new and not message:
             said.append("no better point was found than the best that was known")
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
-        if chosen is found and not message and (chosen.optimality or 0.0) > OPTIMAL:
+        if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
             said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])

@@ -46,6 +46,10 @@ class Nimbus(Preference):
         Objectives that may change as they will.
     augmentation : float
         See `ReferencePoint`.
+    enough : bool
+        Whether the values of `to` are enough. By default better ones still count. If they are enough, the largest excess over them is
+        minimised, at least 0; where all are reached, the largest loss of the others is minimised, counted from their current values.
+        `improve` has to be empty.
     """
 
     current: Mapping[str, float]
@@ -55,6 +59,7 @@ class Nimbus(Preference):
     until: Mapping[str, float] | None = None
     free: Sequence[str] = ()
     augmentation: float = AUGMENTATION
+    enough: bool = False
 
     DEGREE: ClassVar[str] = "part of what was asked for"
 
@@ -68,6 +73,10 @@ class Nimbus(Preference):
             found = getattr(self, name)
             object.__setattr__(self, name, {} if found is None or found == {} else named_numbers(found, f"'{name}'"))
         check_interval("augmentation", self.augmentation, "[0, 1]")
+        if not isinstance(self.enough, bool):
+            raise ValueError(f"enough must be True or False, not {self.enough!r}")
+        if self.enough and self.improve:
+            raise ValueError("values of `to` cannot be enough while others are to `improve` as much as possible")
         for name in self.names:
             if self.names.count(name) > 1:
                 raise ValueError(f"'{name}' is in two classes of Nimbus")
@@ -124,13 +133,13 @@ class Nimbus(Preference):
         spans = self._checked(goals, ranges)
         slopes = [goal.sign / span for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True)]
         limited, asked = self._limits(goals), {**{name: spans.best[name] for name in self.improve}, **self._to}
-        found = places(asked, goals)
+        found = places(self.current, goals)
 
         def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
             return peaks[0] + self.augmentation * sum(spans.normalised(goals, J))
 
-        def groups(J: Sequence[Operand]) -> list[list[Operand]]:
-            return [[slopes[found[name]] * (J[found[name]] - target) for name, target in asked.items()]]
+        def excesses(J: Sequence[Operand], values: Mapping[str, float]) -> list[Operand]:
+            return [slopes[found[name]] * (J[found[name]] - target) for name, target in values.items()]
 
         def limits(J: Sequence[Operand]) -> list[Operand]:
             return [slopes[place] * (J[place] - limit) for place, limit in limited.items()]
@@ -139,7 +148,13 @@ class Nimbus(Preference):
             f"{goals[place].name} {'at most' if goals[place].sign > 0 else 'at least'} {shown(limit, goals[place])}"
             for place, limit in limited.items()
         ]
-        return (Stage("achievement", value, groups, limits, tuple(words)),)
+        if not self.enough:
+            return (Stage("achievement", value, lambda J: [excesses(J, asked)], limits, tuple(words)),)
+        others = {name: now for name, now in self.current.items() if name not in asked}
+        return (
+            Stage("missing", lambda J, peaks: peaks[0], lambda J: [[0.0, *excesses(J, asked)]], limits, tuple(words)),
+            Stage("loss of others", value, lambda J: [excesses(J, others)], after_zero=True),
+        )
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         spans, J = self._checked(goals, ranges), np.asarray(objectives, dtype=float)

@@ -57,7 +57,7 @@ one_class = (
 @st.composite
 def goal_programming(draw: Any) -> GoalProgramming:
     targets = draw(named(number | st.builds(Around, number)))
-    weights = draw(st.none() | st.fixed_dictionaries({one: positive for one in targets}))
+    weights = draw(st.none() | st.fixed_dictionaries(dict.fromkeys(targets, positive)))
     priorities = draw(st.none() | st.permutations([*targets]).map(lambda found: [tuple(found[:1]), *found[1:]]))
     return GoalProgramming(targets, weights, priorities)
 
@@ -66,7 +66,7 @@ def goal_programming(draw: Any) -> GoalProgramming:
 def fuzzy_goal(draw: Any) -> FuzzyGoal:
     targets = draw(named(target))
     plain = [one for one, value in targets.items() if not isinstance(value, Around)]
-    tolerances = draw(st.fixed_dictionaries({one: positive for one in plain})) if plain else None
+    tolerances = draw(st.fixed_dictionaries(dict.fromkeys(plain, positive))) if plain else None
     return FuzzyGoal(targets, tolerances, draw(st.sampled_from(["min", "sum"])))
 
 
@@ -90,7 +90,7 @@ def nimbus(draw: Any) -> Nimbus:
 @st.composite
 def fuzzy_physical(draw: Any) -> FuzzyPhysicalProgramming:
     classes = draw(named(one_class))
-    spread = draw(positive | st.fixed_dictionaries({one: positive for one in classes}))
+    spread = draw(positive | st.fixed_dictionaries(dict.fromkeys(classes, positive)))
     return FuzzyPhysicalProgramming(classes, draw(st.floats(1.01, 9)), spread=spread, printed=draw(st.booleans()))
 
 
