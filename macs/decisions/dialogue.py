@@ -42,8 +42,8 @@ LONGEST = 60
 """Characters of what was asked, in a table."""
 DISTINCT = 1e-3
 """Part of a range by which alternatives differ."""
-ONLY_RANKED = "only points that are known were ranked: the problem is not at hand"
-BLACK_BOX = "only points that are known were ranked: a black box has no derivatives"
+ONLY_RANKED = "only points that are known were ranked, since there is no problem to solve"
+BLACK_BOX = "only points that are known were ranked, since a black box has no derivatives"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +89,7 @@ class Dialogue:
 
     Attributes
     ----------
-    front : Front
-    problem : CompiledProblem or None
-    transcription : Transcription or None
-    ranges : Ranges
-    seed : int
+    front, problem, transcription, ranges, seed
     history : tuple of Turn
 
     Raises

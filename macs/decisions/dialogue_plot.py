@@ -44,7 +44,7 @@ def draw_history(
         Whose degrees are shown. Default: of each choice its own; the first one's where smaller degrees are better by some, and worse by
         others.
     figure : Figure, optional
-        Default: a new one.
+        It is made as large as is needed. Default: a new one.
     """
     import matplotlib
 
@@ -56,16 +56,13 @@ def draw_history(
         by = kinds[0]
     if by is not None:
         kinds = [by]
-    if by is None:
-        degrees = np.array([[one.degrees[goal.name] for goal in goals] for one in choices])
-    else:
-        degrees = by.degrees(goals, ranges, J)
+    degrees = np.array([[one.degrees[goal.name] for goal in goals] for one in choices]) if by is None else by.degrees(goals, ranges, J)
     label = kinds[0].DEGREE if len({one.DEGREE for one in kinds}) == 1 else "degree (1: all that was asked for)"
     marks = kinds[0].MARKS if len({one.MARKS for one in kinds}) == 1 else ()
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         left = max(3.6, 0.9 + len(choices) * max(1.25, 0.36 * len(goals)))
-        if figure is None:
-            figure = new_figure(left + 3.4, max(3.6, 1.3 * len(goals) + 0.8))
+        figure = new_figure(1.0, 1.0) if figure is None else figure
+        figure.set_size_inches(left + 3.4, max(3.6, 1.3 * len(goals) + 0.8))
         grid = figure.add_gridspec(len(goals), 2, width_ratios=(left, 3.0))
         bars = figure.add_subplot(grid[:, 0])
         groups = ["\n".join(textwrap.wrap(f"{k + 1}: {words}", WIDE, max_lines=LINES, placeholder=" …")) for k, words in enumerate(asked)]
