@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, better, new_figure
+from ..fronts.pictures.style import COLORS, GREY, STYLE, label, new_figure
 from ..preferences import Preference, Ranges
 from ..preferences.pictures.degree_plot import draw_degrees
 from .choice import Choice
@@ -57,7 +57,7 @@ def draw_history(
     if by is not None:
         kinds = [by]
     degrees = np.array([[one.degrees[goal.name] for goal in goals] for one in choices]) if by is None else by.degrees(goals, ranges, J)
-    label = kinds[0].DEGREE if len({one.DEGREE for one in kinds}) == 1 else "degree (1: all that was asked for)"
+    heights = kinds[0].DEGREE if len({one.DEGREE for one in kinds}) == 1 else "degree (1: all that was asked for)"
     marks = kinds[0].MARKS if len({one.MARKS for one in kinds}) == 1 else ()
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         left = max(3.6, 0.9 + len(choices) * max(1.25, 0.36 * len(goals)))
@@ -68,9 +68,9 @@ def draw_history(
         groups = ["\n".join(textwrap.wrap(f"{k + 1}: {words}", WIDE, max_lines=LINES, placeholder=" …")) for k, words in enumerate(asked)]
         rows = dict(zip((goal.name for goal in goals), degrees.T, strict=True))
         if by is not None and len(choices) > 1:
-            label += f", all turns by {by.title}"
+            heights += f", all turns by {by.title}"
         entering = {name: row for name, row in rows.items() if not np.isnan(row).all()}
-        draw_degrees(entering, groups, label, marks, kinds[0].SMALLER, ax=bars)
+        draw_degrees(entering, groups, heights, marks, kinds[0].SMALLER, ax=bars)
         values = [figure.add_subplot(grid[k, 1]) for k in range(len(goals))]
         for k, (goal, ax) in enumerate(zip(goals, values, strict=True)):
             _draw_values(ax, goal, ranges, J[:, k], COLORS[k % len(COLORS)], last=k == len(goals) - 1)
@@ -89,6 +89,6 @@ def _draw_values(ax: Any, goal: Objective, ranges: Ranges, values: np.ndarray, c
     ax.set_xlim(0.6, len(values) + 0.4)
     ax.set_xticks(turns, [str(turn) for turn in turns] if last else [""] * len(turns))
     ax.margins(y=0.12)
-    ax.set_title(better(goal), loc="left", color=color)
+    ax.set_title(f"{label(goal.name, goal.unit)}, {goal.sense[:3]}", loc="left", color=color)
     if last:
         ax.set_xlabel("turn")

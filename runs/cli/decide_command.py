@@ -52,11 +52,14 @@ def decide(arguments: Namespace) -> int:
         _ask(dialogue, arguments)
         choice = dialogue.choose()
     print(shown(dialogue))
+    source = dialogue.front.source
+    if dialogue.problem is None and source is not None and not arguments.rank_only:
+        print(f"The problem '{source.name}' is not at hand: give it by --problem, or --trust the code that the file names.")
     if arguments.alternatives:
         print(f"\n{alternatives_table(dialogue)}")
     wanted = {kind: getattr(arguments, kind) for kind in KINDS if getattr(arguments, kind)}
     if not wanted and sys.stdin.isatty() and sys.stdout.isatty():
-        return _loop(dialogue)
+        return _loop(dialogue, arguments.front)
     for kind, path in wanted.items():
         print(KINDS[kind](dialogue, path))
     return DONE if good(choice) else FAILED
@@ -68,24 +71,31 @@ def good(choice: Choice) -> bool:
 
 
 def _check_call(arguments: Namespace) -> None:
-    targets = {f"--{kind}": getattr(arguments, kind) for kind in KINDS if getattr(arguments, kind)}
-    for option, path in targets.items():
-        check_target(path)
-        if Path(path).resolve() == Path(arguments.front).resolve() and option != "--json":
-            raise WrongCall(f"{option} {path} would overwrite the front")
+    targets = {kind: getattr(arguments, kind) for kind in KINDS if getattr(arguments, kind)}
+    for kind, path in targets.items():
+        _check_target(kind, path, arguments.front, f"--{kind} ")
     if len({Path(path).resolve() for path in targets.values()}) < len(targets):
-        raise WrongCall(f"{' and '.join(targets)} name the same file")
-    if arguments.json and Path(arguments.json).is_file() and Path(arguments.json).stat().st_size and not is_dialogue(arguments.json):
-        raise WrongCall(f"--json {arguments.json} would overwrite a file that is no dialogue")
-    if arguments.out:
-        check_is_front(Path(arguments.out))
-    check_picture(arguments.plot)
+        raise WrongCall(f"{' and '.join(f'--{kind}' for kind in targets)} name the same file")
     if (arguments.to is not None or arguments.giving) and not arguments.improve:
         raise WrongCall("--to and --giving say more about --improve NAME")
     if arguments.prefer and arguments.reference:
         raise WrongCall("give --prefer or --reference, not both")
     if arguments.rank_only and (arguments.problem or arguments.transcription):
         raise WrongCall("--rank-only solves nothing: it takes neither --problem nor --transcription")
+
+
+def _check_target(kind: str, path: str, front: str, option: str) -> None:
+    """Raise what is wrong with a file that is to be written, before anything is."""
+    check_target(path)
+    file = Path(path)
+    if file.resolve() == Path(front).resolve() and not (kind == "json" and is_dialogue(front)):
+        raise WrongCall(f"{option}{path} would overwrite what the choice is made from")
+    if kind == "out":
+        check_is_front(file, option)
+    elif kind == "plot":
+        check_picture(path)
+    elif file.is_file() and file.stat().st_size and not is_dialogue(path):
+        raise WrongCall(f"{option}{path} would overwrite a file that is no dialogue")
 
 
 def _begun(arguments: Namespace) -> Dialogue:
@@ -134,7 +144,7 @@ def _ask(dialogue: Dialogue, arguments: Namespace) -> None:
 # The loop
 
 
-def _loop(dialogue: Dialogue) -> int:
+def _loop(dialogue: Dialogue, front: str) -> int:
     """Commands from the terminal."""
     with suppress(ImportError):
         import readline  # noqa: F401 - editing of the line, and earlier ones
@@ -155,6 +165,8 @@ def _loop(dialogue: Dialogue) -> int:
             print(unknown("command", word, [*_COMMANDS, "quit"]))
             continue
         with _said():
+            if word == "save":
+                _check_target(_kind(rest), rest.strip(), front, "")
             print(command(dialogue, rest.strip()))
 
 
@@ -215,15 +227,15 @@ def _undo(dialogue: Dialogue, rest: str) -> str:
 
 
 def _save(dialogue: Dialogue, rest: str) -> str:
-    suffix = Path(rest).suffix.lower().lstrip(".")
-    if not rest or not suffix:
+    return KINDS[_kind(rest)](dialogue, rest)
+
+
+def _kind(path: str) -> str:
+    """What a file is to hold, by its suffix."""
+    suffix = Path(path.strip()).suffix.lower()
+    if not suffix:
         raise ValueError("write: save FILE.json, FILE.nc or FILE.png")
-    kind = {"json": "json", "nc": "out"}.get(suffix, "plot")
-    if kind == "plot":
-        check_picture(rest)
-    if kind == "out":
-        check_is_front(Path(rest), "")
-    return KINDS[kind](dialogue, rest)
+    return {".json": "json", ".nc": "out"}.get(suffix, "plot")
 
 
 _COMMANDS: dict[str, Callable[[Dialogue, str], str]] = {
