@@ -13,8 +13,8 @@ from problems.compiled import Objective
 from ..fronts.point import Point
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
-from ..preferences.ordering import ordering
 from ..preferences.ranges import confidence
+from ..preferences.stage import ordering
 from .trade_offs import TradeOffs, trade_offs
 
 

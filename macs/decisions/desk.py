@@ -26,9 +26,8 @@ from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
-from ..preferences.ordering import ordering
 from ..preferences.ranges import confidence
-from ..preferences.stage import SLACK
+from ..preferences.stage import SLACK, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
 from .judging import excess_stage, meets, unmet, with_all_limits

@@ -16,7 +16,7 @@ from .checks import named_numbers, names_of, places, shown
 from .preference import Preference, needed
 from .ranges import Ranges
 from .reference_point import AUGMENTATION
-from .stage import Operand, Stage
+from .stage import SLACK, Operand, Stage
 
 
 @dataclass(frozen=True, repr=False)
@@ -158,7 +158,7 @@ class Nimbus(Preference):
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         spans, J = self._checked(goals, ranges), np.asarray(objectives, dtype=float)
-        result = np.full(J.shape, np.nan)
+        result, widths = np.full(J.shape, np.nan), spans.spans(goals)
         for place, limit in self._limits(goals).items():
             goal = goals[place]
             asked = self._to.get(goal.name, spans.best[goal.name])
@@ -167,5 +167,5 @@ class Nimbus(Preference):
                 done = goal.sign * (self.current[goal.name] - J[:, place])
                 result[:, place] = np.clip(done / way, 0.0, 1.0) if way > 0 else 1.0
             else:
-                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= 1e-9 * abs(limit), 1.0, 0.0)
+                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= SLACK * widths[place], 1.0, 0.0)
         return result

@@ -12,9 +12,8 @@ import numpy as np
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import counted, numbers, text_table
-from .ordering import ordering
 from .ranges import Ranges, confidence, usable
-from .stage import SLACK, Stage
+from .stage import SLACK, Stage, ordering
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -84,7 +84,7 @@ def nimbus(draw: Any) -> Nimbus:
     now = {one: draw(number) for one in names}
     if draw(st.booleans()):
         return Nimbus(now, improve=names[:1], keep=names[1:2], until={names[2]: draw(number)}, free=names[3:])
-    return Nimbus(now, to={names[0]: draw(number)}, free=names[1:], augmentation=draw(st.floats(0, 1)))
+    return Nimbus(now, to={names[0]: draw(number)}, free=names[1:], augmentation=draw(st.floats(0, 1)), enough=draw(st.booleans()))
 
 
 @st.composite

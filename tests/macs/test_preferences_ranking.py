@@ -29,7 +29,7 @@ from macs.decisions import (
     Value,
     WeightedSum,
 )
-from macs.preferences.ordering import ordering
+from macs.preferences.stage import ordering
 from problems.compiled import Objective
 
 EQUAL = WeightedSum({"time": 1.0, "height": 1.0})
