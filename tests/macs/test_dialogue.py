@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from rest_to_rest import DIAGONAL, MESH, WIDE_E, WIDE_T, cart, crossing, effort, in_time
-from smooth_problems import two_wells
+from smooth_problems import corners, two_wells
 from synthetic_fronts import black_box, empty, flights
 
 from macs import Front, sweep
@@ -314,3 +314,25 @@ def test_the_history_is_drawn() -> None:
     assert heights == pytest.approx(by.degrees(dialogue.goals, dialogue.ranges, J)[:, 1])
     assert list(axes[2].lines[-1].get_ydata()) == pytest.approx(J[:, 1])
     assert len(dialogue.plot(PhysicalProgramming(CLASSES), Figure(layout="constrained"))) == 3
+
+
+def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path: Path) -> None:
+    bare = sweep(cart(), MESH, points=5, verify=None)
+    dialogue, path = Dialogue(bare, cart(), MESH), tmp_path / "choice.json"
+    dialogue.prefer(HOPED)
+    assert dialogue.choose().point.verified and not bare.was_simulated.any()
+    dialogue.save(path)
+    again = Dialogue.load(path)
+    assert again.choose().point.verified and not again.front.was_simulated.any() and len(again.known) == 6
+
+
+def test_more_objectives() -> None:
+    front = sweep(corners(), MESH, points=15)
+    dialogue = Dialogue(front, corners(), MESH)
+    dialogue.choose()
+    now = dialogue.choose().objectives
+    # Those that are not named keep their values, those of `giving` their limits.
+    limit = now["from 1"] + 0.3
+    after = dialogue.improve("from 0", giving={"from 1": limit}).objectives
+    assert after["from 0"] < now["from 0"] - 0.05 and after["from 1"] <= limit + 1e-5 and after["from 2"] <= now["from 2"] + 1e-5
+    assert len(dialogue.plot(figure=Figure(layout="constrained"))) == 4
