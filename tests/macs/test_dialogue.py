@@ -16,6 +16,7 @@ from synthetic_fronts import black_box, empty, flights
 
 from macs import Front, sweep
 from macs.decisions import (
+    Choice,
     Dialogue,
     FuzzyPhysicalProgramming,
     Larger,
@@ -336,3 +337,26 @@ def test_more_objectives() -> None:
     after = dialogue.improve("from 0", giving={"from 1": limit}).objectives
     assert after["from 0"] < now["from 0"] - 0.05 and after["from 1"] <= limit + 1e-5 and after["from 2"] <= now["from 2"] + 1e-5
     assert len(dialogue.plot(figure=Figure(layout="constrained"))) == 4
+
+
+def test_points_that_are_known_are_kept_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    dialogue = begun()
+
+    def third(problem: Any, method: Any, preference: Any, *, ranges: Any, start: Any, **_: Any) -> Choice:
+        return Choice.of(start[[2]][0], preference, ranges)
+
+    monkeypatch.setattr("macs.decisions.dialogue.decide", third)
+    assert dialogue.choose().point.objectives == front()[2].objectives
+    assert dialogue.found == [] and len(dialogue.known) == 9
+
+
+def test_an_improvement_that_is_interrupted_leaves_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    dialogue = begun()
+    now = dialogue.choose()
+    monkeypatch.setattr("macs.decisions.dialogue.decide", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        dialogue.improve("time")
+    assert len(dialogue.history) == 1 and dialogue.choose() is now
