@@ -66,6 +66,8 @@ class Choice:
         By which objectives were normalised.
     message : str
         What is to be known of the choice; usually empty.
+    stopped : str
+        What ended the work before its end: Ctrl-C or a time limit; usually empty.
     """
 
     point: Point
@@ -75,6 +77,7 @@ class Choice:
     preference: Preference
     ranges: Ranges
     message: str = ""
+    stopped: str = ""
 
     @classmethod
     def of(cls, point: Point, preference: Preference, ranges: Ranges, message: str = "") -> Choice:

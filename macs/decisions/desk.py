@@ -162,7 +162,9 @@ class Desk:
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
         values = np.nan_to_num(order.values[order.order[0]], posinf=np.inf).tolist()
-        return Choice(chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message=message)
+        return Choice(
+            chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message, self._reason()
+        )
 
     def _degrees(self, preference: Preference, J: np.ndarray) -> dict[str, float]:
         """Degrees by name at objectives (1, m)."""

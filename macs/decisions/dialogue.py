@@ -230,7 +230,7 @@ class Dialogue:
 
         Each has the present values as its reference point, but for one objective in turn, which is better by a tenth of its range, in the
         next round by two tenths, and so on. What exceeds hard limits that the present choice meets is left out, and so is what is there
-        already.
+        already. Ctrl-C ends it without any.
         """
         check_count("k", k, 1)
         now = self.choose()
@@ -425,6 +425,8 @@ class Dialogue:
 
         if self.problem is not None:
             one = self._chosen(preference)
+            if one.stopped:
+                raise KeyboardInterrupt(one.stopped)
             found = [one.point] if new(np.array([*one.objectives.values()])) else []
             message = one.message
         else:

@@ -321,6 +321,7 @@ def test_the_best_that_is_known_stands_where_solves_fail() -> None:
     assert choice.objectives == best.objectives and "the limit of 1 iterations was reached" in choice.message
     choice = decide(cart(), MESH, preference, ranges=RANGES, start=front(), time_limit=1e-9)
     assert choice.objectives == best.objectives and "time limit" in choice.message
+    assert "time limit" in choice.stopped
     with pytest.raises(TimeoutError, match="time limit"):
         decide(cart(), MESH, preference, time_limit=1e-9)
 

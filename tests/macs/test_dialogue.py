@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -360,3 +361,18 @@ def test_an_improvement_that_is_interrupted_leaves_no_turn(monkeypatch: pytest.M
     with pytest.raises(KeyboardInterrupt):
         dialogue.improve("time")
     assert len(dialogue.history) == 1 and dialogue.choose() is now
+
+
+def test_alternatives_that_are_interrupted_leave_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    dialogue = begun()
+    dialogue.choose()
+    made = []
+
+    def stopped(problem: Any, method: Any, preference: Any, *, ranges: Any, start: Any, **_: Any) -> Choice:
+        made.append(preference)
+        return replace(Choice.of(start[0], preference, ranges), stopped="interrupted")
+
+    monkeypatch.setattr("macs.decisions.dialogue.decide", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        dialogue.alternatives(4)
+    assert len(made) == 1 and dialogue.alternatives_found == ()
