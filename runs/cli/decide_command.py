@@ -347,9 +347,10 @@ def costs(choice: Choice) -> str:
     goals, weights = choice.point.goals, choice.point.weights
     if len(goals) < 2:
         return "There is one objective: it costs no other."
-    if weights is None:
+    found = choice.trade_offs
+    if weights is None or found is None:
         return "What more of one objective costs the others is not known: this point has no weights."
-    rates = choice.trade_offs.rates
+    rates = found.rates
     titles = ["one unit better in", *(label(goal.name, goal.unit) for goal in goals)]
     rows = [
         [label(goal.name, goal.unit), *("" if k == i else _cost(-goal.sign * rates[k, i]) for k in range(len(goals)))]

@@ -67,8 +67,8 @@ def test_with_the_problem_choices_are_optima() -> None:
     assert [turn.choice for turn in dialogue.history] == [first, second, third, fourth, fifth]
     # What was chosen is known from now on: 9 points of the front, and those that are not of it.
     assert len(dialogue.known) == 9 + len(dialogue.found) and len(dialogue.found) >= 3
-    rate = third.trade_offs.rate("effort", "time")
-    assert rate == pytest.approx(-36 / 0.8**4, rel=1e-3)
+    assert third.trade_offs is not None
+    assert third.trade_offs.rate("effort", "time") == pytest.approx(-36 / 0.8**4, rel=1e-3)
 
 
 def test_physical_programming_moves_its_boundaries() -> None:
