@@ -14,6 +14,8 @@ from problems.compiled import Objective
 from ..fronts.point import Point
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
+from ..preferences.ranges import confidence
+from ..preferences.stage import ordering
 from .trade_offs import TradeOffs, trade_offs
 
 
@@ -65,6 +67,8 @@ class Choice:
         By which objectives were normalised.
     message : str
         What is to be known of the choice; usually empty.
+    stopped : str
+        What ended the work before its end: Ctrl-C or a time limit; usually empty.
     """
 
     point: Point
@@ -74,6 +78,15 @@ class Choice:
     preference: Preference
     ranges: Ranges
     message: str = ""
+    stopped: str = ""
+
+    @classmethod
+    def of(cls, point: Point, preference: Preference, ranges: Ranges, message: str = "") -> Choice:
+        """A point that is known, judged by a preference."""
+        J = np.array([[*point.objectives.values()]])
+        found = ordering(preference.stages(point.goals, ranges), J, confidence(point.alone()))
+        degrees = dict(zip(point.objectives, preference.degrees(point.goals, ranges, J)[0].tolist(), strict=True))
+        return cls(point, tuple(np.nan_to_num(found.values[0], posinf=np.inf).tolist()), degrees, (), preference, ranges, message)
 
     @property
     def value(self) -> float:
@@ -107,7 +120,7 @@ class Choice:
             [f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in goals],
             [f"{value:.6g}" for value in chosen.values()],
             *ends,
-            [_shown(self.degrees[goal.name]) for goal in goals],
+            [degree_text(self.degrees[goal.name]) for goal in goals],
         ]
         titles = ["objective", "", "chosen", "best", "worst", "degree"]
         lines = [repr(self.preference), "", text_table([titles], list(zip(*columns, strict=True)), [True, True, *[False] * 4])]
@@ -125,7 +138,7 @@ class Choice:
                 f"{step.value:.6g}",
                 *(f"{step.about[name]:.6g}" if name in step.about else "-" for name in about),
                 *(f"{step.objectives[goal.name]:.6g}" for goal in goals),
-                *(_shown(step.degrees[goal.name]) for goal in goals),
+                *(degree_text(step.degrees[goal.name]) for goal in goals),
             ]
             for step in self.history
         ]
@@ -133,5 +146,6 @@ class Choice:
         return [text_table([titles, units], rows, [True, True, *[False] * (len(titles) - 2)]), *said] if rows else []
 
 
-def _shown(degree: float) -> str:
+def degree_text(degree: float) -> str:
+    """A degree as text; "-" for an objective that does not enter."""
     return "-" if np.isnan(degree) else f"{degree + 0.0:.3f}"
