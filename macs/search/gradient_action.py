@@ -23,8 +23,9 @@ def allowed(evaluations: int, every: int, solves: int) -> int:
     return max(evaluations // every - solves, 0)
 
 
-def single_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
-    """The optimum of each objective alone, for a search that begins with nothing feasible: (m,) or fewer if asked to end early.
+def first_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
+    """The optimum of each objective alone, and a compromise of them, for a search that begins with nothing feasible; fewer if asked to end
+    early, or where none was found.
 
     Each is sought from the candidate that misses least, with as many iterations as it takes.
     """
@@ -34,7 +35,12 @@ def single_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
         return seen.take(known)
     start = seen.Z[known[np.argmin(seen.violation[known])]]
     with evaluator.patiently():
-        return evaluator.descend(np.tile(start, (m, 1)), np.where(np.eye(m) > 0, 0.0, np.inf), np.ones((m, m)))
+        ends = evaluator.descend(np.tile(start, (m, 1)), np.where(np.eye(m) > 0, 0.0, np.inf), np.ones((m, m)))
+        good = np.flatnonzero(ends.violation <= evaluator.tolerance)
+        if m == 1 or len(good) < m:
+            return ends
+        middle = evaluator.descend(ends.Z[:1], ends.F.min(axis=0)[None], ranges(ends.F)[None])
+    return ends.joined(middle)
 
 
 def individual_action(state: SearchState, evaluator: Evaluator, F: float) -> list[Evaluation]:

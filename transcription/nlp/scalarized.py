@@ -59,12 +59,13 @@ COMMON: Options = (
     ("nlp_scaling_method", "none"),
     ("bound_relax_factor", 0.0),
     ("fast_step_computation", "yes"),
-    ("mumps_scaling", 77),
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
 )
-"""Options of all strategies: what is scaled already needs neither scaling by IPOPT nor refinement. The matrices are scaled: near limits
-that leave nothing strictly inside, those that are not make iterations up to thirty times as long."""
+"""Options of all strategies: what is scaled already needs neither scaling nor refinement."""
+SCALED, UNCHANGED = 77, 0
+"""Scaling of matrices by MUMPS. Where limits of objectives leave nothing strictly inside, those that are not scaled make iterations up to
+thirty times as long."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -147,6 +148,11 @@ class _Task:
     top: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+
+    @property
+    def limited(self) -> bool:
+        """Whether objectives have hard limits."""
+        return bool(np.isfinite(self.top).any() or (self.used & (self.slope == 0)).any())
 
     def value(self, F: np.ndarray) -> float:
         """The least a that F (m,) allows."""
@@ -316,7 +322,8 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
+    scaling = ("mumps_scaling", SCALED if task.limited else UNCHANGED)
+    options = (*COMMON, scaling, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
