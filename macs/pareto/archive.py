@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -12,6 +13,11 @@ from .dominance import extremes, nondominated
 
 HUGE = 1e9
 """Largest energy of a pair, in units of the energy of neighbours."""
+
+
+Guide = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Function (front (n, m), points (k, m)) that returns how densely points are wanted on a front where these points are, (k,), positive: how
+many in a length, or an area, relative to elsewhere."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,13 +72,22 @@ def reach(F: np.ndarray, exponent: float | None) -> float:
     return exponent or (2.0 if np.count_nonzero(np.ptp(F, axis=0)) <= 2 else 8.0)
 
 
-def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None) -> np.ndarray:
+def stretches(F: np.ndarray, density: np.ndarray) -> np.ndarray:
+    """Factors (k,) of lengths on the front of F (n, m), where points are wanted with this density (k,): evenly spread points have it, in
+    lengths that are stretched so."""
+    return density ** (1.0 / max(np.count_nonzero(np.ptp(F, axis=0)) - 1, 1))
+
+
+def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None, density: np.ndarray | None = None) -> np.ndarray:
     """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of two rows of F (n, m) scaled by their ranges.
 
     By default the exponent s is 2, as in the paper, if at most two objectives vary, and 8 otherwise: a low exponent has a long reach, which
     drives the points of a surface to its edges; a high one spreads them evenly (Hardin and Saff 2004). An objective that does not vary adds
     nothing to the distances. The unit of distance is that between neighbours when `count` points (default: all) are evenly spread. The
     energy of coinciding points is large but finite, since a larger one would hide the others in rounding errors.
+
+    With a density (n,) that is wanted, the distance of two points is multiplied by the geometric mean of their `stretches`: points of least
+    energy have this density, if they are many (Borodachov, Hardin and Saff 2008).
     """
     span = F.max(axis=0) - F.min(axis=0)
     varying = np.flatnonzero(span > 0.0)
@@ -81,13 +96,18 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
     for k in varying:
         column = F[:, k] / span[k]
         squared += (column[:, None] - column) ** 2
+    if density is not None:
+        factors = stretches(F, density)
+        squared *= factors[:, None] * factors
     unit = (count or len(F)) ** (-2.0 / max(varying.size - 1, 1))
     energies = (unit / np.maximum(squared, unit * HUGE ** (-2.0 / s))) ** (s / 2.0)
     np.fill_diagonal(energies, 0.0)
     return energies
 
 
-def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponent: float | None = None) -> np.ndarray:
+def spread(
+    F: np.ndarray, limit: int, members: np.ndarray | None = None, exponent: float | None = None, guide: Guide | None = None
+) -> np.ndarray:
     """Mask (n,) of `limit` of the points F (n, m), n > limit, with a low energy of all pairs; the best of each objective is always kept.
 
     Free places are filled one at a time by the point that adds least energy. Then chosen points are exchanged for others, the best exchange
@@ -104,12 +124,14 @@ def spread(F: np.ndarray, limit: int, members: np.ndarray | None = None, exponen
         Points to begin with, at most `limit`. Default: the best of each objective only.
     exponent : float, optional
         See `pair_energies`.
+    guide : Guide, optional
+        How densely points are wanted. Default: evenly.
 
     Returns
     -------
     array (n,) of bool
     """
-    energies = pair_energies(F, exponent, limit)
+    energies = pair_energies(F, exponent, limit, None if guide is None else guide(F, F))
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)[:limit]] = True
     inside = fixed.copy() if members is None else fixed | members
@@ -154,6 +176,7 @@ def insert(
     limit: int,
     tolerance: float,
     exponent: float | None = None,
+    guide: Guide | None = None,
 ) -> Archive:
     """The archive after points have been offered to it.
 
@@ -168,6 +191,8 @@ def insert(
         A point with a violation of at most this is feasible.
     exponent : float, optional
         See `pair_energies`.
+    guide : Guide, optional
+        See `spread`.
 
     Returns
     -------
@@ -180,7 +205,7 @@ def insert(
     every = archive.joined(Archive(Z[offered], F[offered], violation[offered]))
     keep = np.flatnonzero(nondominated(every.F))
     if len(keep) > limit:
-        keep = keep[spread(every.F[keep], limit, keep < len(archive), exponent)]
+        keep = keep[spread(every.F[keep], limit, keep < len(archive), exponent, guide)]
     return every.take(keep)
 
 

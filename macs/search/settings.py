@@ -11,6 +11,8 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
+from ..preferences.preference import Preference
+
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
 LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1}
@@ -126,6 +128,12 @@ class Settings:
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
         with more: on a surface, a low power drives the points to the edges.
 
+    prefer : Preference, optional
+        What you want of the objectives, see `macs.decisions`: the search goes where it is good. The archive is dense in the region of
+        interest, where the value of the preference is within a twentieth of its spread along the front from the best, and sparse elsewhere,
+        with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does not reach the
+        values that the preference names, the search is even.
+
     Raises
     ------
     ValueError
@@ -161,6 +169,7 @@ class Settings:
     breeding: float = 0.15
     sample: int | None = None
     exponent: float | None = None
+    prefer: Preference | None = None
 
     def __post_init__(self) -> None:
         for name, least in LEAST.items():
@@ -177,6 +186,8 @@ class Settings:
         check_choice("MACS: reseed", self.reseed, ("all", "spread"))
         check_choice("MACS: mesh", self.mesh, MESHES)
         self._check_polish()
+        if self.prefer is not None and not isinstance(self.prefer, Preference):
+            raise ValueError(f"MACS: prefer must be a preference of macs.decisions, such as ReferencePoint, not {self.prefer!r}")
 
     def _check_polish(self) -> None:
         if self.polish_on is None:

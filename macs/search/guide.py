@@ -1,0 +1,74 @@
+"""Guide of a search by a preference: how densely points are wanted along the front."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Guide
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges
+from ..preferences.region import PART, Region
+
+OUTSIDE = 0.02
+"""Density of points far from the region of interest, relative to that inside."""
+FADING = 0.25
+"""Around the region, the density falls by a factor e where the value is worse by this part of the width of the region."""
+WIDEST = 1e30
+"""Ranges that contain whatever a preference may name."""
+
+
+@dataclass(frozen=True)
+class PreferenceGuide:
+    """The guide that a preference is; see `pareto.archive.Guide`.
+
+    Points are wanted in the region of interest, see `Region`, and sparsely elsewhere. The ranges of the objectives are those of the front
+    at hand. As long as they do not contain what the preference names, such as a target, points are wanted evenly.
+    """
+
+    preference: Preference
+    goals: tuple[Objective, ...]
+
+    def __call__(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Densities (k,) at points (k, m) on a front (n, m), both minimised; even where the preference says nothing yet."""
+        signs = np.array([goal.sign for goal in self.goals])
+        try:
+            region = self._region(front * signs)
+        except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
+            return np.ones(len(points))
+        beyond = np.maximum(region.away(points * signs) / PART - 1.0, 0.0)
+        return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
+
+    def objection(self, front: np.ndarray) -> str:
+        """Why the preference says nothing on a front (n, m), minimised; empty if it does."""
+        try:
+            self._region(front * np.array([goal.sign for goal in self.goals]))
+        except ValueError as error:
+            return str(error)
+        return ""
+
+    def _region(self, J: np.ndarray) -> Region:
+        signs = np.array([goal.sign for goal in self.goals])
+        best, worst = (J * signs).min(axis=0) * signs + 0.0, (J * signs).max(axis=0) * signs + 0.0
+        names = [goal.name for goal in self.goals]
+        ranges = Ranges(dict(zip(names, best.tolist(), strict=True)), dict(zip(names, worst.tolist(), strict=True)))
+        return Region.of(self.preference, self.goals, ranges, J)
+
+
+def guide_of(preference: Preference | None, evaluator: Evaluator) -> Guide | None:
+    """The guide of a search; None without a preference."""
+    return None if preference is None else PreferenceGuide(preference, evaluator.goals)
+
+
+def check_preference(preference: Preference, goals: Sequence[Objective]) -> None:
+    """Raise ValueError, of one line, for a preference that is not one of these objectives: another problem's, or a wrong sense."""
+    ends = {goal.name: goal.sign * WIDEST for goal in goals}
+    try:
+        preference.stages(goals, Ranges({name: -end for name, end in ends.items()}, ends))
+    except ValueError as error:
+        raise ValueError(f"MACS: prefer: {error}") from error
