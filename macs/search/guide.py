@@ -15,9 +15,9 @@ from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges
 from ..preferences.region import PART, Region
 
-OUTSIDE = 0.02
+OUTSIDE = 0.005
 """Density of points far from the region of interest, relative to that inside."""
-FADING = 0.25
+FADING = 0.1
 """Around the region, the density falls by a factor e where the value is worse by this part of the width of the region."""
 WIDEST = 1e30
 """Ranges that contain whatever a preference may name."""
