@@ -113,7 +113,7 @@ def _descend(archive: Archive, solves: CountedSolves, exponent: float | None, gu
 
 def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
     """The ends of the front, and results of solves to `limit` places between them: always the place farthest from all known points, in
-    lengths that are stretched where a guide wants more."""
+    distances multiplied by the factors of a guide."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
     pool = _front(ends.joined(archive), span)
@@ -127,7 +127,7 @@ def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
         if guide is not None:
             beneath = np.linalg.norm(places[:, None] - across((pool.F - ideal) / between), axis=2).argmin(axis=1)
-            apart *= archives.stretches(pool.F, guide(pool.F, pool.F))[beneath]
+            apart *= guide.factors(pool.F, pool.F)[beneath]
         place = places[np.argmax(apart)]
         reference = ideal + between * place
         start = np.argmin(((pool.F - reference) / between).max(axis=1))
@@ -184,9 +184,9 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
     neighbours = [nearest(point, archive.F, span)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
     pairs = sorted({(min(i, j), max(i, j)) for i in range(n) for j in neighbours[i]})
     apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
-    stretched = None if guide is None else archives.stretches(archive.F, guide(archive.F, archive.F))
-    if stretched is not None:
-        apart *= [np.sqrt(stretched[i] * stretched[j]) for i, j in pairs]
+    factors = None if guide is None else guide.factors(archive.F, archive.F)
+    if factors is not None:
+        apart *= [np.sqrt(factors[i] * factors[j]) for i, j in pairs]
     wide = np.count_nonzero(apart > WIDE * np.median(apart))
     gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, min(limit - n, n))]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
@@ -196,8 +196,8 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
         others = np.delete(F, i, axis=0)
         lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])
         squared = ((lines[:, None] - others) ** 2).sum(axis=2)
-        if guide is not None and stretched is not None:
-            squared *= archives.stretches(archive.F, guide(archive.F, lines * span))[:, None] * np.delete(stretched, i)
+        if guide is not None and factors is not None:
+            squared *= guide.factors(archive.F, lines * span)[:, None] * np.delete(factors, i)
         energy = (1.0 / np.maximum(squared, 1e-12) ** power).sum(axis=1)
         best = int(np.argmin(energy))
         if energy[best] < GAIN * energy[0]:

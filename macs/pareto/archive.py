@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -13,11 +12,18 @@ from .dominance import extremes, nondominated
 
 HUGE = 1e9
 """Largest energy of a pair, in units of the energy of neighbours."""
+ANCHORED = 0.5
+"""Part of the places that points may have which a guide wants kept."""
 
 
-Guide = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Function (front (n, m), points (k, m)) that returns how densely points are wanted on a front where these points are, (k,), positive: how
-many in a length, or an area, relative to elsewhere."""
+class Guide(Protocol):
+    """How densely points are wanted along a front. Objectives are minimised; only points of the front at hand are known."""
+
+    def factors(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Positive factors (k,) of distances at points (k, m) on a front (n, m): distances that are multiplied by them are to be even."""
+
+    def anchors(self, front: np.ndarray) -> np.ndarray:
+        """Rows of the front (n, m) that are to be kept beside the best of each objective, most important first."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,13 +78,7 @@ def reach(F: np.ndarray, exponent: float | None) -> float:
     return exponent or (2.0 if np.count_nonzero(np.ptp(F, axis=0)) <= 2 else 8.0)
 
 
-def stretches(F: np.ndarray, density: np.ndarray) -> np.ndarray:
-    """Factors (k,) of lengths on the front of F (n, m), where points are wanted with this density (k,): evenly spread points have it, in
-    lengths that are stretched so."""
-    return density ** (1.0 / max(np.count_nonzero(np.ptp(F, axis=0)) - 1, 1))
-
-
-def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None, density: np.ndarray | None = None) -> np.ndarray:
+def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | None = None, factors: np.ndarray | None = None) -> np.ndarray:
     """Energies 1/d^s of all pairs, (n, n), zero on the diagonal; d is the distance of two rows of F (n, m) scaled by their ranges.
 
     By default the exponent s is 2, as in the paper, if at most two objectives vary, and 8 otherwise: a low exponent has a long reach, which
@@ -86,8 +86,8 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
     nothing to the distances. The unit of distance is that between neighbours when `count` points (default: all) are evenly spread. The
     energy of coinciding points is large but finite, since a larger one would hide the others in rounding errors.
 
-    With a density (n,) that is wanted, the distance of two points is multiplied by the geometric mean of their `stretches`: points of least
-    energy have this density, if they are many (Borodachov, Hardin and Saff 2008).
+    With factors (n,) of a `Guide`, the distance of two points is multiplied by the geometric mean of theirs. Where points are many, those
+    of least energy are then as near to each other as the factors say (Borodachov, Hardin and Saff 2008).
     """
     span = F.max(axis=0) - F.min(axis=0)
     varying = np.flatnonzero(span > 0.0)
@@ -96,8 +96,7 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
     for k in varying:
         column = F[:, k] / span[k]
         squared += (column[:, None] - column) ** 2
-    if density is not None:
-        factors = stretches(F, density)
+    if factors is not None:
         squared *= factors[:, None] * factors
     unit = (count or len(F)) ** (-2.0 / max(varying.size - 1, 1))
     energies = (unit / np.maximum(squared, unit * HUGE ** (-2.0 / s))) ** (s / 2.0)
@@ -125,15 +124,18 @@ def spread(
     exponent : float, optional
         See `pair_energies`.
     guide : Guide, optional
-        How densely points are wanted. Default: evenly.
+        How densely points are wanted, and which are kept. Default: evenly.
 
     Returns
     -------
     array (n,) of bool
     """
-    energies = pair_energies(F, exponent, limit, None if guide is None else guide(F, F))
+    energies = pair_energies(F, exponent, limit, None if guide is None else guide.factors(F, F))
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)[:limit]] = True
+    for row in [] if guide is None else guide.anchors(F):
+        if np.count_nonzero(fixed) < ANCHORED * limit:
+            fixed[row] = True
     inside = fixed.copy() if members is None else fixed | members
     energy = energies[:, inside].sum(axis=1)
     while np.count_nonzero(inside) > limit:  # a best point that was added replaces another

@@ -41,15 +41,15 @@ class Region:
     spread: float
 
     @classmethod
-    def of(cls, preference: Preference, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> Self:
-        """The region on a front with objectives (n, m), all finite, in the user's units and senses.
+    def of(cls, preference: Preference, goals: Sequence[Objective], objectives: np.ndarray) -> Self:
+        """The region on a front with objectives (n, m), all finite, in the user's units and senses; they are normalised by their ranges.
 
         Raises
         ------
         ValueError
             Where `Preference.stages` raises one.
         """
-        stage = preference.stages(goals, ranges)[0]
+        stage = preference.stages(goals, Ranges.over(goals, objectives))[0]
         values = stage.numbers(objectives)
         met = np.isfinite(values)
         values = values[met] if met.any() else stage.excess(objectives)

@@ -15,7 +15,7 @@ from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
 from ..gradients.multistart import GradientSolves
 from ..gradients.tasks import Along
-from ..pareto.archive import Guide, spread, stretches
+from ..pareto.archive import Guide, spread
 from ..pareto.dominance import extremes
 from .mesh_loop import Programs
 
@@ -99,7 +99,7 @@ def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide 
     good = good[np.argsort(good[:, 0], kind="stable")]
     middles, widths = 0.5 * (good[1:] + good[:-1]), np.linalg.norm(np.diff(good, axis=0) / scales, axis=1)
     if guide is not None:
-        widths *= stretches(good, guide(good, middles))
+        widths *= guide.factors(good, middles)
     new = [k for k in np.argsort(-widths, kind="stable").tolist() if not (middles[k] == tried).all(axis=1).any()]
     return middles[new[0]] if new else None
 

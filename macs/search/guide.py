@@ -16,9 +16,9 @@ from ..preferences.ranges import Ranges
 from ..preferences.region import PART, Region
 
 OUTSIDE = 0.005
-"""Density of points far from the region of interest, relative to that inside."""
+"""Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""
 FADING = 0.1
-"""Around the region, the density falls by a factor e where the value is worse by this part of the width of the region."""
+"""Around the region, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
 WIDEST = 1e30
 """Ranges that contain whatever a preference may name."""
 
@@ -28,36 +28,44 @@ class PreferenceGuide:
     """The guide that a preference is; see `pareto.archive.Guide`.
 
     Points are wanted in the region of interest, see `Region`, and sparsely elsewhere. The ranges of the objectives are those of the front
-    at hand. As long as they do not contain what the preference names, such as a target, points are wanted evenly.
+    at hand; their ends, and the best point, are kept. As long as they do not contain what the preference names, such as a target, points are wanted evenly.
     """
 
     preference: Preference
     goals: tuple[Objective, ...]
 
-    def __call__(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Densities (k,) at points (k, m) on a front (n, m), both minimised; even where the preference says nothing yet."""
-        signs = np.array([goal.sign for goal in self.goals])
+    def factors(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Factors (k,) at points (k, m) on a front (n, m), both minimised; even where the preference says nothing yet."""
         try:
-            region = self._region(front * signs)
+            region = self._region(front)
         except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
             return np.ones(len(points))
-        beyond = np.maximum(region.away(points * signs) / PART - 1.0, 0.0)
+        beyond = np.maximum(region.away(points * self._signs) / PART - 1.0, 0.0)
         return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
+
+    def anchors(self, front: np.ndarray) -> np.ndarray:
+        """The row of the best value, then those of the worst values of each objective: without these the ranges would be others."""
+        worst = front.argmax(axis=0)
+        try:
+            away = self._region(front).away(front * self._signs)
+        except ValueError:  # as above
+            return worst
+        return np.append(away.argmin(), worst)
 
     def objection(self, front: np.ndarray) -> str:
         """Why the preference says nothing on a front (n, m), minimised; empty if it does."""
         try:
-            self._region(front * np.array([goal.sign for goal in self.goals]))
+            self._region(front)
         except ValueError as error:
             return str(error)
         return ""
 
-    def _region(self, J: np.ndarray) -> Region:
-        signs = np.array([goal.sign for goal in self.goals])
-        best, worst = (J * signs).min(axis=0) * signs + 0.0, (J * signs).max(axis=0) * signs + 0.0
-        names = [goal.name for goal in self.goals]
-        ranges = Ranges(dict(zip(names, best.tolist(), strict=True)), dict(zip(names, worst.tolist(), strict=True)))
-        return Region.of(self.preference, self.goals, ranges, J)
+    def _region(self, front: np.ndarray) -> Region:
+        return Region.of(self.preference, self.goals, front * self._signs)
+
+    @property
+    def _signs(self) -> np.ndarray:
+        return np.array([goal.sign for goal in self.goals])
 
 
 def guide_of(preference: Preference | None, evaluator: Evaluator) -> Guide | None:

@@ -177,10 +177,11 @@ def shares(state: SearchState, guide: Guide | None) -> np.ndarray | None:
 
     A direction leads to the point of the archive that is best in it.
     """
-    archive = state.archive
-    if guide is None or len(archive) < state.directions.shape[1]:
+    archive, m = state.archive, state.directions.shape[1]
+    if guide is None or len(archive) < m:
         return None
-    return guide(archive.F, archive.F)[directions.best_points(archive.F, state.directions, state.ideal, state.nadir)]
+    wanted = guide.factors(archive.F, archive.F) ** max(m - 1, 1)  # so many in an area, if m = 3
+    return wanted[directions.best_points(archive.F, state.directions, state.ideal, state.nadir)]
 
 
 def assign(state: SearchState, settings: Settings, guide: Guide | None = None) -> None:
