@@ -28,7 +28,8 @@ class PreferenceGuide:
     """The guide that a preference is; see `pareto.archive.Guide`.
 
     Points are wanted in the region of interest, see `Region`, and sparsely elsewhere. The ranges of the objectives are those of the front
-    at hand; their ends, and the best point, are kept. As long as they do not contain what the preference names, such as a target, points are wanted evenly.
+    at hand; their ends, and the best point, are kept. As long as they do not contain what the preference names, such as a target, points
+    are wanted evenly.
     """
 
     preference: Preference

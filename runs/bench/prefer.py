@@ -16,7 +16,6 @@ from macs.pareto.directions import simplex_lattice
 from macs.preferences import Preference, ReferencePoint, WeightedSum
 from problems import load
 from problems.cases import goddard
-from problems.cases.skip_entry import skip
 
 from ..measures.interest import Interest
 from ..measures.references import union
@@ -162,9 +161,10 @@ def report(rows: Sequence[Row]) -> str:
     ratios = {row.case: row for row in rows if row.who == GUIDED}
     lines = [
         "PREFERENCES: MACS guided by a preference, and even, at equal evaluations. Missing: what a front does not dominate of the",
-        "hypervolume that the region of interest of a dense front does, up to the nadir of that region. The region is where the value of",
-        "the preference is within a twentieth of its spread along the front from the best. Worse: the best value of the front, from the",
-        "best of the dense front, in that spread. Part: of the dense front's points that are in the region. Medians and quartiles over seeds.",
+        "hypervolume that the region of interest of a dense front does, up to the nadir of that region. The region is where the value",
+        "of the preference is within a twentieth of its spread along the front from the best. Worse: the best value of the front, from",
+        "that of the dense front, in that spread. Part: of the dense front's points that are in the region. Median and quartiles over",
+        "seeds.",
         "",
         table(rows, COLUMNS),
         "",

@@ -54,7 +54,7 @@ def test_units_and_senses_do_not_matter():
 def test_beyond_hard_limits_nothing_is_of_interest():
     wanted = PhysicalProgramming({"a": Smaller(0.1, 0.2, 0.3, 0.4, 0.5), "b": Smaller(0.5, 0.6, 0.7, 0.8, 0.9)})
     interest = Interest.of(wanted, GOALS, line())
-    assert 0.1 <= interest.points[:, 0].min() and interest.points[:, 0].max() <= 0.5
+    assert interest.points[:, 0].min() >= 0.1 and interest.points[:, 0].max() <= 0.5
     never = PhysicalProgramming({"a": Smaller(0.1, 0.15, 0.2, 0.25, 0.3), "b": Smaller(0.1, 0.15, 0.2, 0.25, 0.3)})
     middle = Interest.of(never, GOALS, line())
     assert np.abs(middle.points - 0.5).max() < 0.05, "where no limits are met, what exceeds them least"
