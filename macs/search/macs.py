@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -34,6 +35,8 @@ from .settings import Settings
 from .social import assign, social_actions
 from .state import SearchState, agents_at, remember
 from .trials import Trials
+
+log = logging.getLogger(__name__)
 
 
 class MACS(Settings, Solver):
@@ -117,6 +120,8 @@ class MACS(Settings, Solver):
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
         """Polish the archive by gradients, if the problem has them. If asked to end early, the polish continues at the next call."""
+        if objection := self._objection(state, evaluator):
+            log.warning("the preference did not guide the search: %s", objection)
         if not (self.refines and evaluator.has_gradients):
             return
         if state.polishing is None:
@@ -174,10 +179,14 @@ class MACS(Settings, Solver):
 
     def extra_stats(self, state: SearchState, evaluator: Evaluator) -> dict[str, Any]:
         """With a preference that the archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
-        if self.prefer is None or not len(state.archive):
-            return {}
-        objection = PreferenceGuide(self.prefer, evaluator.goals).objection(state.archive.F)
+        objection = self._objection(state, evaluator)
         return {"prefer": f"not followed: {objection}"} if objection else {}
+
+    def _objection(self, state: SearchState, evaluator: Evaluator) -> str:
+        """Why the preference says nothing on the archive, if that is so."""
+        if self.prefer is None or not len(state.archive):
+            return ""
+        return PreferenceGuide(self.prefer, evaluator.goals).objection(state.archive.F)
 
     def about(self) -> dict[str, Any]:
         """See `SearchMethod.about`; a preference is there only if there is one."""

@@ -120,7 +120,7 @@ CASES = (
     Guided("zdt1, weighted", partial(black_box, zdt1), partial(curve, 0.5), WeightedSum({"f1": 1.0, "f2": 1.0}), 3000, archive=20),
     Guided("zdt2", partial(black_box, zdt2), partial(curve, 2.0), ReferencePoint({"f1": 0.5, "f2": 0.2}), 3000),
     Guided("dtlz2", partial(black_box, dtlz2), sphere, ReferencePoint({"f1": 0.2, "f2": 0.4, "f3": 0.5}), 5000, archive=20),
-    Guided("goddard", partial(flights, "goddard"), goddard.reference, SPEED, 600, True),
+    Guided("goddard", partial(flights, "goddard"), goddard.reference, SPEED, 1000, True),
     Guided("goddard, no derivatives", partial(flights, "goddard"), goddard.reference, SPEED, 3000, refine=False),
 )
 

@@ -161,9 +161,9 @@ def test_a_checkpoint_goes_on_to_the_same_bits_and_belongs_to_its_preference(tmp
     whole = minimize(MIDDLE, 600)
     part = minimize(MIDDLE, 600, checkpoint=file, callback=lambda progress: next(left, None) is None)
     assert part.stats["stopped"] == "callback"
-    with pytest.raises(ValueError, match="belongs to another run: solver.settings.prefer"):
+    with pytest.raises(ValueError, match=r"belongs to another run: solver\.settings\.prefer"):
         minimize(None, 600, checkpoint=file)
-    with pytest.raises(ValueError, match="belongs to another run: solver.settings.prefer"):
+    with pytest.raises(ValueError, match=r"belongs to another run: solver\.settings\.prefer"):
         minimize(ReferencePoint({"f1": 0.5, "f2": 0.0}), 600, checkpoint=file)
     again = minimize(MIDDLE, 600, checkpoint=file)
     assert again.F.tobytes() == whole.F.tobytes() and again.decision.tobytes() == whole.decision.tobytes()
@@ -207,7 +207,7 @@ def test_a_preference_of_another_problem_is_refused_before_any_work(prefer, word
 
 def test_a_preference_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch):
     monkeypatch.setattr("macs.solvers.solver.search_transcription", never)
-    with pytest.raises(ValueError, match="prefer: .*'f1'.*flight time, horizontal speed"):
+    with pytest.raises(ValueError, match=r"prefer: .*'f1'.*flight time, horizontal speed"):
         MACS(prefer=MIDDLE).solve(load("goddard"), evaluations=20)
 
 
