@@ -18,14 +18,20 @@ from ..preferences import (
     Stage,
     Value,
     WeightedSum,
+    from_dict,
+    to_dict,
 )
 from .choice import Choice, Step
 from .decide import decide
+from .dialogue import Dialogue, Turn
+from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
+from .trade_offs import TradeOffs, trade_offs
 
 __all__ = [
     "Around",
     "Choice",
+    "Dialogue",
     "FuzzyGoal",
     "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",
@@ -41,8 +47,15 @@ __all__ = [
     "Smaller",
     "Stage",
     "Step",
+    "TradeOffs",
+    "Turn",
     "Value",
     "WeightedSum",
     "decide",
+    "from_dict",
+    "front_rates",
+    "plot_rates",
     "satisfy",
+    "to_dict",
+    "trade_offs",
 ]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import Objective, Variable
+from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
@@ -27,6 +27,15 @@ class Point:
     def alone(self) -> Any:
         """`Points` of this point alone."""
         return self._points.take([self.index])
+
+    def compiled(self) -> CompiledProblem:
+        """The problem of the point, see `Points.compiled`."""
+        return self._points.compiled()
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """Ranges (m,) of the objectives over all points of its front."""
+        return np.ptp(self._points.F, axis=0)
 
     @property
     def goals(self) -> tuple[Objective, ...]:
@@ -178,7 +187,7 @@ class Point:
         ValueError
             For a black box, a point without a trajectory, and a saved front whose problem cannot be found.
         """
-        problem = self._points.compiled()
+        problem = self.compiled()
         if self.trajectory is None:
             raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.peaks import refuse_peaks
-from transcription.base import NLP, kept_nlp
+from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
 from transcription.meshes.adaptation import next_method, redistributed, where_controls_gain
@@ -66,9 +66,9 @@ class Programs:
 
     def __init__(self, problem: CompiledProblem, kept: int = KEPT) -> None:
         self.problem, self.built, self._most = problem, 0, kept
-        self._kept: dict[Meshed, NLP] = {}
+        self._kept: dict[Transcription, NLP] = {}
 
-    def __call__(self, method: Meshed) -> NLP:
+    def __call__(self, method: Transcription) -> NLP:
         """The NLP of the problem on these meshes."""
         nlp = self._kept.pop(method, None) or kept_nlp(self.problem, method)
         if nlp is None:

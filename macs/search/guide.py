@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from problems.compiled import Objective
 
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Guide
+from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges
 from ..preferences.region import PART, Region
@@ -72,6 +74,11 @@ class PreferenceGuide:
 def guide_of(preference: Preference | None, evaluator: Evaluator) -> Guide | None:
     """The guide of a search; None without a preference."""
     return None if preference is None else PreferenceGuide(preference, evaluator.goals)
+
+
+def written(preference: Preference) -> Any:
+    """A preference as plain data, for files; that of a class of the user's own as its text."""
+    return to_dict(preference) if type(preference) in METHODS.values() else repr(preference)
 
 
 def check_preference(preference: Preference, goals: Sequence[Objective]) -> None:

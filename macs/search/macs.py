@@ -29,7 +29,7 @@ from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
-from .guide import PreferenceGuide, check_preference, guide_of
+from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .settings import Settings
 from .social import assign, social_actions
@@ -192,7 +192,7 @@ class MACS(Settings, Solver):
         """See `SearchMethod.about`; a preference is there only if there is one."""
         settings: dict[str, Any] = asdict(replace(self, prefer=None))
         del settings["prefer"]
-        given = {} if self.prefer is None else {"prefer": repr(self.prefer)}
+        given = {} if self.prefer is None else {"prefer": written(self.prefer)}
         return {"name": type(self).__name__, "settings": settings | given}
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Self
@@ -11,6 +12,7 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
+from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
 SHARE = 8
@@ -128,11 +130,11 @@ class Settings:
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
         with more: on a surface, a low power drives the points to the edges.
 
-    prefer : Preference, optional
-        What you want of the objectives, see `macs.decisions`: the search goes where it is good. The archive is dense in the region of
-        interest, where the value of the preference is within a twentieth of its spread along the front from the best, and sparse elsewhere,
-        with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does not reach the
-        values that the preference names, the search is even.
+    prefer : Preference or dict, optional
+        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
+        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
+        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
+        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
 
     Raises
     ------
@@ -186,8 +188,7 @@ class Settings:
         check_choice("MACS: reseed", self.reseed, ("all", "spread"))
         check_choice("MACS: mesh", self.mesh, MESHES)
         self._check_polish()
-        if self.prefer is not None and not isinstance(self.prefer, Preference):
-            raise ValueError(f"MACS: prefer must be a preference of macs.decisions, such as ReferencePoint, not {self.prefer!r}")
+        self._read_preference()
 
     def _check_polish(self) -> None:
         if self.polish_on is None:
@@ -202,6 +203,15 @@ class Settings:
             raise ValueError("MACS: polish_on makes no sense with refine=False, which uses no derivatives")
         if self.mesh == "adaptive":
             raise ValueError("MACS: polish_on makes no sense with mesh='adaptive': its points are on the mesh that it names")
+
+    def _read_preference(self) -> None:
+        if isinstance(self.prefer, Mapping):
+            try:
+                object.__setattr__(self, "prefer", from_dict(self.prefer))
+            except ValueError as error:
+                raise ValueError(f"MACS: prefer: {error}") from error
+        if self.prefer is not None and not isinstance(self.prefer, Preference):
+            raise ValueError(f"MACS: prefer must be a preference of macs.decisions, such as ReferencePoint, not {self.prefer!r}")
 
     @classmethod
     def paper(cls, **overrides: Any) -> Self:

@@ -182,6 +182,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
         metavar="T",
         help="polish the front on this transcription by gradients in the end, so that its points are feasible when simulated",
     )
+    solve.add_argument("--prefer", metavar="FILE.json", help="a preference that guides the search: {method: ..., settings: {...}}")
     solve.add_argument(
         "--verify", metavar="T", type=_verify, help="what simulated points may miss, in scales, or none: no simulation (default: 0.001)"
     )

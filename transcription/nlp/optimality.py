@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
@@ -81,32 +82,35 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
-    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others.
+class Linearised:
+    """First derivatives at a vector of an NLP, in units: variables in `units`, objectives and rows in their scales.
 
     Attributes
     ----------
     nlp : NLP
+    z : array (n,)
     scales : array (m,)
         Of the objectives; infinite for those left out.
+    of_objectives, of_equations, of_inequalities : arrays (used, n), (equations, n), (k, n)
+        Gradients of the objectives that are not left out, of the equations, and of the inequalities c >= 0 that may have a multiplier.
     near : list of arrays
-        Masks of the bounds and limits that may have a multiplier: lower and upper bounds (n,), lower and upper limits of rows (r,).
-    reduced, adjoints : arrays (d, k), (equations, k)
-        Reduced gradients of the objectives and of these inequalities, and the multipliers of the equations that belong to them.
-    slack : array
+        Masks of these inequalities: lower and upper bounds (n,), lower and upper limits of rows (r,).
+    slack : array (k,)
         Of the inequalities.
     """
 
     nlp: NLP
+    z: np.ndarray
     scales: np.ndarray
+    of_objectives: np.ndarray
+    of_equations: csr_matrix
+    of_inequalities: np.ndarray
     near: list[np.ndarray]
-    reduced: np.ndarray
-    adjoints: np.ndarray
     slack: np.ndarray
 
     @classmethod
-    def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Conditions | None:
-        """Those at z, see `optimality`; None where they cannot be formed."""
+    def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Linearised | None:
+        """Those at z, see `optimality`; None where a derivative is no number."""
         z = np.asarray(z, dtype=float)
         found = gradients(nlp)(z)
         dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
@@ -114,50 +118,83 @@ class Conditions:
             return None
         natural = nlp_scales(nlp)
         scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
-        unit = _units(nlp)
+        unit = units(nlp)
         dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
         dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
         near, sides, slack = _inequalities(nlp, z, g, dg)
+        return cls(nlp, z, scales, dF, dg[nlp.g_lower == nlp.g_upper], sides, near, slack)
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others.
+
+    Attributes
+    ----------
+    linear : Linearised
+    reduced, adjoints : arrays (d, k), (equations, k)
+        Reduced gradients of the objectives and of the inequalities, and the multipliers of the equations that belong to them.
+    """
+
+    linear: Linearised
+    reduced: np.ndarray
+    adjoints: np.ndarray
+
+    @classmethod
+    def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Conditions | None:
+        """Those at z, see `optimality`; None where they cannot be formed."""
+        linear = Linearised.of(nlp, z, F_scales)
+        if linear is None:
+            return None
         try:
-            reduced, adjoints = _reduced(nlp, dg[nlp.g_lower == nlp.g_upper], np.vstack([dF, -sides]))
+            return cls(linear, *_reduced(nlp, linear.of_equations, np.vstack([linear.of_objectives, -linear.of_inequalities])))
         except RuntimeError:
             return None
-        return cls(nlp, scales, near, reduced, adjoints, slack)
 
     @cached_property
     def residual(self) -> float:
         """See `optimality`."""
         try:
-            return _least(self.reduced, self.slack)[0]
+            return _least(self.reduced, self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
             return float("inf")
 
-    def multipliers(self) -> Multipliers | None:
-        """Those that leave the least residual; None where none are found.
+    @cached_property
+    def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Multipliers (used,) of the objectives and (k,) of the inequalities, in units, that leave the least residual; None where none are
+        found.
 
         Where limits depend on each other, as do those of a state along an arc on one, or of a mass and of the thrust while it is off, they
         are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others.
         """
         try:
-            x = _least(self.reduced, self.slack, SMALL * np.concatenate(self._others()))[1]
+            x = _least(self.reduced, self.linear.slack, SMALL * np.concatenate(self._others()))[1]
         except (RuntimeError, np.linalg.LinAlgError):
             return None
-        nlp, used = self.nlp, np.isfinite(self.scales)
+        of_objectives, of_inequalities = np.split(x, [len(self.linear.of_objectives)])
+        return of_objectives, of_inequalities
+
+    def multipliers(self) -> Multipliers | None:
+        """Those that leave the least residual, see `scaled`; None where none are found."""
+        if self.scaled is None:
+            return None
+        nlp, near, used = self.linear.nlp, self.linear.near, np.isfinite(self.linear.scales)
         of_objectives, of_rows, of_bounds = np.zeros(len(used)), np.zeros(len(nlp.g_scale)), np.zeros(len(nlp.variables))
-        of_objectives[used], rest = np.split(x, [np.count_nonzero(used)])
-        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ x
-        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in self.near])[:-1])
-        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), self.near, (-1, 1, -1, 1), each, strict=True):
+        of_objectives[used], rest = self.scaled
+        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ np.concatenate(self.scaled)
+        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in near])[:-1])
+        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), near, (-1, 1, -1, 1), each, strict=True):
             target[which] += side * values
-        return Multipliers(of_objectives / self.scales, of_rows / nlp.g_scale, of_bounds / _units(nlp))
+        return Multipliers(of_objectives / self.linear.scales, of_rows / nlp.g_scale, of_bounds / units(nlp))
 
     def _others(self) -> list[np.ndarray]:
         """Masks of the inequalities, group by group, that are no bounds of free variables."""
-        kept = np.setdiff1d(np.arange(len(self.nlp.variables)), self.nlp.free)
-        return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.near)]
+        nlp = self.linear.nlp
+        kept = np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)
+        return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.linear.near)]
 
 
-def _units(nlp: NLP) -> np.ndarray:
+def units(nlp: NLP) -> np.ndarray:
     """The unit of each variable: the span of its bounds; the scale of a peak, which has none."""
     return np.where(np.isfinite(nlp.span), nlp.span, nlp.scale)
 
@@ -167,8 +204,8 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
     (k, n) and slacks (k,) of these inequalities c >= 0, in that order."""
     bounded, one_way = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper
     slacks = (
-        (z - nlp.lower) / _units(nlp),
-        (nlp.upper - z) / _units(nlp),
+        (z - nlp.lower) / units(nlp),
+        (nlp.upper - z) / units(nlp),
         (g - nlp.g_lower) / nlp.g_scale,
         (nlp.g_upper - g) / nlp.g_scale,
     )
@@ -192,12 +229,31 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
         by_states = csc_matrix(equations[:, ~measured].T)
         adjoints = _solved(splu(by_states), by_states, gradients[:, ~measured].T)
         return gradients[:, measured].T - equations[:, measured].T @ adjoints, adjoints
-    weights = np.where(measured, 1.0, DEPENDENT)
-    e, every = equations.tocoo(), np.arange(n + r)
-    i, j = np.r_[e.col, e.row + n, every], np.r_[e.row + n, e.col, every]
-    exact, regular = (csc_matrix((np.r_[e.data, e.data, weights, np.full(r, -last)], (i, j))) for last in (0.0, REGULAR))
+    s, adjoints = steepest(diags(np.where(measured, 1.0, DEPENDENT)), equations, gradients)
+    return s[measured], adjoints
+
+
+def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The s (n, k) that minimise s'metric s/2 - gradient's where equations s = 0, for k gradients (k, n); and the multipliers (r, k) of
+    the equations.
+
+    Parameters
+    ----------
+    metric : sparse array (n, n)
+        Positive on what satisfies the equations.
+    equations : sparse array (r, n)
+        Some may follow from others.
+    gradients : array (k, n)
+
+    Raises
+    ------
+    RuntimeError
+        If the system is singular.
+    """
+    r, n = equations.shape
+    exact, regular = (bmat([[metric, equations.T], [equations, diags(np.full(r, -last))]], "csc") for last in (0.0, REGULAR))
     found = _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))
-    return found[:n][measured], found[n:]
+    return found[:n], found[n:]
 
 
 def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
