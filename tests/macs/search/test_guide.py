@@ -245,3 +245,12 @@ def test_one_objective_and_equal_ones():
     box = BlackBox(lambda X: np.hstack([bent(X), np.ones((len(X), 1))]), BOX)
     begun = MACS(prefer=MIDDLE).begin(box, 100, np.random.default_rng(0))
     assert len(begun.archive)
+
+
+def test_plain_data_are_read(tmp_path):
+    data = {"method": "ReferencePoint", "settings": {"aspiration": {"f1": 0.2}, "augmentation": 1e-3}}
+    solver = MACS(prefer=data)
+    assert solver.prefer == ReferencePoint({"f1": 0.2}, augmentation=1e-3)
+    assert MACS(prefer=solver.about()["settings"]["prefer"]) == solver
+    with pytest.raises(ValueError, match="MACS: prefer: .*'Wishes'"):
+        MACS(prefer={"method": "Wishes"})
