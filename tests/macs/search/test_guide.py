@@ -252,5 +252,5 @@ def test_plain_data_are_read(tmp_path):
     solver = MACS(prefer=data)
     assert solver.prefer == ReferencePoint({"f1": 0.2}, augmentation=1e-3)
     assert MACS(prefer=solver.about()["settings"]["prefer"]) == solver
-    with pytest.raises(ValueError, match="MACS: prefer: .*'Wishes'"):
+    with pytest.raises(ValueError, match=r"MACS: prefer: .*'Wishes'"):
         MACS(prefer={"method": "Wishes"})
