@@ -66,7 +66,7 @@ class GradientSolver(Solver):
         *,
         evaluations: int | None = None,
         seed: int | None = None,
-        inner: Any = "auto",
+        inner: Any = None,
         tolerance: float = 1e-6,
         start: Any = None,
         verify: float | None = VERIFY,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,11 @@ class Choice:
     def value(self) -> float:
         """The value of the preference, of its first stage if there are several."""
         return self.values[0]
+
+    @cached_property
+    def trade_offs(self) -> TradeOffs | None:
+        """What more of one objective would cost the others; None for a single objective, and for a point without a trajectory."""
+        return trade_offs(self.point) if len(self.point.goals) > 1 and self.point.trajectory is not None else None
 
     @property
     def objectives(self) -> dict[str, float]:

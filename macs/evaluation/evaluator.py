@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -61,6 +62,19 @@ class Evaluation:
     def violations(self) -> np.ndarray:
         """Largest scaled residual of each constraint (k, c), at least 0; a single column (k, 1) if only the largest of all is known."""
         return self.violation[:, None] if self.itemise is None else self.itemise()
+
+    def joined(self, other: Evaluation) -> Evaluation:
+        """These points and others; of violations only the largest is known."""
+        return Evaluation(
+            np.concatenate([self.Z, other.Z]),
+            np.concatenate([self.F, other.F]),
+            np.concatenate([self.violation, other.violation]),
+            np.concatenate([self.status, other.status]),
+        )
+
+    def take(self, rows: np.ndarray) -> Evaluation:
+        """Some of the points; of violations only the largest is known."""
+        return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
 
     def __repr__(self) -> str:
         by_status = ", ".join(f"{number} {status}" for status, number in Counter(self.status.tolist()).items())
@@ -140,6 +154,7 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     has_gradients: bool = False
+    _patient: bool = False
     m_known: int | None = None
     counts: Counts
     before_batch: Callable[[], Any] = staticmethod(lambda: None)
@@ -212,6 +227,15 @@ class Evaluator(ABC):
         cut_short = found.clocked or len(found.F) < len(starts)
         self.counts.add_solves(len(found.F), found.status.tolist(), iterations, cut_short, starts.shape[1])
         return found
+
+    @contextmanager
+    def patiently(self) -> Iterator[None]:
+        """Gradient solves within may take many iterations, in several ways: nothing good is known to begin at."""
+        self._patient = True
+        try:
+            yield
+        finally:
+            self._patient = False
 
     def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None

@@ -24,6 +24,20 @@ def allowed(evaluations: int, every: int, solves: int) -> int:
     return max(evaluations // every - solves, 0)
 
 
+def single_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
+    """The optimum of each objective alone, for a search that begins with nothing feasible: (m,) or fewer if asked to end early.
+
+    Each is sought from the candidate that misses least, with as many iterations as it takes.
+    """
+    m = seen.F.shape[1]
+    known = np.flatnonzero(np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1))
+    if not len(known):
+        return seen.take(known)
+    start = seen.Z[known[np.argmin(seen.violation[known])]]
+    with evaluator.patiently():
+        return evaluator.descend(np.tile(start, (m, 1)), np.where(np.eye(m) > 0, 0.0, np.inf), np.ones((m, m)))
+
+
 def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:
     """Make one gradient solve for the agent whose turn it is, along its own direction.
 

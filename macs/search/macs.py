@@ -91,6 +91,10 @@ class MACS(Settings, Solver):
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
+        if self.refines and evaluator.has_gradients and not (seen.violation <= evaluator.tolerance).any():
+            optima = gradient_action.single_optima(seen, evaluator)
+            remember(state, [optima], self, evaluator)
+            seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
         assign(state, self, guide)

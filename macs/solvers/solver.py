@@ -47,7 +47,7 @@ class Solver(SearchMethod):
         *,
         evaluations: int | None = None,
         seed: int | None = None,
-        inner: str | InnerSolver = "auto",
+        inner: str | InnerSolver | None = None,
         tolerance: float = 1e-6,
         start: Any = None,
         verify: float | None = VERIFY,
@@ -67,17 +67,17 @@ class Solver(SearchMethod):
             Largest number of candidates that are sent to the inner level. Default: the problem's own number.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
-        inner : str or InnerSolver
+        inner : str or InnerSolver, optional
             How candidates are made feasible: "auto" (fast, and IPOPT if that fails), "propagate" (not at all), "none" (not at all, and
             states are not propagated, but searched, too, with the dynamics as constraints), "ipopt" (the nearest feasible point),
-            "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own.
+            "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own. Default: the problem's own, usually "auto".
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
             First candidates. A front, points or an array: decisions, all variables or the free ones only, which are used after the
             problem's guess. "uniform": each variable drawn independently, without the guess. "smooth": random smooth profiles about the
-            guess, see `transcription.Smooth`. Default: the guess, if there is one, and independent draws; where MACS finds the mesh, also
-            the optima of single objectives that this takes.
+            guess, see `transcription.Smooth`. Default: the problem's own; else the guess, if there is one, and independent draws; where
+            MACS finds the mesh, also the optima of single objectives that this takes.
         verify : float, optional
             How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
             simulated.
@@ -119,8 +119,11 @@ class Solver(SearchMethod):
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
         check_problem(problem, transcription)
-        if evaluations is None:
-            evaluations = problem.default_evaluations if isinstance(problem, Problem) else DEFAULT_EVALUATIONS
+        if isinstance(problem, Problem):
+            evaluations = problem.default_evaluations if evaluations is None else evaluations
+            inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
+        else:
+            evaluations, inner = DEFAULT_EVALUATIONS if evaluations is None else evaluations, "auto" if inner is None else inner
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_verify(verify)
         solver = inner_solver(inner)

@@ -75,7 +75,7 @@ class Population:
                     command = f"{name} command"
                     if command in phase.names and command not in along:
                         ax.plot(times, size * values[command], color=color, lw=0.5 * self._width, ls=(0, (4, 2)))
-            ax.set_title(f"{name} [{unit}]", loc="left")
+            ax.set_title(f"{name} [{unit}]", loc="left", fontsize="small")
             ax.margins(x=0.0)
         for ax, limit in zip(grid[len(along) :], limits, strict=False):
             for bound in (limit.lower, limit.upper):

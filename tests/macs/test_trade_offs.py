@@ -10,7 +10,7 @@ from smooth_problems import nlp_of, shuttle, slide, two_wells, vector
 from synthetic_fronts import black_box
 
 from macs import Front, optimize, sweep
-from macs.decisions import front_rates, plot_rates, trade_offs
+from macs.decisions import Ranges, WeightedSum, decide, front_rates, plot_rates, trade_offs
 from macs.decisions.trade_offs import rates
 from macs.fronts.builders import vectors_points
 from problems import Problem, load
@@ -402,6 +402,17 @@ def test_what_has_no_trade_offs(ascents):
     for wrong in (2, -1, True):
         with pytest.raises(ValueError, match="no objective"):
             trade_offs(ascents[3]).rate(0, wrong)
+
+
+def test_a_choice_knows_what_it_costs():
+    """Of the weighted sum of objectives in ranges, the rates follow from the weights."""
+    ranges = Ranges(best={"flight time": 109.0, "horizontal speed": 0.9}, worst={"flight time": 250.0, "horizontal speed": 0.0})
+    choice = decide(
+        load("goddard"), parse("dfet:6x6"), WeightedSum({"flight time": 0.4, "horizontal speed": 0.6}), ranges=ranges, verify=None
+    )
+    assert choice.trade_offs.point is choice.point
+    assert choice.trade_offs.rate("horizontal speed", "flight time") == pytest.approx((0.4 / 141.0) / (0.6 / 0.9), rel=1e-5)
+    assert choice.trade_offs.matrix[0, 1] == pytest.approx((0.4 / 141.0) / (0.6 / 0.9), rel=1e-5)
 
 
 # Tables and pictures.
