@@ -101,11 +101,6 @@ class Choice:
         return self.point.objectives
 
     @property
-    def trade_offs(self) -> TradeOffs:
-        """What more of one objective would cost the others; see `trade_offs`, which says for which points there are none."""
-        return trade_offs(self.point)
-
-    @property
     def stats(self) -> dict[str, Any]:
         """Costs, those of the payoff table included if it was found on the way; the seed, and more, as of a front."""
         return dict(self.point.alone().stats)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from macs import MACS, Front
+from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.directions import simplex_lattice
 from macs.preferences import Preference, ReferencePoint, WeightedSum
 from problems import load
 from problems.cases import goddard
+from transcription import parse
 
 from ..measures.interest import Interest
 from ..measures.references import union
@@ -28,6 +29,8 @@ VARIABLES = 10
 """Of black boxes."""
 DENSE = 2001
 """Points of a dense front of two objectives."""
+SWEPT = 25
+"""Points of a sweep that it goes through, where no closed form is known."""
 
 
 @dataclass(frozen=True)
@@ -107,21 +110,30 @@ def black_box(function: Callable[[np.ndarray], np.ndarray], solver: MACS, evalua
     return solver.minimize(function, [(0.0, 1.0)] * VARIABLES, evaluations=evaluations, seed=seed)
 
 
-def flights(name: str, solver: MACS, evaluations: int, seed: int) -> Front:
-    """The front of a case, by its own transcription, inner level and start."""
-    problem = load(name)
-    given = {"inner": problem.default_inner, "start": problem.default_start}
-    return solver.solve(problem, evaluations=evaluations, seed=seed, **{key: one for key, one in given.items() if one is not None})
+def flights(name: str, word: str | None, solver: MACS, evaluations: int, seed: int) -> Front:
+    """The front of a case, on its own mesh or, as the search found it, on another one."""
+    if word is None:
+        return solver.solve(load(name), evaluations=evaluations, seed=seed)
+    return replace(solver, mesh="fixed").solve(load(name), parse(word), evaluations=evaluations, seed=seed, verify=None)
 
 
+def swept(name: str, word: str) -> np.ndarray:
+    """The front of a case with two objectives on a mesh, by gradients."""
+    return through(sweep(load(name), parse(word), points=SWEPT, starts=1, verify=None).objectives)
+
+
+SKIP = "dfet:6x4:bernstein:1"
+"""A coarse mesh, on which a gradient solve takes a tenth of the time."""
+MASS = ReferencePoint({"terminal mass": 65e3, "terminal speed": 6500.0})
 SPEED = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 CASES = (
     Guided("zdt1", partial(black_box, zdt1), partial(curve, 0.5), ReferencePoint({"f1": 0.2, "f2": 0.2}), 3000, True),
     Guided("zdt1, weighted", partial(black_box, zdt1), partial(curve, 0.5), WeightedSum({"f1": 1.0, "f2": 1.0}), 3000, archive=20),
     Guided("zdt2", partial(black_box, zdt2), partial(curve, 2.0), ReferencePoint({"f1": 0.5, "f2": 0.2}), 3000),
     Guided("dtlz2", partial(black_box, dtlz2), sphere, ReferencePoint({"f1": 0.2, "f2": 0.4, "f3": 0.5}), 5000, archive=20),
-    Guided("goddard", partial(flights, "goddard"), goddard.reference, SPEED, 1000, True),
-    Guided("goddard, no derivatives", partial(flights, "goddard"), goddard.reference, SPEED, 3000, refine=False),
+    Guided("goddard", partial(flights, "goddard", None), goddard.reference, SPEED, 1000, True),
+    Guided("goddard, no derivatives", partial(flights, "goddard", None), goddard.reference, SPEED, 10_000, refine=False),
+    Guided("skip", partial(flights, "skip", SKIP), partial(swept, "skip", SKIP), MASS, 1500),
 )
 
 
