@@ -28,6 +28,7 @@ from macs.pareto.archive import spread
 from macs.preferences.region import PART, Region
 from macs.search.guide import OUTSIDE, PreferenceGuide
 from problems import load
+from problems.cases import goddard
 from problems.compiled import Objective
 
 GOALS = (Objective("f1"), Objective("f2"))
@@ -254,3 +255,34 @@ def test_plain_data_are_read(tmp_path):
     assert MACS(prefer=solver.about()["settings"]["prefer"]) == solver
     with pytest.raises(ValueError, match=r"MACS: prefer: .*'Wishes'"):
         MACS(prefer={"method": "Wishes"})
+
+
+FLIGHT = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
+
+
+@pytest.fixture(scope="module")
+def flights() -> dict[str, Front]:
+    """Fronts by gradients, one guided, one even."""
+    return {
+        who: MACS(prefer=prefer, mesh="fixed").solve(load("goddard"), evaluations=800, seed=1, verify=None)
+        for who, prefer in (("guided", FLIGHT), ("even", None))
+    }
+
+
+def test_gradients_go_where_the_preference_is_good(flights):
+    truth = goddard.reference()
+    guided, even = flights["guided"], flights["even"]
+    region = Region.of(FLIGHT, guided.goals, truth)
+    inside, others = (region.contains(front.objectives).sum() for front in (guided, even))
+    assert inside >= 5 > 2 >= others
+    assert region.away(guided.objectives).min() < 0.2 * PART
+    assert guided.objectives[0, 0] < 1.02 * truth[0, 0] and guided.objectives[-1, 0] > 240.0
+
+
+def test_a_guided_search_of_trajectories_goes_on_to_the_same_bits(tmp_path, flights):
+    left = iter(range(3))
+    for callback in (lambda progress: next(left, None) is None, None):
+        front = MACS(prefer=FLIGHT, mesh="fixed").solve(
+            load("goddard"), evaluations=800, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt", callback=callback
+        )
+    assert front.F.tobytes() == flights["guided"].F.tobytes()
