@@ -15,7 +15,7 @@ from ..pareto.archive import Guide
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges
-from ..preferences.region import PART, Region
+from .region import PART, Region
 
 OUTSIDE = 0.005
 """Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""

@@ -25,8 +25,8 @@ from macs.decisions import (
 from macs.evaluation.blackbox import BlackBox
 from macs.pareto import directions
 from macs.pareto.archive import spread
-from macs.preferences.region import PART, Region
 from macs.search.guide import OUTSIDE, PreferenceGuide
+from macs.search.region import PART, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective

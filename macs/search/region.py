@@ -10,9 +10,9 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from .preference import Preference
-from .ranges import Ranges
-from .stage import Stage
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges
+from ..preferences.stage import Stage
 
 PART = 0.05
 """The value of a preference in the region of interest differs from the best value on a front by at most this part of the spread of values
