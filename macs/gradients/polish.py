@@ -17,6 +17,10 @@ PLACES = 500
 """Largest number of places that cover a surface."""
 
 
+CLOSER = (1 / 3, 1 / 9)
+"""With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small."""
+
+
 ROUNDS = 6
 """Largest number of rounds with starts from neighbours, and of rounds in which points slide along the front."""
 
@@ -120,10 +124,14 @@ def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
-    places = simplex_lattice(m, divisions_below(m, PLACES)) @ known
+    lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
             break
+        places = lattice
+        if guide is not None:
+            best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
+            places = np.vstack([lattice, *(best + closer * (lattice - best) for closer in CLOSER)])
         apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
         if guide is not None:
             beneath = np.linalg.norm(places[:, None] - across((pool.F - ideal) / between), axis=2).argmin(axis=1)
