@@ -83,10 +83,10 @@ class PopulationSolver(Solver):
     _compares_violations = True
     """Whether the algorithm compares violations itself; otherwise they are included in the objectives presented to it."""
 
-    def extra_stats(self, state: State, tolerance: float) -> dict[str, Any]:
+    def extra_stats(self, state: State, evaluator: Evaluator) -> dict[str, Any]:
         """See `SearchMethod.extra_stats`."""
         members = state.members
-        feasible = members.take(constraints.excess(members.F, members.violation, tolerance) == 0.0)
+        feasible = members.take(constraints.excess(members.F, members.violation, evaluator.tolerance) == 0.0)
         return {
             "population": {
                 "generations": state.iteration + 1,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from problems.compiled import Objective
 from problems.peaks import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
@@ -50,6 +51,11 @@ class Bilevel(Evaluator):
             self.has_gradients = True
         except ValueError:  # for example a peak that is maximised: the search uses no derivatives
             self.has_gradients = False
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """See `Evaluator.goals`."""
+        return self.nlp.problem.goals
 
     def opening(self, candidates: np.ndarray) -> np.ndarray:
         """See `Evaluator.opening`."""

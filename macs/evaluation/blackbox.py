@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from problems.compiled import Objective
+
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
 
 SENSES = ("minimize", "maximize")
@@ -109,6 +111,11 @@ class BlackBox(Evaluator):
     def senses(self) -> tuple[str, ...]:
         """ "minimize" or "maximize" of each objective, (m,)."""
         return self._senses or ("minimize",) * self.m
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """See `Evaluator.goals`."""
+        return tuple(Objective(*words) for words in zip(self.names, self.units, self.senses, strict=True))
 
     def resume(self, counts: Counts, m: int) -> None:
         """See `Evaluator.resume`. Raises ValueError if the function has another number of objectives."""

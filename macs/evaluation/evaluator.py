@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from problems.checks import short_repr
+from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 from ..io.text import counted
@@ -162,6 +163,11 @@ class Evaluator(ABC):
     def box(self) -> Box:
         """Box of the free variables."""
         return Box(self.lower, self.upper, self.period > 0.0)
+
+    @property
+    def goals(self) -> tuple[Objective, ...]:
+        """The m objectives, in the user's units and senses; needed by searches with a preference only."""
+        raise NotImplementedError(f"{type(self).__name__} does not name its objectives")
 
     def resume(self, counts: Counts, m: int) -> None:
         """Continue with the counts of an earlier run, which had m objectives."""

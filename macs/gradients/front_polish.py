@@ -32,7 +32,7 @@ from ..fronts.simulated import simulated
 from ..fronts.verified import unmarked
 from ..io.console import working
 from ..pareto import archive as archives
-from ..pareto.archive import Archive
+from ..pareto.archive import Archive, Guide
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import ranges
 from .polish import CountedSolves, polish
@@ -49,8 +49,9 @@ def polished(
     verify: float | None,
     time_limit: float | None,
     progress: bool | None,
+    guide: Guide | None = None,
 ) -> Points:
-    """The polished points; see `Front.polished`."""
+    """The polished points; see `Front.polished`. A guide says how densely they are wanted."""
     problem = front.compiled()
     check_problem(problem, transcription)
     # Compared with new points by the objectives on their meshes: no new point has been simulated yet.
@@ -76,7 +77,7 @@ def polished(
         begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
         if not len(begun):
             return front.replace(stats=more_costs(front.stats, evaluator.counts, interrupts.elapsed, interrupts.reason))
-        archive = polish(begun, left, limit)
+        archive = polish(begun, left, limit, guide=guide)
         untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         moved, unseen = np.zeros(len(Z), dtype=bool), 0
@@ -93,7 +94,7 @@ def polished(
     stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
     found = merge([vectors_points(nlp, Z, front.solver, stats, **found_of, notes=notes), known])
-    found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit))]
+    found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit, guide=guide))]
     message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
     message = f"{stopped}: {unseen} points of the front before were not simulated" if unseen else message
     return found.replace(solver=dict(front.solver), stats=stats, message=message)

@@ -8,13 +8,17 @@ import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
 from ..pareto import archive as archives
-from ..pareto.archive import Archive
+from ..pareto.archive import Archive, Guide
 from ..pareto.directions import across, divisions_below, simplex_lattice
 from ..pareto.dominance import extremes
 from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
 
 PLACES = 500
 """Largest number of places that cover a surface."""
+
+
+CLOSER = (1 / 3, 1 / 9)
+"""With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small."""
 
 
 ROUNDS = 6
@@ -33,7 +37,7 @@ GAIN = 0.995
 """A slide is tried only if it is expected to lower the energy of the point at least to this fraction."""
 
 
-def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None) -> Archive:
+def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None, guide: Guide | None = None) -> Archive:
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
     1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
@@ -54,23 +58,25 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         Largest number of points.
     exponent : float, optional
         See `archive.pair_energies`.
+    guide : Guide, optional
+        How densely points are wanted. Default: evenly.
     """
     if not len(archive):
         return archive
     if archive.F.shape[1] > CURVE:
-        archive = _cover(archive, solves, limit, exponent)
+        archive = _cover(archive, solves, limit, exponent, guide)
         if not solves.left:
             return archive
-    archive, waiting = _descend(archive, solves, exponent)
+    archive, waiting = _descend(archive, solves, exponent, guide)
     for _ in range(ROUNDS):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:
             break
         archive = better
     pool, span = archive, ranges(archive.F)
-    archive = _thinned(pool, limit, exponent)
+    archive = _thinned(pool, limit, exponent, guide)
     for _ in range(ROUNDS):
-        references, starts, gaps = _slide(archive, limit, exponent)
+        references, starts, gaps = _slide(archive, limit, exponent, guide)
         if not (len(references) and solves.left):
             break
         found = solves(starts, references, np.tile(span, (len(references), 1)))
@@ -82,25 +88,26 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
             found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
             pool = pool.joined(Archive.of(found, found.status == CONVERGED))
         pool = _front(pool, span)
-        before, archive = archive, _thinned(pool, limit, exponent)
+        before, archive = archive, _thinned(pool, limit, exponent, guide)
         if np.array_equal(before.F, archive.F):
             break
     archive = _helped_by_neighbours(archive, solves, extremes(archive.F))
     if len(waiting):
-        archive = _thinned(_front(archive.joined(waiting), span), limit, exponent)
+        archive = _thinned(_front(archive.joined(waiting), span), limit, exponent, guide)
     return archive
 
 
-def _thinned(pool: Archive, limit: int, exponent: float | None) -> Archive:
-    """At most `limit` points of the pool, evenly spread."""
-    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent))
+def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
+    """At most `limit` points of the pool, evenly spread, or as the guide wants them."""
+    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent, guide=guide))
 
 
-def _descend(archive: Archive, solves: CountedSolves, exponent: float | None) -> tuple[Archive, Archive]:
+def _descend(archive: Archive, solves: CountedSolves, exponent: float | None, guide: Guide | None) -> tuple[Archive, Archive]:
     """The points after one guarded solve each, with the ends of the front, and the points that are left out for want of solves."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
-    chosen = archives.spread(archive.F, most, exponent=exponent) if most < len(archive) else np.ones(len(archive), dtype=bool)
+    everyone = np.ones(len(archive), dtype=bool)
+    chosen = archives.spread(archive.F, most, exponent=exponent, guide=guide) if most < len(archive) else everyone
     archive, waiting = archive.take(chosen), archive.take(~chosen)
     found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
     kept = feasible_and_no_worse(found, archive.F, archive.violation, span)
@@ -108,19 +115,28 @@ def _descend(archive: Archive, solves: CountedSolves, exponent: float | None) ->
     return _front(_ends(archive, span, solves).joined(archive), span), waiting
 
 
-def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None) -> Archive:
-    """The ends of the front, and results of solves to `limit` places between them: always the place farthest from all known points."""
+def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
+    """The ends of the front, and results of solves to `limit` places between them: always the place farthest from all known points, in
+    distances multiplied by the factors of a guide."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
     pool = _front(ends.joined(archive), span)
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
-    places = simplex_lattice(m, divisions_below(m, PLACES)) @ known
+    lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
             break
-        place = places[np.argmax(np.linalg.norm(places[:, None] - known, axis=2).min(axis=1))]
+        places = lattice
+        if guide is not None:
+            best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
+            places = np.vstack([lattice, *(best + closer * (lattice - best) for closer in CLOSER)])
+        apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
+        if guide is not None:
+            beneath = np.linalg.norm(places[:, None] - across((pool.F - ideal) / between), axis=2).argmin(axis=1)
+            apart *= guide.factors(pool.F, pool.F)[beneath]
+        place = places[np.argmax(apart)]
         reference = ideal + between * place
         start = np.argmin(((pool.F - reference) / between).max(axis=1))
         found = solves(pool.Z[start : start + 1], reference[None], between[None])
@@ -128,7 +144,7 @@ def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         if found.status[0] == CONVERGED:
             known = np.vstack([known, across((found.F - ideal) / between)])
             pool = Archive.of(found, np.arange(1)).joined(pool)
-    return _thinned(_front(pool, between), limit, exponent)
+    return _thinned(_front(pool, between), limit, exponent, guide)
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
@@ -166,7 +182,7 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.nd
     return _front(Archive.of(found, better).joined(archive), span)
 
 
-def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """References (k, m) on the lines between neighbours, in wide gaps first and then where points have less energy; start vectors (k, D);
     and the points (g, 2) on both sides of the gaps."""
     span = ranges(archive.F)
@@ -176,6 +192,9 @@ def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nda
     neighbours = [nearest(point, archive.F, span)[1 : 2 * (F.shape[1] - 1) + 1] for point in archive.F]
     pairs = sorted({(min(i, j), max(i, j)) for i in range(n) for j in neighbours[i]})
     apart = np.array([np.linalg.norm(F[i] - F[j]) for i, j in pairs])
+    factors = None if guide is None else guide.factors(archive.F, archive.F)
+    if factors is not None:
+        apart *= [np.sqrt(factors[i] * factors[j]) for i, j in pairs]
     wide = np.count_nonzero(apart > WIDE * np.median(apart))
     gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, min(limit - n, n))]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
@@ -184,7 +203,10 @@ def _slide(archive: Archive, limit: int, exponent: float | None) -> tuple[np.nda
     for i in np.setdiff1d(np.arange(n), extremes(archive.F)):
         others = np.delete(F, i, axis=0)
         lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])
-        energy = (1.0 / np.maximum(((lines[:, None] - others) ** 2).sum(axis=2), 1e-12) ** power).sum(axis=1)
+        squared = ((lines[:, None] - others) ** 2).sum(axis=2)
+        if guide is not None and factors is not None:
+            squared *= guide.factors(archive.F, lines * span)[:, None] * np.delete(factors, i)
+        energy = (1.0 / np.maximum(squared, 1e-12) ** power).sum(axis=1)
         best = int(np.argmin(energy))
         if energy[best] < GAIN * energy[0]:
             references.append(lines[best])

@@ -9,6 +9,7 @@ import numpy as np
 
 from transcription.base import NLP
 from transcription.nlp.scalarized import Solved
+from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
 from .multistart import GradientSolves
@@ -101,7 +102,7 @@ class End(Task):
             return solves(nlp, start, alone, self.units)
         near = np.where(mine, np.inf, self.known + ROOM * self.units)
         first = solves(nlp, start, alone, self.units, near)
-        if first.status != CONVERGED or (near - AT_ROOM * self.units < first.F).any():
+        if not stopping() and (first.status != CONVERGED or (near - AT_ROOM * self.units < first.F).any()):
             free = solves(nlp, first.z if first.status == CONVERGED else start, alone, self.units)
             first = free if free.status == CONVERGED else first
         if first.status != CONVERGED:

@@ -53,10 +53,16 @@ def pool(m: int, size: int) -> np.ndarray:
     return np.vstack([np.eye(m), inner / np.linalg.norm(inner, axis=1, keepdims=True)])
 
 
-def draw(directions: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Rows (count,) of active directions: the m orthogonal ones, then others at random; none is repeated before all have been drawn."""
+def draw(directions: np.ndarray, count: int, rng: np.random.Generator, shares: np.ndarray | None = None) -> np.ndarray:
+    """Rows (count,) of active directions: the m orthogonal ones, then others at random; none is repeated before all have been drawn.
+
+    With `shares` (k,), positive, a direction is drawn the more often, the larger its share.
+    """
     m = directions.shape[1]
-    chosen = np.concatenate([np.arange(m), rng.permutation(np.arange(m, len(directions)))])[:count]
+    others = rng.permutation(np.arange(m, len(directions)))
+    if shares is not None and len(others):
+        others = m + rng.choice(len(others), size=len(others), replace=False, p=shares[m:] / shares[m:].sum())
+    chosen = np.concatenate([np.arange(m), others])[:count]
     return np.concatenate([chosen, rng.choice(len(directions), count - len(chosen))])
 
 
@@ -75,6 +81,11 @@ def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir:
     """
     weighted = directions * normalised(F, ideal, nadir)
     return np.where(directions > 0.0, weighted, -np.inf).max(axis=-1)
+
+
+def best_points(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
+    """The row (k,) of F (n, m) that is best in each of the directions (k, m); see `tchebycheff`."""
+    return tchebycheff(F[:, None], directions, ideal, nadir).argmin(axis=0)
 
 
 DEFAULT = 100

@@ -66,6 +66,14 @@ class Ranges:
         best, worst = (F.min(axis=0) * front.signs + 0.0, F.max(axis=0) * front.signs + 0.0)
         return cls(dict(zip(front.names, best.tolist(), strict=True)), dict(zip(front.names, worst.tolist(), strict=True)))
 
+    @classmethod
+    def over(cls, goals: Sequence[Objective], objectives: np.ndarray) -> Ranges:
+        """The best and the worst values of goals over objectives (n, m), n > 0, in the user's units and senses."""
+        names, signs = [goal.name for goal in goals], np.array([goal.sign for goal in goals])
+        F = objectives * signs
+        best, worst = F.min(axis=0) * signs + 0.0, F.max(axis=0) * signs + 0.0
+        return cls(dict(zip(names, best.tolist(), strict=True)), dict(zip(names, worst.tolist(), strict=True)))
+
     def to_dict(self) -> dict[str, dict[str, float]]:
         """As plain data: `Ranges(**data)` makes them again."""
         return {"best": dict(self.best), "worst": dict(self.worst)}

@@ -15,7 +15,7 @@ from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
 from ..gradients.multistart import GradientSolves
 from ..gradients.tasks import Along
-from ..pareto.archive import spread
+from ..pareto.archive import Guide, spread
 from ..pareto.dominance import extremes
 from .mesh_loop import Programs
 
@@ -23,7 +23,15 @@ STARTS = 2
 """Number of verified points from which a solve is tried."""
 
 
-def filled(points: Points, size: int, solves: GradientSolves, most_work: float, programs: Programs, simulations: Simulations) -> Points:
+def filled(
+    points: Points,
+    size: int,
+    solves: GradientSolves,
+    most_work: float,
+    programs: Programs,
+    simulations: Simulations,
+    guide: Guide | None = None,
+) -> Points:
     """The points with further verified ones, until `size` of them are verified or the work is done.
 
     Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
@@ -41,11 +49,13 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float, 
     programs : Programs
     simulations : Simulations
         Of the points, too: what was simulated is not simulated again.
+    guide : Guide, optional
+        How densely points are wanted. Default: evenly.
     """
     tried = np.empty((0, points.F.shape[1]))
     while points.verified.any() and _needed(points).sum() < size and solves.counts.work < most_work and not stopping():
         scales = objective_scales(points)
-        target = _target(points, tried, scales)
+        target = _target(points, tried, scales, guide)
         if target is None:
             break
         tried = np.vstack([tried, target])
@@ -57,15 +67,15 @@ def filled(points: Points, size: int, solves: GradientSolves, most_work: float, 
                 joined = Points.concatenate([points, found]).replace(stats=points.stats, solver=points.solver)
                 points = joined[best_rows(joined)]
                 break
-    return points[_within(points, size)]
+    return points[_within(points, size, guide)]
 
 
-def _within(points: Points, size: int) -> np.ndarray:
+def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:
     """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
     well spread, of others as many as there is room for."""
     good = np.flatnonzero(points.verified)
     if len(good) > size:
-        return good[spread(points.simulated_F[good], size)]
+        return good[spread(points.simulated_F[good], size, guide=guide)]
     spare = np.flatnonzero(~_needed(points))
     return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
 
@@ -77,7 +87,7 @@ def _needed(points: Points) -> np.ndarray:
     return needed
 
 
-def _target(points: Points, tried: np.ndarray, scales: np.ndarray) -> np.ndarray | None:
+def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None) -> np.ndarray | None:
     """Where to go next (m,): to the point that is not verified and nearest to one that is; without any, to the middle of the widest gap
     between verified points that are neighbours in the first of two objectives. None if all of that was tried."""
     good, others = points.simulated_F[points.verified], points.F[~points.verified]
@@ -88,6 +98,8 @@ def _target(points: Points, tried: np.ndarray, scales: np.ndarray) -> np.ndarray
         return None
     good = good[np.argsort(good[:, 0], kind="stable")]
     middles, widths = 0.5 * (good[1:] + good[:-1]), np.linalg.norm(np.diff(good, axis=0) / scales, axis=1)
+    if guide is not None:
+        widths *= guide.factors(good, middles)
     new = [k for k in np.argsort(-widths, kind="stable").tolist() if not (middles[k] == tried).all(axis=1).any()]
     return middles[new[0]] if new else None
 

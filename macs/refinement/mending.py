@@ -21,6 +21,7 @@ from ..fronts.verified import Simulations, accuracy, largest_miss, objective_sca
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
+from ..pareto.archive import Guide
 from .filling import filled
 from .fine_front import solved_on
 from .mesh_loop import BUILDING, OnMesh, Programs
@@ -49,11 +50,13 @@ def mended(
     progress: bool | None = None,
     fine: Meshed | None = None,
     ends: Points | None = None,
+    guide: Guide | None = None,
 ) -> Points:
     """The front of the points of which those that are not verified have been solved again; see `Front.mended`.
 
     With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of
-    single objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`.
+    single objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`. A
+    guide says how densely points are wanted.
     """
     if not len(points):
         return verified(points, verify)
@@ -66,7 +69,7 @@ def mended(
         # The ranges of the objectives may be others now.
         kept = job.marked(joined[best_rows(joined)])
         if joined is not job.points:
-            kept = job.marked(job.filled(kept, len(points)))
+            kept = job.marked(job.filled(kept, len(points), guide))
         return job.paid(job.explained(kept.sorted()), interrupts.elapsed, interrupts.reason)
 
 
@@ -146,10 +149,10 @@ class _Mending:
             return points
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
 
-    def filled(self, points: Points, size: int) -> Points:
+    def filled(self, points: Points, size: int, guide: Guide | None) -> Points:
         """The points, filled up from verified ones; see `filled`."""
         most = self._most_work(points, size - int(points.verified.sum()))
-        return filled(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations)
+        return filled(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
 
     def _as_before(self, points: Points) -> Points:
         """The points, of which those that are verified as they came, and not any more, are as they came."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
+from ..pareto.archive import Guide
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
 from .state import NO_DIRECTION, SearchState
@@ -43,7 +44,7 @@ def first_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
     return ends.joined(middle)
 
 
-def individual_action(state: SearchState, evaluator: Evaluator, F: float) -> list[Evaluation]:
+def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:
     """Make one gradient solve for the agent whose turn it is, along its own direction.
 
     For a feasible agent the solve is guarded. Its start changes from turn to turn: the position of the agent, that of its nearest neighbour
@@ -77,7 +78,7 @@ def individual_action(state: SearchState, evaluator: Evaluator, F: float) -> lis
         start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
     direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
     if m > CURVE and turn and np.count_nonzero(direction) == 1:
-        direction = state.directions[state.rng.integers(m, len(state.directions))]
+        direction = state.directions[_any_inner(state, guide)]
     weights = np.where(direction > 0, ranges_of(state) / np.maximum(direction, FLAT), 0.0)
     alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
@@ -89,6 +90,15 @@ def individual_action(state: SearchState, evaluator: Evaluator, F: float) -> lis
     if feasible_and_no_worse(found, limit[None], agents.violation[i : i + 1], ranges_of(state))[0]:
         agents.place(np.array([i]), found.Z, found.F, found.violation)
     return [found]
+
+
+def _any_inner(state: SearchState, guide: Guide | None) -> int:
+    """The row of a random direction that is not a single objective."""
+    m, count = state.directions.shape[1], len(state.directions)
+    wanted = social.shares(state, guide)
+    if wanted is None:
+        return int(state.rng.integers(m, count))
+    return int(state.rng.choice(np.arange(m, count), p=wanted[m:] / wanted[m:].sum()))
 
 
 def ranges_of(state: SearchState) -> np.ndarray:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, Objective
 from problems.peaks import refuse_peaks
 from transcription.base import Transcription
 from transcription.catalogue import parse
@@ -15,21 +18,25 @@ from transcription.meshed import Meshed
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
+from ..gradients.front_polish import polished
 from ..gradients.polish import CountedSolves, PolishLog, polish
 from ..pareto import archive as archives
 from ..pareto import directions
-from ..pareto.archive import Archive
+from ..pareto.archive import Archive, Guide
 from ..pareto.dominance import dominates, nondominated
 from ..refinement.mending import mended
 from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
+from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .settings import Settings
 from .social import assign, social_actions
 from .state import SearchState, agents_at, remember
 from .trials import Trials
+
+log = logging.getLogger(__name__)
 
 
 class MACS(Settings, Solver):
@@ -69,6 +76,7 @@ class MACS(Settings, Solver):
         seen = evaluator.evaluate(Z)
         m = seen.F.shape[1]
         self.check_objectives(m)
+        guide = self._checked_guide(evaluator)
         state = SearchState(
             agents=agents_at(seen, np.arange(0), len(evaluator.free), self),
             archive=Archive.of(seen, np.arange(0)),
@@ -88,9 +96,15 @@ class MACS(Settings, Solver):
             remember(state, [optima], self, evaluator)
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
-        state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent), len(evaluator.free), self)
-        assign(state, self)
+        state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
+        assign(state, self, guide)
         return state
+
+    def _checked_guide(self, evaluator: Evaluator) -> Guide | None:
+        """The guide by the preference, if there is one, for objectives that are known now."""
+        if self.prefer is not None:
+            self.check_goals(evaluator.goals)
+        return guide_of(self.prefer, evaluator)
 
     def advance(self, state: SearchState, evaluator: Evaluator, budget: int) -> None:
         """Do one iteration, of some tens of evaluations; changes `state`. Once the budget is spent it does nothing."""
@@ -100,22 +114,25 @@ class MACS(Settings, Solver):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
             remember(state, trials.seen, self, evaluator)
+        guide = guide_of(self.prefer, evaluator)
         breed_archive(Trials(self, state, evaluator, budget))
         if self.refines and evaluator.has_gradients:
             for _ in range(gradient_action.allowed(state.evaluations, self.refine_every, state.refinements)):
-                remember(state, gradient_action.individual_action(state, evaluator, self.F), self, evaluator)
-        assign(state, self)
+                remember(state, gradient_action.individual_action(state, evaluator, self.F, guide), self, evaluator)
+        assign(state, self, guide)
         state.iteration += 1
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
         """Polish the archive by gradients, if the problem has them. If asked to end early, the polish continues at the next call."""
+        if objection := self._objection(state, evaluator):
+            log.warning("the preference did not guide the search: %s", objection)
         if not (self.refines and evaluator.has_gradients):
             return
         if state.polishing is None:
             state.polishing = PolishLog.of(state.archive)
         before = evaluator.counts.gradient_solves - len(state.polishing)
         solves = CountedSolves(evaluator, state.evaluations // self.polish_every - before, state.polishing)
-        state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent)
+        state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator))
         if not solves.stopped:
             state.polishing = None
 
@@ -132,27 +149,55 @@ class MACS(Settings, Solver):
     def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
+        guide = None if self.prefer is None else PreferenceGuide(self.prefer, front.goals)
         if self.polish_on is not None:
             solves = front.stats["evaluations"] // self.polish_every
-            return front.polished(
+            more = polished(
+                front,
                 parse(self.polish_on),
                 solves=solves,
                 limit=self.archive,
+                time_limit=None,
                 verify=verify,
                 progress=progress,
+                guide=guide,
             )
+            return Front.of(more)
         if self.mesh == "adaptive" and len(front):
             refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
             return refined[best_rows(refined)]
         if not self.mends or verify is None:
             return front.verify(verify)
         fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.refined)
-        return Front.of(mended(front, verify, None, progress, fine, ends))
+        return Front.of(mended(front, verify, None, progress, fine, ends, guide))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""
         if self.archive < m:
             raise ValueError(f"MACS: archive must have at least one point for each of the {m} objectives, not {self.archive}")
+
+    def check_goals(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError for a preference that is not one of these objectives."""
+        if self.prefer is not None:
+            check_preference(self.prefer, goals)
+
+    def extra_stats(self, state: SearchState, evaluator: Evaluator) -> dict[str, Any]:
+        """With a preference that the archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
+        objection = self._objection(state, evaluator)
+        return {"prefer": f"not followed: {objection}"} if objection else {}
+
+    def _objection(self, state: SearchState, evaluator: Evaluator) -> str:
+        """Why the preference says nothing on the archive, if that is so."""
+        if self.prefer is None or not len(state.archive):
+            return ""
+        return PreferenceGuide(self.prefer, evaluator.goals).objection(state.archive.F)
+
+    def about(self) -> dict[str, Any]:
+        """See `SearchMethod.about`; a preference is there only if there is one."""
+        settings: dict[str, Any] = asdict(replace(self, prefer=None))
+        del settings["prefer"]
+        given = {} if self.prefer is None else {"prefer": written(self.prefer)}
+        return {"name": type(self).__name__, "settings": settings | given}
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:
         """Raise ValueError for `mesh="adaptive"` with a method whose mesh cannot be refined, and for `polish_on` without gradients."""
@@ -167,7 +212,7 @@ class MACS(Settings, Solver):
         return self.refines
 
 
-def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | None) -> np.ndarray:
+def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | None, guide: Guide | None) -> np.ndarray:
     """Rows, in increasing order, of the points that become agents: all of them, or the best `count`.
 
     Feasible points come before infeasible ones; infeasible ones are ordered by their violation. Of the feasible ones, the non-dominated
@@ -178,7 +223,7 @@ def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | No
     feasible = np.flatnonzero(seen.violation <= tolerance)
     front = feasible[nondominated(seen.F[feasible])]
     if len(front) > count:
-        return front[archives.spread(seen.F[front], count, exponent=exponent)]
+        return front[archives.spread(seen.F[front], count, exponent=exponent, guide=guide)]
     worth = np.where(seen.violation <= tolerance, 0.0, seen.violation)
     dominators = [np.count_nonzero(dominates(seen.F[feasible], F)) for F in seen.F]
     return np.sort(np.lexsort((dominators, ~np.isin(np.arange(len(seen.F)), front), worth))[:count])

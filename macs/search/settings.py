@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Self
@@ -10,6 +11,9 @@ import numpy as np
 
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
+
+from ..preferences.catalogue import from_dict
+from ..preferences.preference import Preference
 
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
@@ -126,6 +130,12 @@ class Settings:
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
         with more: on a surface, a low power drives the points to the edges.
 
+    prefer : Preference or dict, optional
+        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
+        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
+        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
+        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
+
     Raises
     ------
     ValueError
@@ -161,6 +171,7 @@ class Settings:
     breeding: float = 0.15
     sample: int | None = None
     exponent: float | None = None
+    prefer: Preference | None = None
 
     def __post_init__(self) -> None:
         for name, least in LEAST.items():
@@ -177,6 +188,7 @@ class Settings:
         check_choice("MACS: reseed", self.reseed, ("all", "spread"))
         check_choice("MACS: mesh", self.mesh, MESHES)
         self._check_polish()
+        self._read_preference()
 
     def _check_polish(self) -> None:
         if self.polish_on is None:
@@ -191,6 +203,15 @@ class Settings:
             raise ValueError("MACS: polish_on makes no sense with refine=False, which uses no derivatives")
         if self.mesh == "adaptive":
             raise ValueError("MACS: polish_on makes no sense with mesh='adaptive': its points are on the mesh that it names")
+
+    def _read_preference(self) -> None:
+        if isinstance(self.prefer, Mapping):
+            try:
+                object.__setattr__(self, "prefer", from_dict(self.prefer))
+            except ValueError as error:
+                raise ValueError(f"MACS: prefer: {error}") from error
+        if self.prefer is not None and not isinstance(self.prefer, Preference):
+            raise ValueError(f"MACS: prefer must be a preference of macs.decisions, such as ReferencePoint, not {self.prefer!r}")
 
     @classmethod
     def paper(cls, **overrides: Any) -> Self:

@@ -10,6 +10,7 @@ import numpy as np
 from ..evaluation.box import Box
 from ..pareto import archive as archives
 from ..pareto import directions
+from ..pareto.archive import Guide
 from ..pareto.ranges import normalised
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
@@ -171,7 +172,19 @@ def social_actions(trials: Trials) -> None:
         trials.evaluate(agents.Z[rows], around.X, trial)
 
 
-def assign(state: SearchState, settings: Settings) -> None:
+def shares(state: SearchState, guide: Guide | None) -> np.ndarray | None:
+    """Shares (k,) of the directions in what is drawn, as densely as points are wanted where they lead; None if that is even.
+
+    A direction leads to the point of the archive that is best in it.
+    """
+    archive, m = state.archive, state.directions.shape[1]
+    if guide is None or len(archive) < m:
+        return None
+    wanted = guide.factors(archive.F, archive.F) ** max(m - 1, 1)  # so many in an area, if m = 3
+    return wanted[directions.best_points(archive.F, state.directions, state.ideal, state.nadir)]
+
+
+def assign(state: SearchState, settings: Settings, guide: Guide | None = None) -> None:
     """Give the social agents their directions, and move them to the points of the archive that are best in these directions.
 
     While the archive has fewer points than objectives, no agent is moved, except with `reseed="spread"`: then, as in the authors' code,
@@ -183,11 +196,11 @@ def assign(state: SearchState, settings: Settings) -> None:
         return
     if settings.redraw or not (agents.direction != NO_DIRECTION).any():
         agents.direction[:] = NO_DIRECTION
-        agents.direction[:social_count] = directions.draw(state.directions, social_count, state.rng)
+        agents.direction[:social_count] = directions.draw(state.directions, social_count, state.rng, shares(state, guide))
     owners = np.flatnonzero(agents.direction != NO_DIRECTION)
     if len(archive) >= m:
         if settings.reseed == "spread" and len(archive) > len(owners) >= m:
-            archive = archive.take(archives.spread(archive.F, len(owners), exponent=settings.exponent))
+            archive = archive.take(archives.spread(archive.F, len(owners), exponent=settings.exponent, guide=guide))
         weights = state.directions[agents.direction[owners]]
         costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     elif settings.reseed == "spread":

@@ -11,6 +11,7 @@ from ..gradients.polish import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
+from .guide import guide_of
 from .settings import Settings
 
 NO_DIRECTION = -1
@@ -129,7 +130,10 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
     Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
     violation = np.concatenate([e.violation for e in seen])
     limit, tolerance = settings.archive, evaluator.tolerance
-    state.archive = archives.insert(state.archive, Z, F, violation, limit=limit, tolerance=tolerance, exponent=settings.exponent)
+    guide = guide_of(settings.prefer, evaluator)
+    state.archive = archives.insert(
+        state.archive, Z, F, violation, limit=limit, tolerance=tolerance, exponent=settings.exponent, guide=guide
+    )
     if len(state.archive):
         state.ideal = np.fmin(state.ideal, state.archive.F.min(axis=0))
         state.nadir = state.archive.F.max(axis=0)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
 import numpy as np
 
 from problems.checks import short_repr
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, Objective
 from transcription.base import Transcription
 
 from ..evaluation.evaluator import Evaluator
@@ -58,7 +58,7 @@ class SearchMethod(ABC):
         batch of this work: called with that state, it continues to the same bits.
         """
 
-    def extra_stats(self, state: Any, tolerance: float) -> dict[str, Any]:
+    def extra_stats(self, state: Any, evaluator: Evaluator) -> dict[str, Any]:
         """Further entries of a front's `stats`, as plain data; none for most solvers."""
         return {}
 
@@ -74,6 +74,9 @@ class SearchMethod(ABC):
 
     def check_objectives(self, m: int) -> None:  # noqa: B027 - most solvers have nothing to refuse
         """Raise ValueError if the settings do not suit m objectives. Called before any work, as soon as m is known."""
+
+    def check_goals(self, goals: Sequence[Objective]) -> None:  # noqa: B027
+        """Raise ValueError if the settings do not suit these objectives. Called before any work, as soon as they are known."""
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""

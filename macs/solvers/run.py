@@ -187,7 +187,7 @@ class SearchRun:
             tolerance=self.evaluator.tolerance,
             stopped=stopped,
             reproducible=stopped in ENDED and not counts.clocked and not (checkpoint and checkpoint.mixed),
-            **({} if state is None else self.solver.extra_stats(state, self.evaluator.tolerance)),
+            **({} if state is None else self.solver.extra_stats(state, self.evaluator)),
             **({"checkpoint": checkpoint.failure} if checkpoint and checkpoint.failure else {}),
         )
 

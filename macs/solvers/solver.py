@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Objective, Variable
+from problems.compiled import CompiledProblem, Variable
 from problems.problem import DEFAULT_EVALUATIONS, Problem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
@@ -128,6 +128,7 @@ class Solver(SearchMethod):
         check_verify(verify)
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
+        self.check_goals(compiled.goals)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
         with Interrupts(time_limit) as interrupts:
@@ -249,23 +250,21 @@ class Solver(SearchMethod):
         box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
         if box.m_known is not None:
             self.check_objectives(box.m_known)
+            self.check_goals(box.goals)
         sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
         variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
 
         about = self.about()
 
-        def goals() -> tuple[Objective, ...]:
-            return tuple(Objective(*words) for words in zip(box.names, box.units, box.senses, strict=True))
-
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
             if state is None:  # the function itself asked whether to end
-                return Front.of(no_points(() if box.m_known is None else goals(), None, about, stats))
-            return Front.of(black_box_points(state.archive, state.closest, goals(), variables, about, stats))
+                return Front.of(no_points(() if box.m_known is None else box.goals, None, about, stats))
+            return Front.of(black_box_points(state.archive, state.closest, box.goals, variables, about, stats))
 
         run = SearchRun(
             self,
             box,
-            goals=goals,
+            goals=lambda: box.goals,
             make_front=make_front,
             budget=evaluations,
             seed=seed,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import density, inner, methods, peers, population, search, standard, study
+from . import density, inner, methods, peers, population, prefer, search, standard, study
 from .measured import Row, save
 
 BENCHMARKS = {
@@ -16,6 +16,7 @@ BENCHMARKS = {
     "methods": methods,
     "peers": peers,
     "population": population,
+    "prefer": prefer,
     "search": search,
     "standard": standard,
     "study": study,
@@ -54,6 +55,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
+        "prefer": lambda: prefer.bench_prefer(rows, QUICK_SEEDS if quick else SEEDS, quick),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
         "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),
         "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),

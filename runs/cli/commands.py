@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -52,7 +53,7 @@ def solve(arguments: Namespace) -> int:
     with wrong_call_on_value_error():
         scheme = None if arguments.transcription is None else transcription.parse(arguments.transcription)
     mesh = choose(arguments.mesh, MESHES, "kind of mesh") if arguments.mesh else None
-    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on)
+    solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, arguments.prefer)
     verify = None if arguments.verify == UNSIMULATED else arguments.verify or problem.default_verify
     inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
     start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
@@ -156,8 +157,9 @@ def bench(arguments: Namespace) -> int:
 # Arguments
 
 
-def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None) -> Solver:
-    """A solver by its name in lower case, `plain` without derivatives, with one of `MESHES`, or polished on another transcription."""
+def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None, prefer: str | None = None) -> Solver:
+    """A solver by its name in lower case, `plain` without derivatives, with one of `MESHES`, polished on another transcription, or guided
+    by the preference in a file."""
     with wrong_call_on_value_error():
         solver = solver_class(name)
         known = inspect.signature(solver).parameters
@@ -167,8 +169,23 @@ def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_
             raise WrongCall(f"--mesh {mesh} does not apply to solver '{name}', which does not change meshes")
         if polish_on and "polish_on" not in known:
             raise WrongCall(f"--polish-on {polish_on} does not apply to solver '{name}', which does not polish")
-        given = {"refine": False if plain else None, "mesh": mesh, "polish_on": polish_on}
+        if prefer and "prefer" not in known:
+            raise WrongCall(f"--prefer {prefer} does not apply to solver '{name}', which no preference guides")
+        given = {"refine": False if plain else None, "mesh": mesh, "polish_on": polish_on, "prefer": prefer and read_preference(prefer)}
         return solver(**{setting: value for setting, value in given.items() if value is not None})
+
+
+def read_preference(path: str) -> dict[str, Any]:
+    """What a JSON file says of a preference; see `macs.decisions.to_dict`."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise WrongCall(f"--prefer {path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise WrongCall(f"--prefer {path} is no JSON: {' '.join(str(error).split())}") from None
+    if not isinstance(found, dict):
+        raise WrongCall(f'--prefer {path} must have a preference, such as {{"method": "WeightedSum", "settings": {{"weights": ...}}}}')
+    return found
 
 
 def choose(word: str, known: Iterable[str], kind: str) -> str:

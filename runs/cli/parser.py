@@ -42,6 +42,7 @@ inner       how fast, how reliable and how near to the candidate the inner level
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
+prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
@@ -191,6 +192,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
         metavar="T",
         help="polish the front on this transcription by gradients in the end, so that its points are feasible when simulated",
     )
+    solve.add_argument("--prefer", metavar="FILE.json", help="a preference that guides the search: {method: ..., settings: {...}}")
     solve.add_argument(
         "--verify", metavar="T", type=_verify, help="what simulated points may miss, in scales, or none: no simulation (default: 0.001)"
     )

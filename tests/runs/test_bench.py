@@ -19,7 +19,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, density, inner, methods, population, search, standard, study
+from runs.bench import command, density, inner, methods, population, prefer, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -62,6 +62,7 @@ def small(monkeypatch):
     monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
     monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
+    monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
@@ -123,6 +124,18 @@ def test_searches_for_the_same_time_and_points(small):
     assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
     assert all(t > 0.9 * o for o, t in zip(ours.values["seconds"], theirs.values["seconds"], strict=True))
     assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
+
+
+def test_a_guided_search_beside_an_even_one():
+    rows: list[Row] = []
+    prefer.bench_prefer(rows, (1, 2), True, (replace(prefer.CASES[0], evaluations=3000),))
+    even, guided = rows
+    assert (even.who, guided.who) == (prefer.EVEN, prefer.GUIDED) and even.case == guided.case == "zdt1"
+    assert even.values["evaluations"] == guided.values["evaluations"] == [3000.0, 3000.0]
+    np.testing.assert_allclose(np.array(guided.values["missing"]) / even.values["missing"], guided.values["ratio"])
+    assert max(guided.values["ratio"]) < prefer.ASKED and guided.of("inside") > 4 * even.of("inside")
+    assert f"measured {guided.spread('ratio')}, met" in prefer.report(rows)
+    assert all(len(line) <= 150 for line in prefer.report(rows).splitlines())
 
 
 def test_intervals_by_density_beside_equal_ones():
@@ -221,7 +234,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
+    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "PREFERENCES", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
     places = [said.out.index(words) for words in (*titles, f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
@@ -229,7 +242,17 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert "inner levels: " in said.err and "searches: goddard" in said.err
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {"density", "inner", "methods", "peers", "population", "search", "standard", "study"}
+    assert {row["benchmark"] for row in table} == {
+        "density",
+        "inner",
+        "methods",
+        "peers",
+        "population",
+        "prefer",
+        "search",
+        "standard",
+        "study",
+    }
     assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
     assert all(np.isfinite(float(row["value"])) for row in table)
 
@@ -264,7 +287,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "density, inner, methods, peers, population, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "density, inner, methods, peers, population, prefer, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

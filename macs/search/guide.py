@@ -1,0 +1,90 @@
+"""Guide of a search by a preference: how densely points are wanted along the front."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..evaluation.evaluator import Evaluator
+from ..pareto.archive import Guide
+from ..preferences.catalogue import METHODS, to_dict
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges
+from .region import PART, Region
+
+OUTSIDE = 0.005
+"""Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""
+FADING = 0.1
+"""Around the region, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
+WIDEST = 1e30
+"""Ranges that contain whatever a preference may name."""
+
+
+@dataclass(frozen=True)
+class PreferenceGuide:
+    """The guide that a preference is; see `pareto.archive.Guide`.
+
+    Points are wanted in the region of interest, see `Region`, and sparsely elsewhere. The ranges of the objectives are those of the front
+    at hand; their ends, and the best point, are kept. As long as they do not contain what the preference names, such as a target, points
+    are wanted evenly.
+    """
+
+    preference: Preference
+    goals: tuple[Objective, ...]
+
+    def factors(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Factors (k,) at points (k, m) on a front (n, m), both minimised; even where the preference says nothing yet."""
+        try:
+            region = self._region(front)
+        except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
+            return np.ones(len(points))
+        beyond = np.maximum(region.away(points * self._signs) / PART - 1.0, 0.0)
+        return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
+
+    def anchors(self, front: np.ndarray) -> np.ndarray:
+        """The row of the best value, then those of the worst values of each objective: without these the ranges would be others."""
+        worst = front.argmax(axis=0)
+        try:
+            away = self._region(front).away(front * self._signs)
+        except ValueError:  # as above
+            return worst
+        return np.append(away.argmin(), worst)
+
+    def objection(self, front: np.ndarray) -> str:
+        """Why the preference says nothing on a front (n, m), minimised; empty if it does."""
+        try:
+            self._region(front)
+        except ValueError as error:
+            return str(error)
+        return ""
+
+    def _region(self, front: np.ndarray) -> Region:
+        return Region.of(self.preference, self.goals, front * self._signs)
+
+    @property
+    def _signs(self) -> np.ndarray:
+        return np.array([goal.sign for goal in self.goals])
+
+
+def guide_of(preference: Preference | None, evaluator: Evaluator) -> Guide | None:
+    """The guide of a search; None without a preference."""
+    return None if preference is None else PreferenceGuide(preference, evaluator.goals)
+
+
+def written(preference: Preference) -> Any:
+    """A preference as plain data, for files; that of a class of the user's own as its text."""
+    return to_dict(preference) if type(preference) in METHODS.values() else repr(preference)
+
+
+def check_preference(preference: Preference, goals: Sequence[Objective]) -> None:
+    """Raise ValueError, of one line, for a preference that is not one of these objectives: another problem's, or a wrong sense."""
+    ends = {goal.name: goal.sign * WIDEST for goal in goals}
+    try:
+        preference.stages(goals, Ranges({name: -end for name, end in ends.items()}, ends))
+    except ValueError as error:
+        raise ValueError(f"MACS: prefer: {error}") from error
