@@ -18,16 +18,20 @@ from ..preferences import (
     Stage,
     Value,
     WeightedSum,
+    from_dict,
+    to_dict,
 )
 from .choice import Choice, Step
 from .decide import decide
 from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
+from .solver import Decide
 from .trade_offs import TradeOffs, trade_offs
 
 __all__ = [
     "Around",
     "Choice",
+    "Decide",
     "FuzzyGoal",
     "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",
@@ -47,8 +51,10 @@ __all__ = [
     "Value",
     "WeightedSum",
     "decide",
+    "from_dict",
     "front_rates",
     "plot_rates",
     "satisfy",
+    "to_dict",
     "trade_offs",
 ]

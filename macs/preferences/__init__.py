@@ -1,5 +1,6 @@
 """What a person wants of the objectives: preferences that rank points, and that gradient solves minimise."""
 
+from .catalogue import from_dict, to_dict
 from .fuzzy_goal import FuzzyGoal
 from .fuzzy_satisfactory import FuzzySatisfactory
 from .goal_programming import GoalProgramming
@@ -31,4 +32,6 @@ __all__ = [
     "Stage",
     "Value",
     "WeightedSum",
+    "from_dict",
+    "to_dict",
 ]
