@@ -14,7 +14,7 @@ from transcription.base import Transcription
 
 from ..front import Front
 from ..fronts.points import Points
-from ..fronts.provenance import more_costs
+from ..fronts.provenance import more_costs, versions
 from ..gradient_solvers import GradientSolver
 from ..gradient_tools import AUTO, Terms, sweep
 from ..gradients.multistart import MOST_ITERATIONS
@@ -33,7 +33,8 @@ class Decide(GradientSolver):
     """Choices by one or several preferences, a point for each, in their order: `macs.decisions.decide` as a solver.
 
     Its front has every choice, those that are dominated included. `stats["choices"]` has, for each, its label, preference, degrees, values,
-    steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice begins at those before it, too.
+    steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice is never worse than those
+    before it, by its own preference.
 
     Parameters
     ----------
@@ -112,12 +113,10 @@ class Decide(GradientSolver):
                 return before.take([]).replace(message=f"{before.stats['stopped']} before the first choice")
             if limit is not None and (limit := limit - before.stats["wall_time"]) <= 0.0:
                 return before.take([]).replace(message="time limit before the first choice")
-        asked = Terms(
-            known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"]
-        )
+        asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
         desk = Desk(problem, transcription, None if self.ranges is None else _ranges(self.ranges), asked)
         found = desk.work(lambda: _choices(desk, preferences))
-        stats = desk.stats()
+        stats = {"versions": versions(), **desk.stats()}
         if before is not None:
             stats = more_costs(before.stats, desk.solves.counts, stats["wall_time"], stats.get("stopped", ""))
         if terms["verify"] is not None:
