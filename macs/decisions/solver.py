@@ -23,6 +23,7 @@ from .choice import Choice
 from .decide import check_statement
 from .desk import Desk
 from .satisfy import satisfied
+from .stages import SAME
 
 KEYS = ("method", "settings", "vary", "loop")
 """Of a choice as plain data."""
@@ -33,8 +34,8 @@ class Decide(GradientSolver):
     """Choices by one or several preferences, a point for each, in their order: `macs.decisions.decide` as a solver.
 
     Its front has every choice, those that are dominated included. `stats["choices"]` has, for each, its label, preference, degrees, values,
-    steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice is never worse than those
-    before it, by its own preference.
+    steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice is never worse than another
+    of the run, by its own preference: where a later one is better, it is made again from there.
 
     Parameters
     ----------
@@ -133,12 +134,24 @@ def _choices(desk: Desk, preferences: list[tuple[str, Preference, bool]]) -> lis
     found: list[tuple[str, Choice]] = []
     for label, preference, loop in preferences:
         if desk.stopped and found:
+            return found
+        found.append((label, _chosen(desk, preference, loop)))
+    # Later choices may have found better points for earlier ones, of which solves are local.
+    for k, (label, preference, loop) in enumerate(preferences):
+        if desk.stopped:
             break
-        desk.history = []
-        choice = satisfied(desk, preference) if loop and isinstance(preference, FuzzySatisfactory) else desk.decided(preference)
-        desk.known = Points.concatenate([desk.known, choice.point.alone()])
-        found.append((label, choice))
+        best = preference.rank(desk.known, desk.ranges)
+        if not loop and best.values[best.order[0]] < found[k][1].value - SAME * max(abs(found[k][1].value), 1.0):
+            found[k] = (label, _chosen(desk, preference, loop))
     return found
+
+
+def _chosen(desk: Desk, preference: Preference, loop: bool) -> Choice:
+    """A choice, of which the point is known from now on."""
+    desk.history = []
+    choice = satisfied(desk, preference) if loop and isinstance(preference, FuzzySatisfactory) else desk.decided(preference)
+    desk.known = Points.concatenate([desk.known, choice.point.alone()])
+    return choice
 
 
 def _about(label: str, choice: Choice) -> dict[str, Any]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 DECIDES = "Decide"
 """The solver that chooses, by the name that cells record."""
-SIDE_BY_SIDE = 6
+SIDE_BY_SIDE = 5
 """Most flights of one figure, and most choices of one figure of degrees."""
 LEAST = 3
 """Choices with different lambda that make a line."""
@@ -116,7 +116,7 @@ def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str
                 for one, step in steps
             ],
             f"{comparison.name}: steps of the choices that took several.",
-            ["What a step found, before it was compared with points that were known."],
+            ["Objectives are what the solve of a step found; kappa is that of the best point known by then, which may be another."],
         )
     return found
 
@@ -142,7 +142,8 @@ def lambda_figures(every: Sequence[Chosen]) -> list[Figure]:
         if isinstance(one.preference, FuzzySatisfactory) and not one.preference.ordered:
             goals, preference = one.point.goals, one.preference
             kappa = preference.kappa(goals, one.ranges, one.objectives[None])
-            by_order.setdefault(preference.priorities, {})[preference.regulating] = np.concatenate([one.degrees(), kappa])
+            line = by_order.setdefault(preference.priorities, {})
+            line.setdefault(preference.regulating, np.concatenate([one.degrees(), kappa]))
     found = []
     for priorities, values in by_order.items():
         if len(values) < LEAST:
@@ -167,7 +168,10 @@ def degrees_figure(every: Sequence[Chosen], by: Preference | None = None) -> Fig
     with style():
         figure = new_figure(PAGE, 3.0)
         degrees = {one.label: one.degrees(by, every[0].ranges) for one in every}
-        draw_degrees(degrees, goals, by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
+        ax = draw_degrees(degrees, goals, by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
+        if (beside := ax.get_legend()) is not None:
+            beside.remove()  # its columns do not know how long names are
+        legend(figure, ax, None)
     return figure
 
 

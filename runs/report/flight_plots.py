@@ -86,7 +86,7 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
                     if (law := beside[column]) is not None and name in law:
                         ax.plot(law["time"], law[name], color="black", lw=0.9, ls=dashes, zorder=3)
                 ax.margins(x=0.0)
-            title = _title(names[column] if names else f"point {column + 1}", point, round(75 / len(points)) + 10)
+            title = _title(names[column] if names else f"point {column + 1}", point, min(round(75 / len(points)) + 10, 110 // len(points)))
             grid[0, column].set_title(title, loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
             # A long label on one line would run into those above and below.
@@ -165,7 +165,7 @@ def _flights(points: Sequence[Point], laws: Laws) -> list[Trajectory]:
 
 def _title(name: str, point: Point, width: int) -> str:
     """The point's name and objectives, in lines of at most `width` characters."""
-    values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
+    values = {name: f"{value:.5g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
     lines = [f"{goal.name} {values[goal.name]} {goal.unit}".rstrip() for goal in point.goals]
     return "\n".join(part for line in [name, *lines] for part in wrap(line, width))
 
