@@ -369,7 +369,7 @@ class Degrees(Published, tag="degrees", kw_only=True):
         if self.preference is not None:
             with errors_begin_with("by"):
                 none = dict.fromkeys(names, 0.0)
-                self.preference.degrees(problem.goals, Ranges(none, none), np.zeros((1, len(names))))
+                self.preference.stages(problem.goals, Ranges(none, none))
 
     @property
     def preference(self) -> Preference | None:
