@@ -25,13 +25,11 @@ from .choice import Choice, Step
 from .decide import decide
 from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
-from .solver import Decide
 from .trade_offs import TradeOffs, trade_offs
 
 __all__ = [
     "Around",
     "Choice",
-    "Decide",
     "FuzzyGoal",
     "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",

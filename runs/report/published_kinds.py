@@ -400,7 +400,7 @@ class Degrees(Published, tag="degrees", kw_only=True):
         known |= {row[STATISTIC]: self.theirs(row) for row in self.rows}
         found = []
         for weight, key in zip(self.regulating, self._more[1:], strict=True):
-            values = {name: float(figures[key]) for name, figures in known.items() if isinstance(figures.get(key), float)}
+            values = {name: value for name, figures in known.items() if isinstance(value := figures.get(key), float)}
             least = min(values, key=lambda name: values[name])
             found.append(f"With lambda = {weight:g}, eq. (53) is least, of the paper's rows and ends, at '{least}': {values[least]:.4g}.")
         return found

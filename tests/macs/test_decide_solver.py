@@ -7,7 +7,8 @@ import pytest
 from rest_to_rest import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, cart, effort, ends
 
 from macs import Front
-from macs.decisions import Decide, FuzzyGoal, FuzzySatisfactory, WeightedSum
+from macs.decision_solver import Decide
+from macs.decisions import FuzzyGoal, FuzzySatisfactory, WeightedSum
 from macs.gradient_solvers import Payoff
 from macs.solvers.catalogue import solver
 

@@ -12,18 +12,18 @@ from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Transcription
 
-from ..front import Front
-from ..fronts.points import Points
-from ..fronts.provenance import more_costs, versions
-from ..gradient_solvers import GradientSolver
-from ..gradient_tools import AUTO, Terms, sweep
-from ..gradients.multistart import MOST_ITERATIONS
-from ..preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
-from .choice import Choice
-from .decide import check_statement
-from .desk import Desk
-from .satisfy import satisfied
-from .stages import SAME
+from .decisions.choice import Choice
+from .decisions.decide import check_statement
+from .decisions.desk import Desk
+from .decisions.satisfy import satisfied
+from .decisions.stages import SAME
+from .front import Front
+from .fronts.points import Points
+from .fronts.provenance import more_costs, versions
+from .gradient_solvers import GradientSolver
+from .gradient_tools import AUTO, Terms, sweep
+from .gradients.multistart import MOST_ITERATIONS
+from .preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
 
 KEYS = ("method", "settings", "vary", "loop")
 """Of a choice as plain data."""
