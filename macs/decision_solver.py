@@ -104,6 +104,8 @@ class Decide(GradientSolver):
         preferences = list(self.preferences())
         known, limit = terms["start"], terms["time_limit"]
         check_statement(problem, transcription, preferences[0][1], known)
+        for _, preference, _ in preferences:
+            preference.check(problem.compile().goals)
         before: Points | None = None
         if self.known is not None:
             known = Front.load(self.known, problem=problem)

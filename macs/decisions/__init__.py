@@ -23,6 +23,7 @@ from ..preferences import (
 )
 from .choice import Choice, Step
 from .decide import decide
+from .dialogue import Dialogue, Turn
 from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
 from .trade_offs import TradeOffs, trade_offs
@@ -30,6 +31,7 @@ from .trade_offs import TradeOffs, trade_offs
 __all__ = [
     "Around",
     "Choice",
+    "Dialogue",
     "FuzzyGoal",
     "FuzzyPhysicalProgramming",
     "FuzzySatisfactory",
@@ -46,6 +48,7 @@ __all__ = [
     "Stage",
     "Step",
     "TradeOffs",
+    "Turn",
     "Value",
     "WeightedSum",
     "decide",

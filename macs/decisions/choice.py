@@ -14,6 +14,8 @@ from problems.compiled import Objective
 from ..fronts.point import Point
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
+from ..preferences.ranges import confidence
+from ..preferences.stage import ordering
 from .trade_offs import TradeOffs, trade_offs
 
 
@@ -75,20 +77,28 @@ class Choice:
     ranges: Ranges
     message: str = ""
 
+    @classmethod
+    def of(cls, point: Point, preference: Preference, ranges: Ranges, message: str = "") -> Choice:
+        """A point that is known, judged by a preference."""
+        J = np.array([[*point.objectives.values()]])
+        found = ordering(preference.stages(point.goals, ranges), J, confidence(point.alone()))
+        degrees = dict(zip(point.objectives, preference.degrees(point.goals, ranges, J)[0].tolist(), strict=True))
+        return cls(point, tuple(np.nan_to_num(found.values[0], posinf=np.inf).tolist()), degrees, (), preference, ranges, message)
+
     @property
     def value(self) -> float:
         """The value of the preference, of its first stage if there are several."""
         return self.values[0]
 
-    @cached_property
-    def trade_offs(self) -> TradeOffs | None:
-        """What more of one objective would cost the others; None for a single objective, and for a point without a trajectory."""
-        return trade_offs(self.point) if len(self.point.goals) > 1 and self.point.trajectory is not None else None
-
     @property
     def objectives(self) -> dict[str, float]:
         """Objectives of the point by name, in the user's units and senses."""
         return self.point.objectives
+
+    @cached_property
+    def trade_offs(self) -> TradeOffs:
+        """What more of one objective would cost the others; see `trade_offs`, which says for which points there are none."""
+        return trade_offs(self.point)
 
     @property
     def stats(self) -> dict[str, Any]:
@@ -107,7 +117,7 @@ class Choice:
             [f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in goals],
             [f"{value:.6g}" for value in chosen.values()],
             *ends,
-            [_shown(self.degrees[goal.name]) for goal in goals],
+            [degree_text(self.degrees[goal.name]) for goal in goals],
         ]
         titles = ["objective", "", "chosen", "best", "worst", "degree"]
         lines = [repr(self.preference), "", text_table([titles], list(zip(*columns, strict=True)), [True, True, *[False] * 4])]
@@ -125,7 +135,7 @@ class Choice:
                 f"{step.value:.6g}",
                 *(f"{step.about[name]:.6g}" if name in step.about else "-" for name in about),
                 *(f"{step.objectives[goal.name]:.6g}" for goal in goals),
-                *(_shown(step.degrees[goal.name]) for goal in goals),
+                *(degree_text(step.degrees[goal.name]) for goal in goals),
             ]
             for step in self.history
         ]
@@ -133,5 +143,6 @@ class Choice:
         return [text_table([titles, units], rows, [True, True, *[False] * (len(titles) - 2)]), *said] if rows else []
 
 
-def _shown(degree: float) -> str:
+def degree_text(degree: float) -> str:
+    """A degree as text; "-" for an objective that does not enter."""
     return "-" if np.isnan(degree) else f"{degree + 0.0:.3f}"

@@ -73,6 +73,7 @@ def decide(
     assert not isinstance(transcription, Preference) and preference is not None
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     desk = Desk(problem, transcription, ranges, terms)
+    preference.check(desk.problem.goals)
     return desk.work(lambda: desk.decided(preference))
 
 

@@ -21,15 +21,16 @@ from ..fronts.builders import OPTIMAL, certified, nearest_violation, vectors_poi
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
-from ..fronts.verified import VERIFY, objective_scales, unmarked, verified
+from ..fronts.verified import VERIFY, objective_scales, verified
 from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
-from ..preferences.stage import SLACK
+from ..preferences.ranges import confidence
+from ..preferences.stage import SLACK, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
-from .judging import Merit, excess_stage, meets, stage_values, unmet, with_all_limits
+from .judging import excess_stage, meets, unmet, with_all_limits
 from .stages import SAME, Kept, Known, Outcome, StageSolver
 
 BEST = 3
@@ -93,8 +94,7 @@ class Desk:
             if self._given is not None:
                 self.ranges = self._given
             else:
-                # Without an end that its mesh makes a little too good, a payoff table would have no range.
-                self.ranges = Ranges.of(unmarked(self.known) if self._start is None else self.known)
+                self.ranges = Ranges.of(self.known)
             best, worst = self.ranges.ends(self.problem.goals)
             self._solver = StageSolver(self.problem, best, worst, self.solves, np.random.default_rng(self._seed))
             return task()
@@ -144,18 +144,24 @@ class Desk:
             found, message = None, f"{reason}: no stage was solved to its end"
             if not candidates:
                 self._end(str(reason))
-        points = [*([] if found is None else [found]), *candidates]
-        chosen = min(points, key=Merit(stages, points))
-        said = [message]
-        if chosen is not found and not message:
+        points: list[Point] = [*([] if found is None else [found]), *candidates]
+        order = ordering(
+            stages,
+            np.array([list(point.objectives.values()) for point in points]),
+            np.concatenate([confidence(point.alone()) for point in points]),
+            same=SAME,
+        )
+        chosen = points[order.order[0]]
+        said, is_new = [message], chosen is found
+        if not is_new and not message:
             said.append("no better point was found than the best that was known")
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
-        if chosen is found and not message and (chosen.optimality or 0.0) > OPTIMAL:
+        if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
             said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
-        values = stage_values(stages, J)[0].tolist()
+        values = np.nan_to_num(order.values[order.order[0]], posinf=np.inf).tolist()
         return Choice(chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message=message)
 
     def _degrees(self, preference: Preference, J: np.ndarray) -> dict[str, float]:

@@ -75,13 +75,14 @@ def satisfy(
     assert not isinstance(transcription, FuzzySatisfactory)
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     desk = Desk(problem, transcription, ranges, terms)
+    preference.check(desk.problem.goals)
     return desk.work(lambda: satisfied(desk, preference))
 
 
 def satisfied(desk: Desk, preference: FuzzySatisfactory) -> Choice:
     """The last choice of the loop."""
     goals, found = desk.problem.goals, list[Point]()
-    for weight in _raised(preference.regulating, len(_names(preference))):
+    for weight in _raised(preference.regulating, len(preference.names)):
         trial = replace(preference, regulating=weight)
         choice = desk.decided(trial, {"lambda": weight}, found)
         kappa = _kappa(trial, goals, desk, choice)
@@ -106,10 +107,6 @@ def _raised(first: float, m: int) -> Sequence[float]:
     for _ in range(STEPS if weights[-1] < most else 0):
         weights.append(weights[-1] + NEARER * (most - weights[-1]))
     return weights
-
-
-def _names(preference: FuzzySatisfactory) -> list[str]:
-    return [name for level in preference.priorities for name in ([level] if isinstance(level, str) else level)]
 
 
 def _kappa(preference: FuzzySatisfactory, goals: Sequence[Objective], desk: Desk, choice: Choice) -> float:

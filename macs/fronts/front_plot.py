@@ -14,7 +14,7 @@ from problems.compiled import Objective
 from ..evaluation.evaluator import CONVERGED
 from ..io.atomic import write_whole
 from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
-from .point import Point
+from .points import Points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,17 +26,17 @@ NOT_VERIFIED, NOT_FEASIBLE = "not verified", "not feasible"
 """Words of the legend."""
 
 
-def save_picture(what: Points | Point, path: str | PathLike[str]) -> None:
-    """Draw a front, or the trajectory of a point, into a file; the suffix gives the format."""
+def save_picture(what: Any, path: str | PathLike[str]) -> None:
+    """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
     figure = blank_figure()
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        if isinstance(what, Point):
-            what.plot(figure)
-        else:
+        if isinstance(what, Points):
             figure.set_size_inches(*_size(what))
             draw_front(what, figure.add_subplot())
+        else:
+            what.plot(figure=figure)
     suffix = Path(path).suffix.lstrip(".").lower()
     picture = io.BytesIO()
     figure.savefig(picture, format=suffix, dpi=200)

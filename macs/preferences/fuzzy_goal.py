@@ -61,6 +61,10 @@ class FuzzyGoal(Preference):
 
     __repr__ = short_repr
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.targets)
+
     def _aims(self, goals: Sequence[Objective], ranges: Ranges | None) -> dict[str, Aim]:
         return aims(self.targets, goals, needed(ranges, self), self.tolerances, to_worst=True)
 

@@ -12,7 +12,7 @@ import numpy as np
 from problems.checks import check_interval, short_repr
 from problems.compiled import Objective
 
-from .checks import levels, places
+from .checks import levels
 from .preference import Preference, needed
 from .ranges import Ranges
 from .stage import Operand, Stage
@@ -53,7 +53,7 @@ class FuzzySatisfactory(Preference):
     DEGREE: ClassVar[str] = "membership"
 
     def __post_init__(self) -> None:
-        targets = named_targets(self.targets) if self.targets else {}
+        targets = {} if self.targets == {} else named_targets(self.targets)
         given = levels(self.priorities)
         if len(given) < 2:
             raise ValueError("priorities must have at least two levels: what is most important, and what is less")
@@ -68,11 +68,15 @@ class FuzzySatisfactory(Preference):
 
     __repr__ = short_repr
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(name for level in levels(self.priorities) for name in level)
+
     def _aims(self, goals: Sequence[Objective], ranges: Ranges | None) -> dict[str, Aim]:
-        spans, names = needed(ranges, self), [name for level in levels(self.priorities) for name in level]
-        places(names, goals)
+        spans = needed(ranges, self)
+        self.check(goals)
         spans.ends(goals)
-        return aims({name: self.targets.get(name, spans.best[name]) for name in names}, goals, spans, to_worst=True)
+        return aims({name: self.targets.get(name, spans.best[name]) for name in self.names}, goals, spans, to_worst=True)
 
     def _pairs(self) -> list[tuple[str, str]]:
         """All goals s of one level and r of the next."""

@@ -69,6 +69,10 @@ class GoalProgramming(Preference):
 
     __repr__ = short_repr
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.targets)
+
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         spans = needed(ranges, self)
         found = aims(self.targets, goals, spans)

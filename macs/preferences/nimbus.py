@@ -16,7 +16,7 @@ from .checks import named_numbers, names_of, places, shown
 from .preference import Preference, needed
 from .ranges import Ranges
 from .reference_point import AUGMENTATION
-from .stage import Operand, Stage
+from .stage import SLACK, Operand, Stage
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,6 +46,10 @@ class Nimbus(Preference):
         Objectives that may change as they will.
     augmentation : float
         See `ReferencePoint`.
+    enough : bool
+        Whether the values of `to` are enough. By default better ones still count. If they are enough, the largest excess over them is
+        minimised, at least 0; where all are reached, the largest loss of the others is minimised, counted from their current values.
+        `improve` has to be empty.
     """
 
     current: Mapping[str, float]
@@ -55,6 +59,7 @@ class Nimbus(Preference):
     until: Mapping[str, float] | None = None
     free: Sequence[str] = ()
     augmentation: float = AUGMENTATION
+    enough: bool = False
 
     DEGREE: ClassVar[str] = "part of what was asked for"
 
@@ -66,11 +71,14 @@ class Nimbus(Preference):
             object.__setattr__(self, name, names_of(getattr(self, name), name))
         for name in ("to", "until"):
             found = getattr(self, name)
-            object.__setattr__(self, name, named_numbers(found, f"'{name}'") if found else {})
+            object.__setattr__(self, name, {} if found is None or found == {} else named_numbers(found, f"'{name}'"))
         check_interval("augmentation", self.augmentation, "[0, 1]")
-        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
-        for name in classes:
-            if classes.count(name) > 1:
+        if not isinstance(self.enough, bool):
+            raise ValueError(f"enough must be True or False, not {self.enough!r}")
+        if self.enough and self.improve:
+            raise ValueError("values of `to` cannot be enough while others are to `improve` as much as possible")
+        for name in self.names:
+            if self.names.count(name) > 1:
                 raise ValueError(f"'{name}' is in two classes of Nimbus")
         if not self.improve and not self._to:
             raise ValueError("Nimbus needs an objective that is to become better, in `improve` or `to`")
@@ -80,6 +88,10 @@ class Nimbus(Preference):
     __repr__ = short_repr
 
     @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.improve, *self._to, *self.keep, *self._until, *self.free)
+
+    @property
     def _to(self) -> Mapping[str, float]:
         return self.to or {}
 
@@ -87,23 +99,28 @@ class Nimbus(Preference):
     def _until(self) -> Mapping[str, float]:
         return self.until or {}
 
-    def _check(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
-        """The ranges, if each objective is in a class whose values make sense."""
-        spans, known = needed(ranges, self), {goal.name: goal for goal in goals}
-        classes = [*self.improve, *self._to, *self.keep, *self._until, *self.free]
-        places([*self.current, *classes], goals)
-        for name, goal in known.items():
+    def check(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError if an objective is in no class, one that is none is in a class, or the values of a class make no sense."""
+        places([*self.current, *self.names], goals)
+        for goal in goals:
+            name = goal.name
             if name not in self.current:
                 raise ValueError(f"the current point of Nimbus has no '{name}'")
-            if name not in classes:
+            if name not in self.names:
                 raise ValueError(f"'{name}' is in no class of Nimbus: improve, to, keep, until or free")
             now = shown(self.current[name], goal)
-            if name in self._to:
-                spans.check(self._to[name], goal, "the value in `to`")
-                if goal.sign * (self._to[name] - self.current[name]) >= 0:
-                    raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
+            if name in self._to and goal.sign * (self._to[name] - self.current[name]) >= 0:
+                raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
             if name in self._until and goal.sign * (self._until[name] - self.current[name]) < 0:
                 raise ValueError(f"'{name}' may become worse until {shown(self._until[name], goal)}, which is better than {now}")
+
+    def _checked(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
+        """The ranges, if each objective is in a class whose values make sense, and what is asked for lies in them."""
+        spans = needed(ranges, self)
+        self.check(goals)
+        for goal in goals:
+            if goal.name in self._to:
+                spans.check(self._to[goal.name], goal, "the value in `to`")
         return spans
 
     def _limits(self, goals: Sequence[Objective]) -> dict[int, float]:
@@ -113,16 +130,16 @@ class Nimbus(Preference):
         return {found[name]: value for name, value in values.items()}
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
-        spans = self._check(goals, ranges)
+        spans = self._checked(goals, ranges)
         slopes = [goal.sign / span for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True)]
         limited, asked = self._limits(goals), {**{name: spans.best[name] for name in self.improve}, **self._to}
-        found = places(asked, goals)
+        found = places(self.current, goals)
 
         def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
             return peaks[0] + self.augmentation * sum(spans.normalised(goals, J))
 
-        def groups(J: Sequence[Operand]) -> list[list[Operand]]:
-            return [[slopes[found[name]] * (J[found[name]] - target) for name, target in asked.items()]]
+        def excesses(J: Sequence[Operand], values: Mapping[str, float]) -> list[Operand]:
+            return [slopes[found[name]] * (J[found[name]] - target) for name, target in values.items()]
 
         def limits(J: Sequence[Operand]) -> list[Operand]:
             return [slopes[place] * (J[place] - limit) for place, limit in limited.items()]
@@ -131,11 +148,17 @@ class Nimbus(Preference):
             f"{goals[place].name} {'at most' if goals[place].sign > 0 else 'at least'} {shown(limit, goals[place])}"
             for place, limit in limited.items()
         ]
-        return (Stage("achievement", value, groups, limits, tuple(words)),)
+        if not self.enough:
+            return (Stage("achievement", value, lambda J: [excesses(J, asked)], limits, tuple(words)),)
+        others = {name: now for name, now in self.current.items() if name not in asked}
+        return (
+            Stage("missing", lambda J, peaks: peaks[0], lambda J: [[0.0, *excesses(J, asked)]], limits, tuple(words)),
+            Stage("loss of others", value, lambda J: [excesses(J, others)], after_zero=True),
+        )
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
-        spans, J = self._check(goals, ranges), np.asarray(objectives, dtype=float)
-        result = np.full(J.shape, np.nan)
+        spans, J = self._checked(goals, ranges), np.asarray(objectives, dtype=float)
+        result, widths = np.full(J.shape, np.nan), spans.spans(goals)
         for place, limit in self._limits(goals).items():
             goal = goals[place]
             asked = self._to.get(goal.name, spans.best[goal.name])
@@ -144,5 +167,5 @@ class Nimbus(Preference):
                 done = goal.sign * (self.current[goal.name] - J[:, place])
                 result[:, place] = np.clip(done / way, 0.0, 1.0) if way > 0 else 1.0
             else:
-                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= 1e-9 * abs(limit), 1.0, 0.0)
+                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= SLACK * widths[place], 1.0, 0.0)
         return result

@@ -12,6 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
+from .checks import places
 from .ranges import Ranges
 from .ranking import Ranking, ranked
 from .stage import Stage
@@ -38,6 +39,20 @@ class Preference(ABC):
     def title(self) -> str:
         """The name of the method, for figures."""
         return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+
+    @property
+    def words(self) -> str:
+        """The name of the method, and the objectives that it speaks of."""
+        return f"{self.title} of {', '.join(self.names)}"
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the objectives that it speaks of."""
+
+    def check(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError for what can be told to be wrong without ranges: names that are none of these goals'."""
+        places(self.names, goals)
 
     @abstractmethod
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
@@ -107,7 +122,7 @@ class Preference(ABC):
                 raise ValueError(f"'{name}' is a point of another problem: its objectives are {', '.join(point.objectives)}")
         J = np.array([[*point.objectives.values()] for point in points.values()])
         found = dict(zip(points, self.degrees(goals, ranges, J), strict=True))
-        return draw_degrees(found, goals, self.DEGREE, self.MARKS, self.SMALLER, ax=ax)
+        return draw_degrees(found, [goal.name for goal in goals], self.DEGREE, self.MARKS, self.SMALLER, ax=ax)
 
     def plot_functions(self, front: Any, ranges: Ranges | None = None, best: int | None = None, figure: Any = None) -> np.ndarray:
         """Axes, one for each objective, with what the preference makes of it, and the points of a front on it.

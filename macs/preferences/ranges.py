@@ -15,6 +15,11 @@ from ..fronts.points import Points
 from ..pareto.dominance import nondominated
 from .checks import ROUNDING, named_numbers, places, shown
 
+PAYOFF = "payoff"
+"""The solver of a payoff table."""
+TWO = 2
+"""Points without which there is no range."""
+
 
 @dataclass(frozen=True)
 class Ranges:
@@ -41,7 +46,8 @@ class Ranges:
     def of(cls, front: Points) -> Ranges:
         """The ranges of a front, or of a payoff table: the best and the worst values over its feasible, non-dominated points.
 
-        Points that a simulation did not confirm do not count, unless there are no others.
+        Points that a simulation did not confirm do not count, but for two cases. A payoff table keeps all its ends: without one of them it
+        has no ranges. And where fewer than two confirmed points are left, all feasible points count.
 
         Raises
         ------
@@ -51,12 +57,18 @@ class Ranges:
         if not isinstance(front, Points):
             raise ValueError(f"ranges are those of a front or a payoff table, not of {front!r}")
         feasible, confirmed = usable(front)
+        kept = feasible if front.solver.get("name") == PAYOFF else confirmed
         if not feasible.any():
             raise ValueError(f"the front has no feasible point, so that it has no ranges{f': {front.message}' if front.message else ''}")
-        F = front.F[confirmed if confirmed.any() else feasible]
-        F = F[nondominated(F)]
+        F = front.F[kept][nondominated(front.F[kept])]
+        if len(F) < TWO:
+            F = front.F[feasible][nondominated(front.F[feasible])]
         best, worst = (F.min(axis=0) * front.signs + 0.0, F.max(axis=0) * front.signs + 0.0)
         return cls(dict(zip(front.names, best.tolist(), strict=True)), dict(zip(front.names, worst.tolist(), strict=True)))
+
+    def to_dict(self) -> dict[str, dict[str, float]]:
+        """As plain data: `Ranges(**data)` makes them again."""
+        return {"best": dict(self.best), "worst": dict(self.worst)}
 
     def ends(self, goals: Sequence[Objective]) -> tuple[np.ndarray, np.ndarray]:
         """The best and the worst values (m,) of these goals.
@@ -95,6 +107,12 @@ class Ranges:
         if low < high and not low - slack <= value <= high + slack:
             best, worst = shown(self.best[goal.name], goal), shown(self.worst[goal.name], goal)
             raise ValueError(f"{what} of '{goal.name}', {shown(value, goal)}, lies beyond its range: best {best}, worst {worst}")
+
+
+def confidence(front: Points) -> np.ndarray:
+    """How far each point (n,) is to be believed: 0 feasible, and no simulation contradicts it; 1 feasible; 2 neither."""
+    feasible, confirmed = usable(front)
+    return np.where(confirmed, 0, np.where(feasible, 1, 2))
 
 
 def usable(front: Points) -> tuple[np.ndarray, np.ndarray]:

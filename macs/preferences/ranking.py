@@ -12,8 +12,8 @@ import numpy as np
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import counted, numbers, text_table
-from .ranges import Ranges, usable
-from .stage import ATTAINED, SLACK, Stage
+from .ranges import Ranges, confidence, usable
+from .stage import SLACK, Stage, ordering
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,34 +120,23 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
     """The points of a front in the order of a preference; see `Preference.rank`."""
     if not isinstance(front, Points):
         raise ValueError(f"a front is ranked, not {front!r}")
-    feasible, confirmed = usable(front)
-    if not feasible.any():
+    if not usable(front)[0].any():
         raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
     ranges = Ranges.of(front) if ranges is None else ranges
     stages: Sequence[Stage] = preference.stages(front.goals, ranges)
-    J = front.objectives
-    columns: list[np.ndarray] = []
-    for stage in stages:
-        found = stage.numbers(J)
-        follows = columns[-1] <= ATTAINED if columns and stage.after_zero else np.ones(len(J), dtype=bool)
-        columns.append(np.where(follows, found, np.nan))
-    excess = np.max([stage.excess(J) for stage in stages], axis=0)
-    excess = np.where(excess <= SLACK, 0.0, excess)
-    kind = np.where(confirmed, 0, np.where(feasible, 1, 2))
+    J, kind = front.objectives, confidence(front)
     with np.errstate(invalid="ignore"):
         tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)
-        # What stages before the last attain is kept, but for rounding.
-        rounded = [np.round(column / ATTAINED) for column in columns[:-1]]
-    keys = [tie, columns[-1], *rounded[::-1], excess, kind]
-    order = np.lexsort([np.where(np.isnan(key), 0.0, key) for key in keys])
+    found = ordering(stages, J, kind, tie)
+    best = found.order[0]
     return Ranking(
         front,
         preference,
         ranges,
-        np.stack(columns, axis=1),
+        found.values,
         preference.degrees(front.goals, ranges, J),
-        order,
-        _message(stages, J[feasible], excess[order[0]] > 0.0, kind[order[0]] > 0),
+        found.order,
+        _message(stages, J[kind < 2], found.excess[best] > 0.0, kind[best] > 0),
         tuple(stage.name for stage in stages),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from problems.checks import check_interval, short_repr
 from problems.compiled import Objective
 
-from .checks import named_numbers, places, shown
+from .checks import named_numbers, shown
 from .preference import Preference, needed
 from .ranges import Ranges
 from .stage import Operand, Stage
@@ -53,11 +53,15 @@ class ReferencePoint(Preference):
 
     __repr__ = short_repr
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*self.aspiration, *(self.reservation or {})]))
+
     def _lines(self, goals: Sequence[Objective], ranges: Ranges | None) -> list[tuple[float, float]]:
         """The slope of a_i and its aspiration, for each goal."""
         spans, lines = needed(ranges, self), []
         reservation = self.reservation or {}
-        places([*self.aspiration, *reservation], goals)
+        self.check(goals)
         for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True):
             name, hoped = goal.name, self.aspiration.get(goal.name, spans.best[goal.name])
             spans.check(hoped, goal, "the aspiration")

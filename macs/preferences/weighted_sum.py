@@ -40,6 +40,10 @@ class WeightedSum(Preference):
 
     __repr__ = short_repr
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.weights)
+
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         found, spans = places(self.weights, goals), needed(ranges, self)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import traceback
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -24,18 +23,17 @@ from macs.search.settings import MESHES
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
 from macs.solvers.start import STARTS
-from problems import Problem
 from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from transcription.inner import NAMED
 
 from ..batch import file as studyfile
-from . import study_commands
+from . import decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
+from .inputs import check_is_front, check_picture, load_problem
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
-PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
 
 
 def list_all(arguments: Namespace) -> int:
@@ -100,16 +98,6 @@ def solve(arguments: Namespace) -> int:
     return DONE if len(front) else FAILED
 
 
-def check_is_front(path: Path) -> None:
-    """Raise `WrongCall` if a file exists that is no front: it would be overwritten."""
-    if not path.is_file() or not path.stat().st_size:
-        return
-    with path.open("rb") as file:
-        known = file.read(4) == b"\x89HDF"
-    if not known:
-        raise WrongCall(f"--out {path} would overwrite a file that is no front")
-
-
 def show(arguments: Namespace) -> int:
     """A saved front, or one of its points."""
     check_picture(arguments.plot)
@@ -168,25 +156,6 @@ def bench(arguments: Namespace) -> int:
 # Arguments
 
 
-def load_problem(address: str, **data: Any) -> Problem:
-    """A problem by name or address; an error in the user's own file is one line."""
-    try:
-        problem = problems.load(address, **data)
-        problem.compile()
-    except ValueError as error:
-        raise WrongCall(str(error)) from error
-    except (Exception, SystemExit) as error:
-        raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}{_place(error, address)}") from error
-    return problem
-
-
-def _place(error: BaseException, address: str) -> str:
-    """The line of the user's file in which an error arose; "" if there is none."""
-    path = Path(address.rpartition(":")[0]).resolve()
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == path]
-    return f" (line {lines[-1]} of {path.name})" if lines else ""
-
-
 def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None) -> Solver:
     """A solver by its name in lower case, `plain` without derivatives, with one of `MESHES`, or polished on another transcription."""
     with wrong_call_on_value_error():
@@ -223,15 +192,6 @@ def free_name(problem: str) -> Path:
     stem = "".join(c if c.isalnum() or c in "-_." else "_" for c in problem).strip(".") or "front"
     names = (Path(f"{stem}{f'-{i}' if i > 1 else ''}.nc") for i in range(1, 10**6))
     return next(name for name in names if not name.exists())
-
-
-def check_picture(path: str | None) -> None:
-    """Refuse a picture that could not be written, before any work."""
-    if path:
-        check_target(path)
-        suffix = Path(path).suffix.lower().lstrip(".")
-        if suffix not in PICTURES:
-            raise WrongCall(f"cannot draw '{path}': a picture is one of .{', .'.join(PICTURES[:5])}")
 
 
 # Output
@@ -307,4 +267,12 @@ def verification_table(front: Front, checks: Sequence[Check]) -> str:
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 
 
-COMMANDS = {"list": list_all, "solve": solve, "show": show, "verify": verify, "study": study_commands.study, "bench": bench}
+COMMANDS = {
+    "list": list_all,
+    "solve": solve,
+    "show": show,
+    "verify": verify,
+    "decide": decide_command.decide,
+    "study": study_commands.study,
+    "bench": bench,
+}

@@ -26,6 +26,7 @@ examples:
   macs solve my_problem.py:build --transcription dfet:8x3 --evaluations 20000 --seed 1 --out front.nc --plot front.png
   macs show front.nc --point 3 --plot flight.png
   macs verify front.nc --problem my_problem.py:build
+  macs decide front.nc
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
   macs bench inner --quick
@@ -49,6 +50,14 @@ Targets are printed beside the measured values. The exit code is 0 whether they 
 machine proves little; but it is 1 where methods find different optima, both verified. Ctrl-C prints the values measured so far.
 MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner benchmark and that of populations show
 both."""
+
+
+DECIDE = """\
+With the problem of the front at hand, points are found by gradients; otherwise the points of the front are ranked, and the answer says so.
+Problems of `macs list` are at hand; others need --problem or --trust. With --out, --json or --plot nothing is asked, in a terminal neither.
+Values may have their unit: --reference "flight time=150 s".
+
+exit codes: 0 chosen; 1 what was chosen exceeds a hard limit, or is not feasible, or not verified; 2 the call was wrong"""
 
 
 STUDY = """\
@@ -148,6 +157,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_solve(commands)
     _add_show(commands)
     _add_verify(commands)
+    _add_decide(commands)
     _add_study(commands)
     _add_bench(commands)
     return parser
@@ -204,6 +214,26 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="what simulated points may miss (default: 0.001)")
+
+
+def _add_decide(commands: argparse._SubParsersAction[Parser]) -> None:
+    decide = _add(commands, "decide", "choose from a saved front, step by step; in a terminal by commands, else by these options")
+    decide.formatter_class = argparse.RawDescriptionHelpFormatter
+    decide.epilog = DECIDE
+    decide.add_argument("front", metavar="FRONT.nc", help="a front, or a dialogue that --json wrote, which goes on")
+    decide.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
+    decide.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
+    decide.add_argument("--rank-only", action="store_true", help="rank the points that there are; solve nothing")
+    decide.add_argument("--transcription", metavar="T", help=TRANSCRIPTION.replace("the problem's own", "a mesh that is found"))
+    decide.add_argument("--reference", metavar="NAME=VALUE", action="append", help="come as near as can be to this value; again for others")
+    decide.add_argument("--prefer", metavar="FILE.json", help="a preference, as `to_dict` of macs.decisions makes it")
+    decide.add_argument("--improve", metavar="NAME", help="then make this objective better than it is")
+    decide.add_argument("--to", metavar="VALUE", help="this much (default: as much as can be)")
+    decide.add_argument("--giving", metavar="OTHER=LIMIT", action="append", help="others may become worse until this; again for others")
+    decide.add_argument("--alternatives", metavar="K", type=_positive, help="other choices about the one that is made")
+    decide.add_argument("--out", metavar="CHOICE.nc", help="save the chosen point as a front")
+    decide.add_argument("--json", metavar="CHOICE.json", help="save the choice, and all that led to it: `macs decide CHOICE.json` goes on")
+    decide.add_argument("--plot", metavar="FILE.png", help="draw the history: degrees and objectives, turn by turn")
 
 
 def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:

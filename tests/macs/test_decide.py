@@ -94,6 +94,24 @@ def test_every_method_finds_its_optimum(preference: Preference, T: float, values
     assert choice.point.optimality < 1e-6 and choice.point.verified and choice.point.status == "converged"
 
 
+def test_values_that_are_enough_are_reached_and_no_more() -> None:
+    enough = Nimbus(NOW, to={"effort": 8.0}, free=["time"], enough=True)
+    choice = decide(cart(), MESH, enough, ranges=RANGES, start=ends())
+    T = in_time(8)
+    # The second stage may use up what the first may be exceeded by, 1e-7.
+    assert choice.message == "" and choice.values == pytest.approx((0.0, (T - NOW["time"]) / WIDE_T + 1e-4 * sum(both(T))), abs=3e-7)
+    assert choice.objectives["time"] == pytest.approx(T, rel=3e-6) and choice.point.verified and choice.point.optimality < 1e-6
+    assert enough.rank(dense(), RANGES).best.objectives["time"] == pytest.approx(T, abs=2.1e-4)
+    # Out of reach: as near as can be.
+    near = Nimbus(NOW, to={"effort": 8.0}, until={"time": 1.1}, enough=True)
+    choice = decide(cart(), MESH, near, ranges=RANGES, start=ends())
+    assert choice.objectives["time"] == pytest.approx(1.1, rel=1e-5) and choice.values[0] == pytest.approx(
+        (effort(1.1) - 8) / WIDE_E, rel=1e-4
+    )
+    # Limits that are met but for rounding are met.
+    assert choice.degrees["time"] == 1.0
+
+
 EFFORTS, TIMES = Smaller(5, 10, 15, 25, 50), Smaller(0.6, 0.8, 1.0, 1.3, 2.0)
 RANGED = Range(2, 5, 8, 10, 12, 14, 16, 20, 30, 40)
 PHYSICAL = [

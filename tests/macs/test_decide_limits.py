@@ -10,7 +10,17 @@ from rest_to_rest import MESH, RANGES, cart, ends
 from smooth_problems import two_wells
 
 from macs import MACS
-from macs.decisions import Nimbus, Ranges, ReferencePoint, WeightedSum, decide, satisfy
+from macs.decisions import (
+    FuzzySatisfactory,
+    Nimbus,
+    PhysicalProgramming,
+    Ranges,
+    ReferencePoint,
+    Smaller,
+    WeightedSum,
+    decide,
+    satisfy,
+)
 
 TIME = WeightedSum({"time": 1.0})
 
@@ -80,3 +90,23 @@ def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
     choice = decide(problem, MESH, WeightedSum({"from left": 1.0}), ranges=Ranges(*both))
     assert choice.point.status != "converged" and choice.history[0].status != "converged"
     assert "the nearest violates constraint 'beyond'" in choice.message
+
+
+@pytest.mark.parametrize(
+    ("call", "preference"),
+    [
+        (decide, WeightedSum({"tyme": 1.0})),
+        (decide, PhysicalProgramming({"tyme": Smaller(1, 2, 3, 4, 5)})),
+        (decide, Nimbus({"effort": 10.0, "time": 1.0}, improve=["tyme"], free=["effort"])),
+        (decide, ReferencePoint({"time": 1.0}, {"tyme": 2.0})),
+        (satisfy, FuzzySatisfactory({}, ["effort", "tyme"])),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_names_are_checked_before_any_work(monkeypatch: pytest.MonkeyPatch, call, preference) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("a payoff table was begun")
+
+    monkeypatch.setattr("macs.decisions.desk.payoff", never)
+    with pytest.raises(ValueError, match="unknown objective 'tyme'"):
+        call(cart(), MESH, preference)

@@ -57,7 +57,7 @@ one_class = (
 @st.composite
 def goal_programming(draw: Any) -> GoalProgramming:
     targets = draw(named(number | st.builds(Around, number)))
-    weights = draw(st.none() | st.fixed_dictionaries({one: positive for one in targets}))
+    weights = draw(st.none() | st.fixed_dictionaries(dict.fromkeys(targets, positive)))
     priorities = draw(st.none() | st.permutations([*targets]).map(lambda found: [tuple(found[:1]), *found[1:]]))
     return GoalProgramming(targets, weights, priorities)
 
@@ -66,7 +66,7 @@ def goal_programming(draw: Any) -> GoalProgramming:
 def fuzzy_goal(draw: Any) -> FuzzyGoal:
     targets = draw(named(target))
     plain = [one for one, value in targets.items() if not isinstance(value, Around)]
-    tolerances = draw(st.fixed_dictionaries({one: positive for one in plain})) if plain else None
+    tolerances = draw(st.fixed_dictionaries(dict.fromkeys(plain, positive))) if plain else None
     return FuzzyGoal(targets, tolerances, draw(st.sampled_from(["min", "sum"])))
 
 
@@ -84,13 +84,13 @@ def nimbus(draw: Any) -> Nimbus:
     now = {one: draw(number) for one in names}
     if draw(st.booleans()):
         return Nimbus(now, improve=names[:1], keep=names[1:2], until={names[2]: draw(number)}, free=names[3:])
-    return Nimbus(now, to={names[0]: draw(number)}, free=names[1:], augmentation=draw(st.floats(0, 1)))
+    return Nimbus(now, to={names[0]: draw(number)}, free=names[1:], augmentation=draw(st.floats(0, 1)), enough=draw(st.booleans()))
 
 
 @st.composite
 def fuzzy_physical(draw: Any) -> FuzzyPhysicalProgramming:
     classes = draw(named(one_class))
-    spread = draw(positive | st.fixed_dictionaries({one: positive for one in classes}))
+    spread = draw(positive | st.fixed_dictionaries(dict.fromkeys(classes, positive)))
     return FuzzyPhysicalProgramming(classes, draw(st.floats(1.01, 9)), spread=spread, printed=draw(st.booleans()))
 
 

@@ -65,6 +65,8 @@ NOW = {"time": 2.0, "effort": 1.5}
         (lambda: Nimbus(NOW, improve=["time"], keep=["effort"]), "an objective that may become worse"),
         (lambda: Nimbus(NOW, improve=["time"], free=["time", "effort"]), "'time' is in two classes"),
         (lambda: Nimbus(NOW, improve="time", free=["effort"]), "improve must be a list of names"),
+        (lambda: Nimbus(NOW, improve=["time"], free=["effort"], enough=True), "values of `to` cannot be enough while others"),
+        (lambda: Nimbus(NOW, to={"time": 1.5}, free=["effort"], enough=1), "enough must be True or False"),
         (lambda: Smaller(1, 2, 3, 4), "Smaller needs 5 boundaries"),
         (lambda: Smaller(1, 2, 3, 3, 4), "the boundaries of Smaller must increase"),
         (lambda: Larger(1, 2, 3, 4, 5), "the boundaries of Larger must decrease"),

@@ -25,9 +25,11 @@ from macs.decisions import (
     Ranges,
     ReferencePoint,
     Smaller,
+    Stage,
     Value,
     WeightedSum,
 )
+from macs.preferences.stage import ordering
 from problems.compiled import Objective
 
 EQUAL = WeightedSum({"time": 1.0, "height": 1.0})
@@ -217,3 +219,30 @@ def test_degrees_of_choices_are_of_one_problem():
         EQUAL.plot_degrees({"one": flights(2)[0], "other": black_box(2)[0]}, Ranges.of(flights(2)))
     with pytest.raises(ValueError, match="choices must be a dict of points by name"):
         EQUAL.plot_degrees([flights(2)[0]])
+
+
+def test_a_payoff_table_keeps_ends_that_are_not_verified():
+    ends = [[1.0, 5.0], [3.0, 1.0]]
+    goals = [Objective("a"), Objective("b")]
+    whole = Ranges({"a": 1.0, "b": 1.0}, {"a": 3.0, "b": 5.0})
+    table = marked(plain_front(np.array(ends), goals, solver={"name": "payoff"}), [True, False])
+    assert Ranges.of(table) == whole
+    # Of another front, too, one point alone would be no range.
+    assert Ranges.of(marked(plain_front(np.array(ends), goals), [True, False])) == whole
+    three = marked(plain_front(np.array([*ends, [2.0, 2.0]]), goals), [True, True, False])
+    assert Ranges.of(three) == Ranges({"a": 1.0, "b": 2.0}, {"a": 2.0, "b": 5.0})
+    assert Ranges.of(three.replace(solver={"name": "payoff"})) == whole
+
+
+def test_values_that_are_as_good_as_the_best_are_told_apart_by_the_next_stage():
+    J = np.array([[1.0, 3.0], [1.0 + 5e-7, 2.0], [1.0 + 9e-7, 1.0], [1.0 + 2e-6, 0.0], [0.0, 9.0]])
+    stages = (Stage("first", lambda J, peaks: J[0]), Stage("second", lambda J, peaks: J[1]))
+    kind = np.array([0, 0, 0, 0, 1])
+    assert list(ordering(stages, J, kind, same=1e-6).order) == [2, 1, 0, 3, 4]
+    assert list(ordering(stages, J, kind, same=1e-9).order) == [0, 1, 2, 3, 4]
+    # The last stage tells all differences; where there is none, points keep their places, or the tie decides.
+    one = stages[:1]
+    assert list(ordering(one, J[[1, 0, 1]], np.zeros(3), same=1.0).order) == [1, 0, 2]
+    assert list(ordering(one, J[[1, 0, 1]], np.zeros(3), np.array([2.0, 0.0, 1.0])).order) == [1, 2, 0]
+    limited = (Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1] - 2.0], limit_names=("b at most 2",)),)
+    assert list(ordering(limited, J, kind).order) == [1, 2, 3, 0, 4]

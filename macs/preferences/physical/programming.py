@@ -76,6 +76,14 @@ class PhysicalProgramming(Preference):
         """What is averaged, by name."""
         return dict(self.functions)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.classes)
+
+    def check(self, goals: Sequence[Objective]) -> None:
+        """Raise ValueError for names that are none of these goals', and classes that go the other way."""
+        self._places(goals)
+
     def _places(self, goals: Sequence[Objective]) -> dict[str, int]:
         found = places(self.classes, goals)
         for name, place in found.items():

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from problems.compiled import Objective
-
 from ...fronts.pictures.style import COLORS, GREY, STYLE, new_figure
 from .bands import shade_degrees
 
@@ -18,20 +16,21 @@ if TYPE_CHECKING:
 
 def draw_degrees(
     degrees: Mapping[str, np.ndarray],
-    goals: Sequence[Objective],
+    groups: Sequence[str],
     label: str,
     levels: Sequence[tuple[float, str]],
     smaller: bool,
     title: str = "",
     ax: Axes | None = None,
 ) -> Axes:
-    """Axes with a group of bars for each objective, one bar for each choice.
+    """Axes with groups of bars, usually one for each objective, with one bar for each choice.
 
     Parameters
     ----------
     degrees : dict
-        Degrees (m,) by name of the choice; NaN for an objective that does not enter.
-    goals : m Objectives
+        Degrees (m,) by name of the choice, which the legend shows; NaN for an objective that does not enter.
+    groups : m texts
+        Below the groups.
     label : str
         Of the vertical axis.
     levels : sequence of (degree, word)
@@ -46,7 +45,7 @@ def draw_degrees(
 
     values = np.array([*degrees.values()], dtype=float)
     shown = ~np.isnan(values).all(axis=0)
-    values, names = values[:, shown], [goal.name for goal, one in zip(goals, shown, strict=True) if one]
+    values, names = values[:, shown], [name for name, one in zip(groups, shown, strict=True) if one]
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if ax is None:
             ax = new_figure(max(4.6, 1.2 + 0.45 * values.size), 3.4).add_subplot()
@@ -59,7 +58,9 @@ def draw_degrees(
             ax.bar(places, row, 0.9 * width, color=color, label=name, zorder=3, hatch="" if k < len(COLORS) else "//")
             for x, degree in zip(places, row, strict=True):
                 if np.isfinite(degree):
-                    ax.annotate(f"{degree + 0.0:.2f}", (x, max(degree, 0.0)), (0, 2), textcoords="offset points", ha="center", fontsize=7)
+                    ax.annotate(
+                        f"{round(degree, 2) + 0.0:.2f}", (x, max(degree, 0.0)), (0, 2), textcoords="offset points", ha="center", fontsize=7
+                    )
         ax.set_xticks(range(len(names)), names)
         ax.tick_params(axis="x", length=0)
         ax.set_ylabel(label)
