@@ -168,7 +168,7 @@ def degrees_figure(every: Sequence[Chosen], by: Preference | None = None) -> Fig
     with style():
         figure = new_figure(PAGE, 3.0)
         degrees = {one.label: one.degrees(by, every[0].ranges) for one in every}
-        ax = draw_degrees(degrees, goals, by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
+        ax = draw_degrees(degrees, [goal.name for goal in goals], by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
         if (beside := ax.get_legend()) is not None:
             beside.remove()  # its columns do not know how long names are
         legend(figure, ax, None)
