@@ -93,11 +93,6 @@ class Choice:
         """The value of the preference, of its first stage if there are several."""
         return self.values[0]
 
-    @cached_property
-    def trade_offs(self) -> TradeOffs | None:
-        """What more of one objective would cost the others; None for a single objective, and for a point without a trajectory."""
-        return trade_offs(self.point) if len(self.point.goals) > 1 and self.point.trajectory is not None else None
-
     @property
     def objectives(self) -> dict[str, float]:
         """Objectives of the point by name, in the user's units and senses."""

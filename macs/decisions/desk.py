@@ -283,14 +283,15 @@ class Desk:
             outcome.nlp,
             outcome.z[None],
             {"name": "decide", "settings": {"starts": self._terms.starts}},
-            self._stats(),
+            self.stats(),
             status=[outcome.status],
             notes=[outcome.note],
             **certified(outcome.nlp, outcome.z[None], scales),
         )
         return verified(points, self._terms.verify, scales)[0]
 
-    def _stats(self) -> dict[str, Any]:
+    def stats(self) -> dict[str, Any]:
+        """Costs so far, those of the payoff table included; the seed, and more, as of a front."""
         counts, elapsed, stopped = self.solves.counts, time.perf_counter() - self._began, self._reason()
         if self._costs:
             return more_costs(self._costs, counts, elapsed - self._costs["wall_time"], stopped)

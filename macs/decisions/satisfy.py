@@ -76,10 +76,10 @@ def satisfy(
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     desk = Desk(problem, transcription, ranges, terms)
     preference.check(desk.problem.goals)
-    return desk.work(lambda: _satisfied(desk, preference))
+    return desk.work(lambda: satisfied(desk, preference))
 
 
-def _satisfied(desk: Desk, preference: FuzzySatisfactory) -> Choice:
+def satisfied(desk: Desk, preference: FuzzySatisfactory) -> Choice:
     """The last choice of the loop."""
     goals, found = desk.problem.goals, list[Point]()
     for weight in _raised(preference.regulating, len(preference.names)):

@@ -17,6 +17,7 @@ SOLVERS: dict[str, str] = {
     "moead": "macs.baselines.moead:MOEAD",
     "mopso": "macs.baselines.mopso:MOPSO",
     "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
+    "decide": "macs.decision_solver:Decide",
     "optimum": "macs.gradient_solvers:Optimum",
     "payoff": "macs.gradient_solvers:Payoff",
     "sweep": "macs.gradient_solvers:Sweep",

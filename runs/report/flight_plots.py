@@ -50,7 +50,7 @@ def representatives(front: Front, count: int = 4) -> list[int]:
     return sorted(good[spread(normalised(F, F)[0], count)].tolist())
 
 
-def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({}), solver: str = "") -> Figure:
+def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({}), solver: str = "", names: Sequence[str] = ()) -> Figure:
     """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
 
     Parameters
@@ -61,6 +61,8 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
         Flights to draw beside each point, dashed; quantities that a flight does not have are left out.
     solver : str
         For the legend.
+    names : sequence of str
+        Of the points, in place of their numbers.
 
     Raises
     ------
@@ -84,7 +86,8 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
                     if (law := beside[column]) is not None and name in law:
                         ax.plot(law["time"], law[name], color="black", lw=0.9, ls=dashes, zorder=3)
                 ax.margins(x=0.0)
-            grid[0, column].set_title(_title(column + 1, point, round(75 / len(points)) + 10), loc="left", fontsize=6.5)
+            title = _title(names[column] if names else f"point {column + 1}", point, min(round(75 / len(points)) + 10, 110 // len(points)))
+            grid[0, column].set_title(title, loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
             # A long label on one line would run into those above and below.
             ax.set_ylabel(fill(label(name, units.get(name, "")), LABEL, break_long_words=False, break_on_hyphens=False))
@@ -160,11 +163,11 @@ def _flights(points: Sequence[Point], laws: Laws) -> list[Trajectory]:
     return flights
 
 
-def _title(number: int, point: Point, width: int) -> str:
-    """The point's number and objectives, in lines of at most `width` characters."""
-    values = {name: f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
+def _title(name: str, point: Point, width: int) -> str:
+    """The point's name and objectives, in lines of at most `width` characters."""
+    values = {name: f"{value:.5g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
     lines = [f"{goal.name} {values[goal.name]} {goal.unit}".rstrip() for goal in point.goals]
-    return "\n".join(part for line in [f"point {number}", *lines] for part in wrap(line, width))
+    return "\n".join(part for line in [name, *lines] for part in wrap(line, width))
 
 
 def _legend(figure: Any, flight: Any, laws: Sequence[str], solver: str) -> None:

@@ -80,7 +80,7 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
         if not here:
             continue
         seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
-        rows += [[problem, row["by"], None, *_cells(row, keys, None)] for row in theirs]
+        rows += [[problem, row["by"], None, *_cells(paper.theirs(row), keys, None)] for row in theirs]
         seen = set[tuple[str, str]]()
         for comparison in here:
             for solver, figures in paper.ours(comparison).items():
@@ -98,7 +98,7 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
         return None
     heads: list[Column | str] = [Column("problem", grouped=True)]
     heads += [Column(name, grouped=paper.statistics) for name in ("by", "runs")]
-    heads += [STATISTIC] if paper.statistics else []
+    heads += [paper.statistic_head] if paper.statistics else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
 
+from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
 from problems.checks import unknown
+from problems.compiled import Objective
 
 from ..data.schema import Number, Section, Text, check_known, errors_begin_with, is_number
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
 from ..measures.simulation_record import Ends as FinalStates
 from ..measures.statistics import summarise
+from .choices import chosen
 from .comparison import Comparison
 from .run_measures import samples, spent
 from .tables import Cell, Column
@@ -69,7 +73,12 @@ class Published(Section, tag_field="of", kw_only=True):
     differs: Text = ""
 
     statistics: ClassVar[bool] = False
+    statistic_head: ClassVar[str] = STATISTIC
     population: ClassVar[bool] = False
+
+    def theirs(self, row: Mapping[str, Any]) -> Figures:
+        """The figures of a row of the paper."""
+        return row
 
     @property
     def columns(self) -> Mapping[str, Column] | None:
@@ -310,7 +319,104 @@ class PayoffTable(Published, tag="payoff"):
             raise ValueError(f"{STATISTIC} must be '{BEST}' and the name of an objective, not {given!r}")
 
 
-KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable
+class Degrees(Published, tag="degrees", kw_only=True):
+    """How well each choice of solvers that decide satisfies each objective. The `statistic` of a row names the choice; its figures are the
+    degrees by name of objectives.
+
+    Attributes
+    ----------
+    by : dict, optional
+        The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
+    regulating : tuple of float
+        Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
+        are in order of priority.
+    """
+
+    by: dict[str, Any] | None = None
+    regulating: tuple[Number, ...] = ()
+
+    statistics: ClassVar[bool] = True
+    statistic_head: ClassVar[str] = "choice"
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        found = {name: Column(name, "degree", digits=4) for name in self._names}
+        return found | {key: Column(key, digits=4) for key in self._more}
+
+    def theirs(self, row: Mapping[str, Any]) -> Figures:
+        degrees = [row.get(name) for name in self._names]
+        if not self.regulating or None in degrees:
+            return row
+        return {**row, **self._satisfactory(np.array(degrees, dtype=float))}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for one in chosen(comparison):
+            degrees = one.degrees(self.preference)
+            named = dict(zip((goal.name for goal in one.point.goals), degrees.tolist(), strict=True))
+            more = self._satisfactory(np.array([named[name] for name in self._names])) if self.regulating else {}
+            mark = "" if one.point.verified else " (not verified)"
+            rows.setdefault(one.solver, []).append({STATISTIC: one.label + mark, **named, **more})
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        by = "the preference that chose" if self.preference is None else repr(self.preference)
+        return f"degrees of ours by {by}.{''.join(f' {one}' for one in self._optima())}"
+
+    def check_problem(self, problem: CompiledProblem) -> None:
+        names = [goal.name for goal in problem.goals]
+        check_known("objective", self._names, names)
+        if self.preference is not None:
+            with errors_begin_with("by"):
+                none = dict.fromkeys(names, 0.0)
+                self.preference.stages(problem.goals, Ranges(none, none))
+
+    @property
+    def preference(self) -> Preference | None:
+        """The preference by which all choices are measured."""
+        return None if self.by is None else from_dict(self.by)
+
+    @property
+    def _names(self) -> list[str]:
+        """Names of the objectives."""
+        return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
+
+    @property
+    def _more(self) -> list[str]:
+        return ["kappa", *(f"(53) at {weight:g}" for weight in self.regulating)] if self.regulating else []
+
+    def _satisfactory(self, degrees: np.ndarray) -> Figures:
+        """kappa and eq. (53), for each lambda, at memberships (m,)."""
+        goals = [Objective(name, "", "maximize") for name in self._names]
+        ranges = Ranges(dict.fromkeys(self._names, 1.0), dict.fromkeys(self._names, 0.0))
+        goal = FuzzySatisfactory({}, self._names)
+        values = [replace(goal, regulating=weight).stages(goals, ranges)[0].numbers(degrees[None])[0] for weight in self.regulating]
+        return dict(zip(self._more, map(float, [goal.kappa(goals, ranges, degrees[None])[0], *values]), strict=True))
+
+    def _optima(self) -> list[str]:
+        """For each lambda, the least value of eq. (53) over the paper's rows and both ends of its front."""
+        ends = np.eye(len(self._names))
+        known = {f"best {name}": self._satisfactory(end) for name, end in zip(self._names, ends, strict=True)} if self.regulating else {}
+        known |= {row[STATISTIC]: self.theirs(row) for row in self.rows}
+        found = []
+        for weight, key in zip(self.regulating, self._more[1:], strict=True):
+            values = {name: value for name, figures in known.items() if isinstance(value := figures.get(key), float)}
+            least = min(values, key=lambda name: values[name])
+            found.append(f"With lambda = {weight:g}, eq. (53) is least, of the paper's rows and ends, at '{least}': {values[least]:.4g}.")
+        return found
+
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or not given:
+            raise ValueError(f"{STATISTIC} must name a choice, not {given!r}")
+
+    def __post_init__(self) -> None:
+        if self.by is not None:
+            with errors_begin_with("by"):
+                from_dict(self.by)
+        super().__post_init__()
+
+
+KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable | Degrees
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:

@@ -24,6 +24,7 @@ from ..data.schema import Flag, Text, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
 from .changed_data import ChangedData, changed_data
+from .choices import choices_figures, choices_tables, only_choices
 from .comparison import Comparison, comparisons
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Flights
@@ -37,8 +38,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FOLDER = "report"
-TABLES: Sequence[Callable[[Comparison, Mapping[str, Any]], dict[str, Table]]] = (claims_tables, indicator_tables, cost_tables)
+TABLES: Sequence[Callable[[Comparison, Mapping[str, Any]], dict[str, Table]]] = (
+    *(claims_tables, choices_tables),
+    *(indicator_tables, cost_tables),
+)
 """The tables of each comparison: (comparison, definition of the study) -> {name of a file: table}. A new table is one more here."""
+OF_FRONTS = (indicator_tables,)
+"""Those left out where solvers choose single points."""
 
 
 class ReportKeys(msgspec.Struct):
@@ -143,7 +149,8 @@ def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
 
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
     """The tables of a comparison as text, written to files with its figures."""
-    tables = {name: one for tables_of in TABLES for name, one in tables_of(comparison, study).items()}
+    kinds = [tables_of for tables_of in TABLES if tables_of not in OF_FRONTS or not only_choices(comparison)]
+    tables = {name: one for tables_of in kinds for name, one in tables_of(comparison, study).items()}
     figures = _figures(comparison) if drawn else {}
     flights = Flights.of(comparison) if study.get("flights", True) else None
     if flights is not None:
@@ -180,11 +187,13 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
     """{name of a file: figure} of a comparison."""
     reference = comparison.against
     name = "truth" if reference.true else "reference"
-    found: dict[str, Figure] = {}
+    found: dict[str, Figure] = choices_figures(comparison)
     if not len(reference.front):
         return found
     if len(comparison.known.goals) > 1:
         found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
+    if only_choices(comparison):
+        return found
     # A failed run attains nothing, as an empty front does.
     nothing = comparison.known[:0]
     runs = {solver: [*fronts, *[nothing] * comparison.failures.get(solver, 0)] for solver, fronts in comparison.fronts.items()}

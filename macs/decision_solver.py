@@ -1,0 +1,216 @@
+"""Decide: choices by preferences as a solver, so that studies and the command line can name it beside searches and gradient tools."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any, ClassVar
+
+from problems.checks import check_count, unknown
+from problems.compiled import CompiledProblem
+from problems.problem import Problem
+from transcription.base import Transcription
+
+from .decisions.choice import Choice
+from .decisions.decide import check_statement
+from .decisions.desk import Desk
+from .decisions.satisfy import satisfied
+from .decisions.stages import SAME
+from .front import Front
+from .fronts.points import Points
+from .fronts.provenance import more_costs, versions
+from .gradient_solvers import GradientSolver
+from .gradient_tools import AUTO, Terms, sweep
+from .gradients.multistart import MOST_ITERATIONS
+from .preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
+
+KEYS = ("method", "settings", "vary", "loop")
+"""Of a choice as plain data."""
+
+
+@dataclass(frozen=True)
+class Decide(GradientSolver):
+    """Choices by one or several preferences, a point for each, in their order: `macs.decisions.decide` as a solver.
+
+    Its front has every choice, those that are dominated included. `stats["choices"]` has, for each, its label, preference, degrees, values,
+    steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice is never worse than another
+    of the run, by its own preference: where a later one is better, it is made again from there.
+
+    Parameters
+    ----------
+    choices : dict
+        By label: a `Preference`, or one as plain data, {"method": ..., "settings": {...}}. As data, it may have two keys more. "vary" has
+        settings that take several values, {setting: [values]}: a choice for each, of which the label names them. "loop": true raises
+        lambda until the order of priority is kept (`satisfy`).
+    starts : int or "auto"
+        Number of starts of each solve; see `decide`.
+    mesh : "fixed"
+    sweep : int
+        Points of a sweep that is made first, whose points are known then; 0: the ends of the front alone.
+    known : str, optional
+        File with a front of the problem, which is known instead.
+    ranges : Ranges or dict, optional
+        By which objectives are normalised, {"best": {...}, "worst": {...}}. Default: those of the points that are known.
+
+    Raises
+    ------
+    ValueError
+        For no choice, a preference that is stated wrongly, and settings out of their ranges.
+    """
+
+    starts: int | str = AUTO  # type: ignore[assignment]
+    choices: Mapping[str, Any] = field(default_factory=dict)
+    sweep: int = 0
+    known: str | None = None
+    ranges: Any = None
+
+    MESH: ClassVar[str] = "fixed"
+
+    def __post_init__(self) -> None:
+        if self.starts != AUTO:
+            check_count("Decide: starts", self.starts, 1)
+        if self.mesh != self.MESH:
+            raise ValueError(f"Decide: mesh must be {self.MESH!r}, not {self.mesh!r}: each choice is a point on the mesh of its solve")
+        if self.sweep != 0:
+            check_count("Decide: sweep", self.sweep, 2)
+        if self.known is not None and (not isinstance(self.known, str) or self.sweep):
+            raise ValueError("Decide: known is the name of a file, and without a sweep")
+        if not isinstance(self.choices, Mapping) or not self.choices:
+            raise ValueError('Decide: choices must be a table of preferences by label, {label: {"method": ..., "settings": ...}}')
+        object.__setattr__(self, "choices", {label: _plain(label, one) for label, one in self.choices.items()})
+        if self.ranges is not None:
+            object.__setattr__(self, "ranges", _data(_ranges(self.ranges)))
+        list(self.preferences())
+
+    def preferences(self) -> Iterator[tuple[str, Preference, bool]]:
+        """Label, preference, and whether it is a loop, of each choice."""
+        for label, one in self.choices.items():
+            varied = one.get("vary", {})
+            for values in product(*varied.values()):
+                own = dict(zip(varied, values, strict=True))
+                name = ", ".join([label, *(f"{setting} {_shown(value)}" for setting, value in own.items())])
+                try:
+                    made = from_dict({"method": one["method"], "settings": {**one.get("settings", {}), **own}})
+                except ValueError as error:
+                    raise ValueError(f"Decide: choice '{name}': {error}") from None
+                loop = one.get("loop", False)
+                if loop and not isinstance(made, FuzzySatisfactory):
+                    raise ValueError(f"Decide: choice '{name}': only FuzzySatisfactory has a loop")
+                yield name, made, loop
+
+    def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
+        """The choices; see the class."""
+        preferences = list(self.preferences())
+        known, limit = terms["start"], terms["time_limit"]
+        check_statement(problem, transcription, preferences[0][1], known)
+        for _, preference, _ in preferences:
+            preference.check(problem.compile().goals)
+        before: Points | None = None
+        if self.known is not None:
+            known = Front.load(self.known, problem=problem)
+        elif self.sweep and known is None:
+            shared = {key: terms[key] for key in ("seed", "tolerance", "verify", "time_limit", "progress")}
+            known = before = sweep(problem, transcription, points=self.sweep, **shared)
+            if "stopped" in before.stats:
+                return before.take([]).replace(message=f"{before.stats['stopped']} before the first choice")
+            if limit is not None and (limit := limit - before.stats["wall_time"]) <= 0.0:
+                return before.take([]).replace(message="time limit before the first choice")
+        asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
+        desk = Desk(problem, transcription, None if self.ranges is None else _ranges(self.ranges), asked)
+        found = desk.work(lambda: _choices(desk, preferences))
+        stats = {"versions": versions(), **desk.stats()}
+        if before is not None:
+            stats = more_costs(before.stats, desk.solves.counts, stats["wall_time"], stats.get("stopped", ""))
+        if terms["verify"] is not None:
+            stats["verify"] = terms["verify"]
+        points = Points.concatenate([choice.point.alone() for _, choice in found])
+        about = [_about(label, choice) for label, choice in found]
+        return Front.of(
+            points.replace(solver=self.about(), stats={**stats, "ranges": _data(desk.ranges), "choices": about}, message=_message(found))
+        )
+
+
+def _choices(desk: Desk, preferences: list[tuple[str, Preference, bool]]) -> list[tuple[str, Choice]]:
+    """The choices by label, those that were made until the work was to end."""
+    found: list[tuple[str, Choice]] = []
+    for label, preference, loop in preferences:
+        if desk.stopped and found:
+            return found
+        found.append((label, _chosen(desk, preference, loop)))
+    # Later choices may have found better points for earlier ones, of which solves are local.
+    for k, (label, preference, loop) in enumerate(preferences):
+        if desk.stopped:
+            break
+        best = preference.rank(desk.known, desk.ranges)
+        if not loop and best.values[best.order[0]] < found[k][1].value - SAME * max(abs(found[k][1].value), 1.0):
+            found[k] = (label, _chosen(desk, preference, loop))
+    return found
+
+
+def _chosen(desk: Desk, preference: Preference, loop: bool) -> Choice:
+    """A choice, of which the point is known from now on."""
+    desk.history = []
+    choice = satisfied(desk, preference) if loop and isinstance(preference, FuzzySatisfactory) else desk.decided(preference)
+    desk.known = Points.concatenate([desk.known, choice.point.alone()])
+    return choice
+
+
+def _about(label: str, choice: Choice) -> dict[str, Any]:
+    """A choice as plain data."""
+    return {
+        "label": label,
+        "preference": to_dict(choice.preference),
+        "degrees": dict(choice.degrees),
+        "values": list(choice.values),
+        "steps": [
+            {
+                "name": step.name,
+                "value": step.value,
+                "objectives": dict(step.objectives),
+                "degrees": dict(step.degrees),
+                "status": step.status,
+                "about": dict(step.about),
+                "message": step.message,
+            }
+            for step in choice.history
+        ],
+        "message": choice.message,
+    }
+
+
+def _message(found: list[tuple[str, Choice]]) -> str:
+    return "; ".join(f"{label}: {choice.message}" for label, choice in found if choice.message)
+
+
+def _plain(label: Any, one: Any) -> dict[str, Any]:
+    """A choice as plain data, with the keys that it has checked."""
+    if isinstance(one, Preference):
+        return to_dict(one)
+    if not isinstance(label, str) or not isinstance(one, Mapping) or "method" not in one:
+        raise ValueError(f"Decide: choice {label!r} must be a preference as a table with its method and settings, not {one!r}")
+    for key in one:
+        if key not in KEYS:
+            raise ValueError(f"Decide: choice '{label}': {unknown('key', key, KEYS)}")
+    varied = one.get("vary", {})
+    if not isinstance(varied, Mapping) or not all(isinstance(values, list | tuple) and values for values in varied.values()):
+        raise ValueError(f"Decide: choice '{label}': vary must be a table with a list of values for each setting, not {varied!r}")
+    if not isinstance(one.get("loop", False), bool):
+        raise ValueError(f"Decide: choice '{label}': loop must be true or false, not {one['loop']!r}")
+    return dict(one)
+
+
+def _ranges(given: Any) -> Ranges:
+    if isinstance(given, Ranges):
+        return given
+    if not isinstance(given, Mapping) or set(given) != {"best", "worst"}:
+        raise ValueError(f"Decide: ranges must be a table with best and worst, not {given!r}")
+    return Ranges(**given)
+
+
+def _data(ranges: Ranges) -> dict[str, dict[str, float]]:
+    return {"best": dict(ranges.best), "worst": dict(ranges.worst)}
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)

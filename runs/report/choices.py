@@ -1,0 +1,208 @@
+"""The choices of runs that decide: what was chosen, how well it satisfies each objective, the steps of loops, and the flights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from macs.fronts.pictures.style import COLORS, label
+from macs.fronts.point import Point
+from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
+from macs.preferences.pictures.degree_plot import draw_degrees
+
+from .comparison import Comparison
+from .flight_plots import flights_figure
+from .style import COLUMN, PAGE, legend, new_figure, style
+from .tables import Cell, Column, Table, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from problems.compiled import Objective
+
+DECIDES = "Decide"
+"""The solver that chooses, by the name that cells record."""
+SIDE_BY_SIDE = 5
+"""Most flights of one figure, and most choices of one figure of degrees."""
+LEAST = 3
+"""Choices with different lambda that make a line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """One choice of a run.
+
+    Attributes
+    ----------
+    solver, label : str
+    point : Point
+    objectives : array (m,)
+        As simulated where the point is verified, else as the transcription has them.
+    preference : Preference
+    ranges : Ranges
+        By which objectives were normalised.
+    steps : sequence of dict
+        Of the solves that led to it, see `macs.decisions.Step`.
+    message : str
+    """
+
+    solver: str
+    label: str
+    point: Point
+    objectives: np.ndarray
+    preference: Preference
+    ranges: Ranges
+    steps: Sequence[Mapping[str, Any]]
+    message: str
+
+    def degrees(self, by: Preference | None = None, ranges: Ranges | None = None) -> np.ndarray:
+        """How well each objective is satisfied (m,), by its own preference or another one."""
+        return (by or self.preference).degrees(self.point.goals, ranges or self.ranges, self.objectives[None])[0]
+
+
+def chosen(comparison: Comparison) -> list[Chosen]:
+    """All choices of a comparison, solver by solver and run by run. Empty where nothing was chosen."""
+    found = []
+    for solver, runs in comparison.runs.items():
+        for run in runs:
+            stats = run.front.stats
+            if "choices" not in stats:
+                continue
+            ranges = Ranges(**stats["ranges"])
+            for point, about in zip(run.front, stats["choices"], strict=True):
+                values = point.simulated if point.verified and point.simulated is not None else point.objectives
+                name = about["label"] if len(runs) == 1 else f"{about['label']} (run {run.number})"
+                made = from_dict(about["preference"])
+                J = np.array(list(values.values()))
+                found.append(Chosen(solver, name, point, J, made, ranges, about["steps"], about["message"]))
+    return found
+
+
+def only_choices(comparison: Comparison) -> bool:
+    """Whether all its solvers choose, so that there are no fronts to compare."""
+    return all(run.cell.details["solver"]["name"] == DECIDES for runs in comparison.runs.values() for run in runs)
+
+
+def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
+    """The choices, and the steps of those that took several. Empty where nothing was chosen."""
+    every = chosen(comparison)
+    if not every:
+        return {}
+    goals = every[0].point.goals
+    heads: list[Column | str] = [Column("solver", grouped=True), "choice", *_objectives(goals), *_degrees(goals), "verified"]
+    rows = [[one.solver, one.label, *one.objectives.tolist(), *_numbers(one.degrees()), _verified(one.point)] for one in every]
+    notes = ["Degrees are those of the preference that chose. " + _measures(every)]
+    notes += [f"{one.solver}, {one.label}: {one.message}." for one in every if one.message]
+    found = {"choices": table(heads, rows, f"{comparison.name}: what was chosen.", notes)}
+    steps = [(one, step) for one in every if len(one.steps) > 1 for step in one.steps]
+    if steps:
+        about = list(dict.fromkeys(name for _, step in steps for name in step["about"]))
+        heads = [Column("solver", grouped=True), Column("choice", grouped=True), "step", *(Column(name, digits=4) for name in about)]
+        heads += [Column("value", digits=5), *_objectives(goals), *_degrees(goals), "status"]
+        found["steps"] = table(
+            heads,
+            [
+                [
+                    *(one.solver, one.label, step["name"]),
+                    *(step["about"].get(name) for name in about),
+                    step["value"],
+                    *(step["objectives"][goal.name] for goal in goals),
+                    *_numbers(np.array([step["degrees"][goal.name] for goal in goals])),
+                    step["status"],
+                ]
+                for one, step in steps
+            ],
+            f"{comparison.name}: steps of the choices that took several.",
+            ["Objectives are what the solve of a step found; kappa is that of the best point known by then, which may be another."],
+        )
+    return found
+
+
+def choices_figures(comparison: Comparison) -> dict[str, Figure]:
+    """{name of a file: figure} of the degrees of choices by one preference, and of their flights, beside each other."""
+    every, found = chosen(comparison), dict[str, Any]()
+    for solver in dict.fromkeys(one.solver for one in every):
+        mine = [one for one in every if one.solver == solver]
+        found |= {f"lambda-{solver}-{k}": figure for k, figure in enumerate(lambda_figures(mine), 1)}
+        for number, part in enumerate(_parts(mine), 1):
+            stem = solver if len(mine) <= SIDE_BY_SIDE else f"{solver}-{number}"
+            found[f"degrees-{stem}"] = degrees_figure(part)
+            if all(one.point.trajectory is not None for one in part):
+                found[f"flights-{stem}"] = flights_figure([one.point for one in part], names=[one.label for one in part])
+    return found
+
+
+def lambda_figures(every: Sequence[Chosen]) -> list[Figure]:
+    """Memberships and kappa over lambda, a figure for each order of priority of which there are at least three choices."""
+    by_order: dict[Any, dict[float, np.ndarray]] = {}
+    for one in every:
+        if isinstance(one.preference, FuzzySatisfactory) and not one.preference.ordered:
+            goals, preference = one.point.goals, one.preference
+            kappa = preference.kappa(goals, one.ranges, one.objectives[None])
+            line = by_order.setdefault(preference.priorities, {})
+            line.setdefault(preference.regulating, np.concatenate([one.degrees(), kappa]))
+    found = []
+    for priorities, values in by_order.items():
+        if len(values) < LEAST:
+            continue
+        weights = sorted(values)
+        with style():
+            figure = new_figure(COLUMN, 2.7)
+            ax = figure.subplots()
+            names = [*(goal.name for goal in goals), "kappa"]
+            for k, (name, line) in enumerate(zip(names, np.array([values[weight] for weight in weights]).T, strict=True)):
+                ax.plot(weights, line, "o-", ms=3, lw=1.2, color=COLORS[k % len(COLORS)], label=name)
+            ax.axhline(0.0, color="black", lw=0.6)
+            ax.set(xlabel="lambda", ylabel="membership, kappa")
+            legend(figure, ax, None, f"first {' and '.join(priorities[0])}")
+        found.append(figure)
+    return found
+
+
+def degrees_figure(every: Sequence[Chosen], by: Preference | None = None) -> Figure:
+    """Degrees of some choices as bars beside each other, by the preference of the first unless another is given."""
+    by, goals = by or every[0].preference, every[0].point.goals
+    with style():
+        figure = new_figure(PAGE, 3.0)
+        degrees = {one.label: one.degrees(by, every[0].ranges) for one in every}
+        ax = draw_degrees(degrees, [goal.name for goal in goals], by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
+        if (beside := ax.get_legend()) is not None:
+            beside.remove()  # its columns do not know how long names are
+        legend(figure, ax, None)
+    return figure
+
+
+def _parts(every: Sequence[Chosen]) -> list[Sequence[Chosen]]:
+    return [every[k : k + SIDE_BY_SIDE] for k in range(0, len(every), SIDE_BY_SIDE)]
+
+
+def _objectives(goals: Sequence[Objective]) -> list[Column]:
+    return [Column(goal.name, goal.unit, digits=5) for goal in goals]
+
+
+def _degrees(goals: Sequence[Objective]) -> list[Column]:
+    return [Column(f"degree of {goal.name}", digits=4) for goal in goals]
+
+
+def _numbers(degrees: np.ndarray) -> list[Cell]:
+    return [None if np.isnan(one) else float(one) for one in degrees]
+
+
+def _verified(point: Point) -> str:
+    return "yes" if point.verified else "-" if point.verified is None else "no"
+
+
+def _measures(every: Sequence[Chosen]) -> str:
+    """The ranges by which objectives were normalised, solver by solver."""
+    words = []
+    for solver in dict.fromkeys(one.solver for one in every):
+        first = next(one for one in every if one.solver == solver)
+        ends = ", ".join(
+            f"{label(goal.name, goal.unit)} {first.ranges.best[goal.name]:.5g} to {first.ranges.worst[goal.name]:.5g}"
+            for goal in first.point.goals
+        )
+        words.append(f"Ranges of {solver}, best to worst: {ends}.")
+    return " ".join(words)
