@@ -98,6 +98,11 @@ class Choice:
         """Objectives of the point by name, in the user's units and senses."""
         return self.point.objectives
 
+    @cached_property
+    def trade_offs(self) -> TradeOffs | None:
+        """What more of one objective would cost the others; None for a single objective, and for a point without a trajectory."""
+        return trade_offs(self.point) if len(self.point.goals) > 1 and self.point.trajectory is not None else None
+
     @property
     def stats(self) -> dict[str, Any]:
         """Costs, those of the payoff table included if it was found on the way; the seed, and more, as of a front."""
