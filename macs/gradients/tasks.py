@@ -72,9 +72,9 @@ class Along(Task):
 
 
 ROOM = 0.05
-"""How much worse the other objectives of an end may become on another mesh, in units, before the end is sought anywhere."""
-AT_ROOM = 1e-4
-"""Distance to that limit, in units, at which it counts as what stops the one objective."""
+"""How much worse the other objectives of an end may become on another mesh, in units, before it is also sought near where it was."""
+TIED = 1e-6
+"""What counts as no loss of the one objective then, in units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,8 @@ class End(Task):
     objective : int
     units : array (m,)
     known : array (m,)
-        Objectives of the end on another mesh. Many points may have the least value of the one objective, such as its bound: those with the
-        others near these are looked at first.
+        Objectives of the end on another mesh. Many points may have the least value of the one objective, such as its bound: one with the
+        others near these is preferred.
     """
 
     objective: int
@@ -100,16 +100,17 @@ class End(Task):
         alone = np.where(mine, 0.0, np.inf)
         if len(self.units) == 1:
             return solves(nlp, start, alone, self.units)
+        first = solves(nlp, start, alone, self.units)
         near = np.where(mine, np.inf, self.known + ROOM * self.units)
-        first = solves(nlp, start, alone, self.units, near)
-        if not stopping() and (first.status != CONVERGED or (near - AT_ROOM * self.units < first.F).any()):
-            free = solves(nlp, first.z if first.status == CONVERGED else start, alone, self.units)
-            first = free if free.status == CONVERGED else first
+        if not stopping() and (first.status != CONVERGED or (near < first.F).any()):
+            held = solves(nlp, start, alone, self.units, near)
+            if held.status == CONVERGED and (first.status != CONVERGED or self.loss(held.F) <= self.loss(first.F) + TIED):
+                first = held
         if first.status != CONVERGED:
             return first
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         ceiling = np.where(mine, first.F, np.inf)
-        second = solves(nlp, first.z, np.where(mine, np.inf, self.known), self.units, ceiling)
+        second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 

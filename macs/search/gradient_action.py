@@ -39,9 +39,9 @@ def first_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
         ends = evaluator.descend(np.tile(start, (m, 1)), np.where(np.eye(m) > 0, 0.0, np.inf), np.ones((m, m)))
         good = np.flatnonzero(ends.violation <= evaluator.tolerance)
         if m == 1 or len(good) < m:
-            return ends
+            return ends.take(good)
         middle = evaluator.descend(ends.Z[:1], ends.F.min(axis=0)[None], ranges(ends.F)[None])
-    return ends.joined(middle)
+    return ends.joined(middle.take(np.flatnonzero(middle.violation <= evaluator.tolerance)))
 
 
 def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:

@@ -162,7 +162,7 @@ class MACS(Settings, Solver):
                 progress=progress,
                 guide=guide,
             )
-            return Front.of(more)
+            return Front.of(more).verify(front.stats.get("verify") if verify is None else verify)
         if self.mesh == "adaptive" and len(front):
             refined = front.refine_mesh(tolerance=self.mesh_tolerance, progress=progress).verify(verify)
             return refined[best_rows(refined)]
