@@ -1,4 +1,4 @@
-"""A problem whose one objective is a function of the objectives of another: what somebody prefers, for gradient solves.
+"""A problem whose one objective is a function of the objectives of another: a preference, for gradient solves.
 
 Objectives are mostly integrals or peaks, and depend on all of a trajectory. A function of them that is not linear would couple all of it in
 its second derivatives, and a maximum of several has none. So the problem gets a further parameter for each objective, and one for each

@@ -98,9 +98,9 @@ class End(Task):
         """See `Task.solve`."""
         mine = np.arange(len(self.units)) == self.objective
         alone = np.where(mine, 0.0, np.inf)
-        if len(self.units) == 1:
-            return solves(nlp, start, alone, self.units)
         first = solves(nlp, start, alone, self.units)
+        if len(self.units) == 1:
+            return first
         near = np.where(mine, np.inf, self.known + ROOM * self.units)
         if not stopping() and (first.status != CONVERGED or (near < first.F).any()):
             held = solves(nlp, start, alone, self.units, near)

@@ -14,15 +14,12 @@ from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Guide
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
-from ..preferences.ranges import Ranges
 from .region import PART, Region
 
 OUTSIDE = 0.005
 """Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""
 FADING = 0.1
 """Around the region, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
-WIDEST = 1e30
-"""Ranges that contain whatever a preference may name."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,7 @@ def written(preference: Preference) -> Any:
 
 def check_preference(preference: Preference, goals: Sequence[Objective]) -> None:
     """Raise ValueError, of one line, for a preference that is not one of these objectives: another problem's, or a wrong sense."""
-    ends = {goal.name: goal.sign * WIDEST for goal in goals}
     try:
-        preference.stages(goals, Ranges({name: -end for name, end in ends.items()}, ends))
+        preference.check(goals)
     except ValueError as error:
         raise ValueError(f"MACS: prefer: {error}") from error

@@ -55,8 +55,8 @@ def solve(arguments: Namespace) -> int:
     mesh = choose(arguments.mesh, MESHES, "kind of mesh") if arguments.mesh else None
     solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, arguments.prefer)
     verify = None if arguments.verify == UNSIMULATED else arguments.verify or problem.default_verify
-    inner = choose(arguments.inner or problem.default_inner, NAMED, "inner level")
-    start = (arguments.start and choose(arguments.start, STARTS, "start")) or problem.default_start
+    inner = arguments.inner and choose(arguments.inner, NAMED, "inner level")
+    start = arguments.start and choose(arguments.start, STARTS, "start")
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_is_front(out)
@@ -70,7 +70,7 @@ def solve(arguments: Namespace) -> int:
             front = solver.solve(
                 problem,
                 scheme,
-                evaluations=arguments.evaluations or problem.default_evaluations,
+                evaluations=arguments.evaluations,
                 seed=arguments.seed,
                 inner=inner,
                 start=start,

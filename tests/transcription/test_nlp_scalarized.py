@@ -116,6 +116,17 @@ def test_a_start_near_the_answer_takes_few_iterations() -> None:
     assert near.iterations <= 12 and near.iterations < far.iterations
 
 
+def test_near_the_start_only() -> None:
+    """The optimum is found again from a vector that nearly is it, and no other way is tried where that is not enough."""
+    nlp = goddard()
+    known = solve(nlp, [INF, 0.0], [1.0, 1.0])
+    start = np.clip(known.z + 1e-3 * nlp.span * np.sin(np.arange(len(known.z))), nlp.lower, nlp.upper)
+    found = solve(nlp, [INF, 0.0], [1.0, 1.0], start=start, near=True)
+    assert nlp.evaluate(start[None])[1][0] > 1e-6 and found.status == "converged" and close(found, known.F, 1e-6)
+    cut = solve(nlp, [INF, 0.0], [1.0, 1.0], near=True, max_iterations=20)
+    assert cut.status == "failed" and cut.iterations == 6, "the share of this way alone"
+
+
 def test_the_same_solve_gives_the_same_bits() -> None:
     nlp, start = goddard(), feasible(goddard(), 2)
     one, two = (solve(nlp, [150, -1], [1, 0.01], start) for _ in range(2))

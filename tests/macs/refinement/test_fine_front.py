@@ -58,7 +58,7 @@ def test_only_the_rows_that_are_named_change_and_what_they_cost_is_counted(coars
     same = [one is other for one, other in zip(fine.trajectories, coarse.trajectories, strict=True)]
     assert same == [True, False, True, False, True]
     more = {name: fine.stats[name] - coarse.stats[name] for name in ("gradient_solves", "inner_iterations", "work")}
-    # Both are ends of what is solved, for the least of one objective, first near where it was, and then of the other.
+    # Both are ends of what is solved, for the least of one objective, again near where it was, and then of the other.
     assert more["gradient_solves"] == 6 and more["work"] == more["inner_iterations"] * len(FINE.nlp(cart()).variables)
 
 
