@@ -33,6 +33,8 @@ from .choice import Choice, Step
 from .judging import excess_stage, meets, unmet, with_all_limits
 from .stages import SAME, Kept, Known, Outcome, StageSolver
 
+NOTHING_BETTER = "no better point was found than the best that was known"
+"""Message where a known point is the choice."""
 BEST = 3
 """Points of `start` that solves begin at by default, the best-ranked."""
 Result = TypeVar("Result")
@@ -145,16 +147,17 @@ class Desk:
             if not candidates:
                 self._end(str(reason))
         points: list[Point] = [*([] if found is None else [found]), *candidates]
-        order = ordering(
-            stages,
-            np.array([list(point.objectives.values()) for point in points]),
-            np.concatenate([confidence(point.alone()) for point in points]),
-            same=SAME,
-        )
+        objectives = np.array([list(point.objectives.values()) for point in points])
+        sure = np.concatenate([confidence(point.alone()) for point in points])
+        order = ordering(stages, objectives, sure, same=SAME)
         chosen = points[order.order[0]]
         said, is_new = [message], chosen is found
-        if not is_new and not message:
-            said.append("no better point was found than the best that was known")
+        if found is not None and not is_new and not message:
+            better = ordering(stages, objectives, np.zeros(len(points)), same=SAME).order[0] == 0
+            said.append(f"a better point was found, but not confirmed: {found.note}" if better else NOTHING_BETTER)
+        limits = with_all_limits(stages, len(self.problem.goals))[0]
+        if not message and limits.limit_names and not meets(limits, chosen):
+            said.append(unmet(limits, self.problem.goals, objectives[order.order[0]]))
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
