@@ -10,7 +10,7 @@ from smooth_problems import corners, nlp_of, shuttle, slide, still, two_wells, v
 from problems import Problem, load
 from transcription import DFET, NLP
 from transcription.inner import inner_solver
-from transcription.nlp.optimality import optimality
+from transcription.nlp.optimality import Conditions, optimality
 from transcription.nlp.scalarized import scalarize
 
 SPAN = 4.0
@@ -179,3 +179,21 @@ def test_derivatives_that_are_no_numbers() -> None:
     p = problem.parameter("p", bounds=(0, 1))
     problem.minimize("f", ca.sqrt(p) + phase.final(x))
     assert at(nlp_of(problem), p=0.0) == np.inf
+
+
+@pytest.mark.parametrize("name", ["skip", "goddard", "reentry_case1"])
+def test_states_may_be_eliminated_or_not(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Equations at the end are more than determine the states: the saddle point of all of them says the same.
+    problem = load(name)
+    nlp = DFET(6, 3).transcribe(problem.compile())
+    rng = np.random.default_rng(1)
+    z = nlp.propagate(nlp.first_guess(nlp.lower[nlp.free] + rng.random((1, len(nlp.free))) * nlp.span[nlp.free]))[0]
+    z = np.clip(np.where(np.isfinite(z), z, nlp.first_guess(z[None, nlp.free])[0]), nlp.lower, nlp.upper)
+    found = Conditions.of(nlp, z)
+    monkeypatch.setattr("transcription.nlp.optimality.BEYOND", -1)
+    whole = Conditions.of(nlp, z)
+    assert found is not None and whole is not None
+    size = np.abs(whole.reduced).max()
+    assert np.abs(found.reduced - whole.reduced).max() <= 1e-6 * size
+    assert not np.array_equal(found.reduced, whole.reduced)
+    assert found.residual == pytest.approx(whole.residual, rel=1e-6)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import bmat, csc_matrix, csr_matrix, diags
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
@@ -21,6 +21,8 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
+BEYOND, DETERMINED = 50, 1e-9
+"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part."""
 SMALL = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
@@ -220,17 +222,43 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
     these multipliers (equations, k).
 
     Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
-    for the others. Where there are as many equations as others, these follow from the free ones, and it is the total derivative by these.
+    for the others. Where the equations determine the others, these follow from the free ones, and it is the total derivative by these, less
+    what the equations beyond those can take from it.
     """
-    r, n = equations.shape
     measured = np.isinf(nlp.span)
     measured[nlp.free] = True
-    if r + np.count_nonzero(measured) == n:
-        by_states = csc_matrix(equations[:, ~measured].T)
-        adjoints = _solved(splu(by_states), by_states, gradients[:, ~measured].T)
-        return gradients[:, measured].T - equations[:, measured].T @ adjoints, adjoints
+    found = _by_elimination(csc_matrix(equations[:, ~measured]), equations[:, measured], gradients[:, ~measured], gradients[:, measured])
+    if found is not None:
+        return found
     s, adjoints = steepest(diags(np.where(measured, 1.0, DEPENDENT)), equations, gradients)
     return s[measured], adjoints
+
+
+def _by_elimination(
+    by_states: csc_matrix, by_free: csr_matrix, of_states: np.ndarray, of_free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """See `_reduced`, from the columns of equations and gradients that belong to states and to what is free; None where the equations do
+    not determine the states, or where far more equations than states are left."""
+    r, states = by_states.shape
+    beyond = r - states
+    if not 0 <= beyond <= BEYOND:
+        return None
+    # Columns that no structure has make the matrix square; with them, its transpose gives one solution and those of the equations beyond.
+    square = hstack([by_states, csc_matrix(np.random.default_rng(0).standard_normal((r, beyond)))], "csc")
+    try:
+        factors = splu(square)
+    except RuntimeError:
+        return None
+    right = np.vstack([of_states.T, np.zeros((beyond, len(of_states)))])
+    adjoints = _solved(factors, square.T, right, "T")
+    left = of_free.T - by_free.T @ adjoints
+    if beyond:
+        others = _solved(factors, square.T, np.eye(r)[:, states:], "T")
+        taken = np.linalg.lstsq(by_free.T @ others, left, rcond=None)[0]
+        adjoints += others @ taken
+        left -= by_free.T @ (others @ taken)
+    missed = np.abs(by_states.T @ adjoints - of_states.T).max(initial=0.0)
+    return (left, adjoints) if missed <= DETERMINED * np.abs(of_states).max(initial=0.0) else None
 
 
 def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -256,23 +284,23 @@ def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.nda
     return found[:n], found[n:]
 
 
-def _solved(factors: SuperLU, matrix: csc_matrix, right: np.ndarray) -> np.ndarray:
-    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it."""
-    solution = _each(factors, right)
+def _solved(factors: SuperLU, matrix: Any, right: np.ndarray, side: str = "N") -> np.ndarray:
+    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it; with side "T", of its transpose."""
+    solution = _each(factors, right, side)
     for _ in range(REFINEMENTS):
         left = right - matrix @ solution
         if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
             break
-        solution += _each(factors, left)
+        solution += _each(factors, left, side)
     return solution
 
 
-def _each(factors: SuperLU, right: np.ndarray) -> np.ndarray:
+def _each(factors: SuperLU, right: np.ndarray, side: str) -> np.ndarray:
     """The solution for each column by itself: for all at once, BLAS starts threads for every small block, which wait for each other."""
     solution = np.zeros_like(right)
     # Many are zero: the derivatives of bounds of controls by the states.
     for k in np.flatnonzero(right.any(axis=0)):
-        solution[:, k] = factors.solve(right[:, k])
+        solution[:, k] = factors.solve(right[:, k], side)
     return solution
 
 
