@@ -15,8 +15,6 @@ from .evaluator import Counts, Evaluation, Evaluator
 
 PATIENCE = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
-PATIENT = 500
-"""The same where nothing feasible is known, and the whole search depends on it."""
 LIGHT = 0.25
 """What an iteration of Newton's method on propagated states, or a propagation, takes, in iterations of IPOPT on the same problem: measured
 0.1 to 0.7, more where few candidates are feasible."""
@@ -97,8 +95,8 @@ class Bilevel(Evaluator):
                 weights=weight,
                 margin=margin,
                 tolerance=self.tolerance,
-                max_iterations=PATIENT if self._patient else PATIENCE if margin is None else INSIDE * PATIENCE,
-                persistent=self._patient,
+                max_iterations=PATIENCE if margin is None else INSIDE * PATIENCE,
+                persistent=False,
             )
             if not solved.begun:
                 break

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -154,7 +153,6 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     has_gradients: bool = False
-    _patient: bool = False
     m_known: int | None = None
     counts: Counts
     before_batch: Callable[[], Any] = staticmethod(lambda: None)
@@ -227,15 +225,6 @@ class Evaluator(ABC):
         cut_short = found.clocked or len(found.F) < len(starts)
         self.counts.add_solves(len(found.F), found.status.tolist(), iterations, cut_short, starts.shape[1])
         return found
-
-    @contextmanager
-    def patiently(self) -> Iterator[None]:
-        """Gradient solves within may take many iterations, in several ways: nothing good is known to begin at."""
-        self._patient = True
-        try:
-            yield
-        finally:
-            self._patient = False
 
     def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None

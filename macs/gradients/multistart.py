@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import permutations
 from typing import Any
 
 import numpy as np
 
 from transcription.base import NLP
 from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scaling import nlp_scales
 from transcription.smooth import Smooth
 
 from ..evaluation.evaluator import CONVERGED, Counts
@@ -34,6 +36,10 @@ least values, it was not determined by them, and a point where it is lower by mo
 SLACK, TIES = 1e-5, 150
 """Where the others cannot be improved without any loss in an objective, how much of it may be lost, in its range between the ends; most
 iterations of a solve that is to improve the others."""
+
+
+ROUNDS, MORE = 5, 1e-6
+"""Most rounds in which optima are sought from each other; what counts as a gain then, in scales."""
 
 
 MOST_ITERATIONS = 500
@@ -170,46 +176,87 @@ class MultistartSolver:
     def ends(self, singles: Sequence[Solved] = ()) -> list[Solved]:
         """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
         those before, or, where no solve achieves that, with a loss of `SLACK`. It begins at the `singles`, the optima of each objective
-        alone, in their order; those that are not given are found where they are needed first, so that they may begin at what is known by
-        then."""
-        known = dict(enumerate(singles))
-        return [self._lexicographic(i, known) for i in range(len(self.nlp.problem.goals))]
-
-    def _lexicographic(self, i: int, singles: dict[int, Solved]) -> Solved:
-        def single(k: int) -> Solved:
-            if k not in singles:
-                singles[k] = self.single(k)
-            return singles[k]
-
+        alone, in their order; those that are not given are found first. Each is also sought from the ends of the others: they are found in
+        different valleys."""
         m = len(self.nlp.problem.goals)
-        best, ceiling = single(i), np.full(m, np.inf)
+        optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
+        while (i := len(optima)) < m:
+            begun = self._nearest(*_alone(i, m))
+            optima.append(self.single(i))
+            tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
+        ends: list[Solved | None] = [None] * m
+        for _ in range(ROUNDS):
+            self._from_each_other(optima, tried)
+            for i in range(m):
+                if optima[i] is not ends[i]:
+                    ends[i] = self._lexicographic(i, optima)
+            if all(one is end for one, end in zip(optima, ends, strict=True)):
+                break
+            optima = [end for end in ends if end is not None]
+        return optima
+
+    def _from_each_other(self, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:
+        """Replace optima of single objectives by better ones that short solves from those of the others find, until there are none.
+
+        `tried` has the objectives of the optimum k from which objective i was sought before, by (i, k); a solve from another one like it is
+        not worth its time.
+        """
+        m, scales = len(optima), nlp_scales(self.nlp)
+        for _ in range(ROUNDS):
+            improved = False
+            for i, k in permutations(range(m), 2):
+                if optima[k].status != CONVERGED:
+                    continue
+                spans = _spans(optima)
+                if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= LOOSE * spans).all():
+                    continue
+                tried[i, k] = optima[k].F
+                with self._solves.at_most(TIES):
+                    found = self.from_vector(optima[k].z, *_alone(i, m))
+                # What an end has lost to the others is none.
+                gain = max(MORE * scales[i], 2 * SLACK * spans[i])
+                if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
+                    optima[i], improved = found, True
+            if not improved:
+                break
+
+    def _lexicographic(self, i: int, optima: Sequence[Solved]) -> Solved:
+        """The end of objective i; see `ends`."""
+        best, m = optima[i], len(optima)
+        ceiling = np.full(m, np.inf)
         for j in (k for k in range(m) if k != i):
             if best.status != CONVERGED:
                 break
-            # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             ceiling[i] = best.F[i]
-            reference, weights = _alone(j, m)
-            solved = near = self.solve(reference, weights, ceiling, best.z)
-            large, freer = LOOSE * abs(best.F[j] - single(j).F[j]), ceiling
-            if solved.status != CONVERGED:
-                # Perhaps nothing is strictly inside, and yet much can be gained near by; if not, what is known stays.
-                freer = ceiling + SLACK * np.ptp([single(k).F for k in range(m)], axis=0)
-                with self._solves.at_most(TIES):
-                    near = self.from_vector(best.z, reference, weights, freer)
-            if solved.status != CONVERGED and near.status == CONVERGED and best.F[j] - near.F[j] > large:
-                solved = self.from_vector(near.z, reference, weights, ceiling)
-                solved, ceiling = (solved, ceiling) if solved.status == CONVERGED else (near, freer)
-            elif solved.status != CONVERGED:
-                solved = best
-            if single(j).status == CONVERGED and best.F[j] - solved.F[j] > large:
-                # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
-                # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
-                other = self.from_vector(single(j).z, reference, weights, ceiling)
-                if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
-                    solved = other
-            best = solved
+            best, ceiling = self._tied(j, best, ceiling, _spans(optima), optima[j])
             ceiling[j] = best.F[j]
         return best
+
+    def _tied(self, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved) -> tuple[Solved, np.ndarray]:
+        """The least value of objective j, with that of `optimum`, among the points within a ceiling (m,), which `best` attains; and the
+        ceiling, with `SLACK` where it was needed.
+
+        Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
+        """
+        alone = _alone(j, len(spans))
+        large = LOOSE * abs(best.F[j] - optimum.F[j])
+        with self._solves.at_most(TIES):
+            # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+            solved = self.solve(*alone, ceiling, best.z)
+            if solved.status != CONVERGED:
+                # Perhaps much can be gained near by; if not, what is known stays.
+                freer = ceiling + SLACK * spans
+                near, solved = self.from_vector(best.z, *alone, freer), best
+                if near.status == CONVERGED and best.F[j] - near.F[j] > large:
+                    exact = self.from_vector(near.z, *alone, ceiling)
+                    solved, ceiling = (exact, ceiling) if exact.status == CONVERGED else (near, freer)
+            if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:
+                # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
+                # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
+                other = self.from_vector(optimum.z, *alone, ceiling)
+                if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
+                    solved = other
+        return solved, ceiling
 
     def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
         """Merits (k,) of points F (k, m) for a scalarised problem, less is better: their alpha plus their excess over limits and
@@ -269,6 +316,11 @@ class MultistartSolver:
 def _alone(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
     """Reference and weights (m,) of objective i alone; see `scalarize`."""
     return np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i]
+
+
+def _spans(optima: Sequence[Solved]) -> np.ndarray:
+    """Ranges (m,) of the objectives between the optima that were found, at least one."""
+    return np.ptp([one.F for one in optima if one.status == CONVERGED], axis=0)
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:

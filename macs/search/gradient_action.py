@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..evaluation.evaluator import Evaluation, Evaluator
+from ..evaluation.bilevel import Bilevel
+from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
+from ..gradients.multistart import GradientSolves, MultistartSolver
 from ..pareto.archive import Guide
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
@@ -24,24 +26,26 @@ def allowed(evaluations: int, every: int, solves: int) -> int:
     return max(evaluations // every - solves, 0)
 
 
-def first_optima(seen: Evaluation, evaluator: Evaluator) -> Evaluation:
-    """The optimum of each objective alone, and a compromise of them, for a search that begins with nothing feasible; fewer if asked to end
-    early, or where none was found.
-
-    Each is sought from the candidate that misses least, with as many iterations as it takes.
-    """
-    m = seen.F.shape[1]
+def first_optima(seen: Evaluation, evaluator: Bilevel, rng: np.random.Generator) -> Evaluation:
+    """The ends of the front, and a compromise of them, for a search that begins with nothing feasible; fewer if asked to end early, or
+    where none was found. They are sought from the candidate that misses least."""
     known = np.flatnonzero(np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1))
     if not len(known):
         return seen.take(known)
-    start = seen.Z[known[np.argmin(seen.violation[known])]]
-    with evaluator.patiently():
-        ends = evaluator.descend(np.tile(start, (m, 1)), np.where(np.eye(m) > 0, 0.0, np.inf), np.ones((m, m)))
-        good = np.flatnonzero(ends.violation <= evaluator.tolerance)
-        if m == 1 or len(good) < m:
-            return ends.take(good)
-        middle = evaluator.descend(ends.Z[:1], ends.F.min(axis=0)[None], ranges(ends.F)[None])
-    return ends.joined(middle.take(np.flatnonzero(middle.violation <= evaluator.tolerance)))
+    solves = GradientSolves(evaluator.tolerance)
+    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
+    solver = MultistartSolver(evaluator.nlp, seen.Z[known[[np.argmin(seen.violation[known])]]], 1, rng, solves)
+    found = solver.ends()
+    if 1 < len(found) == sum(one.status == CONVERGED for one in found):
+        F = np.array([one.F for one in found])
+        found.append(solver.solve(F.min(axis=0), ranges(F)))
+    good = [one for one in found if one.violation <= evaluator.tolerance]
+    return Evaluation(
+        Z=np.array([one.z for one in good]).reshape(-1, seen.Z.shape[1]),
+        F=np.array([one.F for one in good]).reshape(-1, seen.F.shape[1]),
+        violation=np.array([one.violation for one in good]),
+        status=np.array([one.status for one in good], dtype="<U10"),
+    )
 
 
 def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:

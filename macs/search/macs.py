@@ -15,6 +15,7 @@ from transcription.base import Transcription
 from transcription.catalogue import parse
 from transcription.meshed import Meshed
 
+from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
@@ -91,8 +92,9 @@ class MACS(Settings, Solver):
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
-        if self.refines and evaluator.has_gradients and not (seen.violation <= evaluator.tolerance).any():
-            optima = gradient_action.first_optima(seen, evaluator)
+        infeasible = not (seen.violation <= evaluator.tolerance).any()
+        if self.refines and infeasible and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
+            optima = gradient_action.first_optima(seen, evaluator, rng)
             remember(state, [optima], self, evaluator)
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
@@ -130,8 +132,7 @@ class MACS(Settings, Solver):
             return
         if state.polishing is None:
             state.polishing = PolishLog.of(state.archive)
-        before = evaluator.counts.gradient_solves - len(state.polishing)
-        solves = CountedSolves(evaluator, state.evaluations // self.polish_every - before, state.polishing)
+        solves = CountedSolves(evaluator, state.evaluations // self.polish_every - state.refinements, state.polishing)
         state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator))
         if not solves.stopped:
             state.polishing = None
