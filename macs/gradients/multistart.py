@@ -243,6 +243,11 @@ class MultistartSolver:
         with self._solves.at_most(TIES):
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             solved = self.solve(*alone, ceiling, best.z)
+            for _ in range(ROUNDS):
+                if solved.status == CONVERGED or not best.F[j] - solved.F[j] > large:
+                    break
+                # Much was gained before the iterations ran out.
+                solved = self.solve(*alone, ceiling, solved.z)
             if solved.status != CONVERGED:
                 # Perhaps much can be gained near by; if not, what is known stays.
                 freer = ceiling + SLACK * spans

@@ -37,6 +37,8 @@ LITTLE = 1e-4
 ABSURD = 1e12
 """Multiple of what counts as one unit of an objective at the start, and of 1, from which on its usual scale is that of an explosion
 somewhere in the box: in it the objective would be nothing."""
+LEAST = 100
+"""Fewest iterations for which a strategy is worth beginning, if there may be as many."""
 AT_LIMIT = "maximum iterations exceeded"
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -230,7 +232,7 @@ def scalarize(
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
-        share = max_iterations if not (found or persistent) else max(1, int(strategy.share * max_iterations))
+        share = max_iterations if not (found or persistent) else max(min(LEAST, max_iterations), int(strategy.share * max_iterations))
         if sum(solved.iterations for solved in found) + share > max_iterations:
             break
         # What is feasible and ran out of iterations goes on, scaled anew.

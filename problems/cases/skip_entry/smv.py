@@ -54,16 +54,16 @@ VEHICLE = Winged(
     heating_constant=SHUTTLE.heating_constant,
     turning=TURNING,
 )
-ATTACK = """3 -10 -10 -10 -10 -10 -10 -10 -10 -10 -10 30 30 30 30 30 30 30 29 29 30 30 30 -10 -6
- -4 30 30 30 29 29 28 28 29 29 29 29 30 30 30 30 30 30 29 29 28 27 25 26"""
-BANK = """-80 80 -2 0 0 0 0 0 1 4 34 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -69 -80 -80 -15
- -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -32 -8"""
+ATTACK = """-10 -10 -10 -10 -10 -10 -10 -10 -10 -10 -10 30 30 30 30 30 30 30 29 29 30 30 30 -10 -4
+ 3 30 30 30 28 28 26 28 29 30 30 30 30 30 30 30 30 24 27 29 28 27 26 22"""
+BANK = """0 -1 4 1 0 0 0 0 0 0 -7 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -36 3
+ -66 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -80 -79 -80 -80 -80 -80 -80 -25 57"""
 NOMINAL: dict[str, tuple[float, Any, Any, Any]] = {
-    DESCENT: (366.5, np.radians(np.array(ATTACK.split(), float)), np.radians(np.array(BANK.split(), float)), [0.0, 0.0]),
+    DESCENT: (373.7, np.radians(np.array(ATTACK.split(), float)), np.radians(np.array(BANK.split(), float)), [0.0, 0.0]),
     ASCENT: (51.1, np.radians([21, 30, 30, 30]), np.radians([67, 0, 0, 0]), [2e6, 2e6]),
 }
-"""Duration, s, and commands at equal steps of it, rad and N: down without lift, two turns to the left, and up with full thrust. The fastest
-flight that 170 solves from perturbed ones found, in whole degrees."""
+"""Duration, s, and commands at equal steps of it, rad and N: down without lift, two turns to the left, and up with full thrust. Near the
+fastest flight that 170 solves from perturbed ones found; it exceeds no limit by more than 2 %."""
 MESHES = {
     DESCENT: {"edges": np.linspace(0.0, 1.0, 49).tolist(), "order": 3},
     ASCENT: {"edges": [*np.linspace(0.0, 0.4, 21), *np.linspace(0.4, 1.0, 7)[1:]], "order": 3},
