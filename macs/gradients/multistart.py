@@ -223,13 +223,19 @@ class MultistartSolver:
     def _lexicographic(self, i: int, optima: Sequence[Solved]) -> Solved:
         """The end of objective i; see `ends`."""
         best, m = optima[i], len(optima)
-        ceiling = np.full(m, np.inf)
+        if best.status != CONVERGED:
+            return best
+        ceiling, least, spans = np.full(m, np.inf), best.F[i], _spans(optima)
         for j in (k for k in range(m) if k != i):
-            if best.status != CONVERGED:
-                break
             ceiling[i] = best.F[i]
-            best, ceiling = self._tied(j, best, ceiling, _spans(optima), optima[j])
+            best, ceiling = self._tied(j, best, ceiling, spans, optima[j])
             ceiling[j] = best.F[j]
+        if best.F[i] - least > LIMIT * spans[i]:
+            # What was lost for the others is worth a little of what they gained.
+            near = np.where(np.arange(m) == i, np.inf, best.F + SLACK * spans)
+            with self._solves.at_most(TIES):
+                again = self.from_vector(best.z, *_alone(i, m), near)
+            best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
         return best
 
     def _tied(self, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved) -> tuple[Solved, np.ndarray]:

@@ -21,6 +21,11 @@ CLOSER = (1 / 3, 1 / 9)
 """With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small."""
 
 
+FAIR, LOSS = 1e-4, 0.05
+"""Gain in its own objective, in its range, for which an end of the front may be replaced by a point that is far worse in another; what
+counts as far."""
+
+
 ROUNDS = 6
 """Largest number of rounds with starts from neighbours, and of rounds in which points slide along the front."""
 
@@ -153,7 +158,10 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
     best = archive.take(extremes(archive.F))
     one = np.eye(m, dtype=bool)
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
-    kept = (single.status == CONVERGED) & (np.diag(single.F) <= np.diag(best.F) + slack(best.violation) * span)
+    gain = (np.diag(best.F) - np.diag(single.F)) / span
+    # Where many points have the least value of an objective, the one that is known may be far better in the others.
+    fair = (gain > FAIR) | ((single.F - best.F) / span <= LOSS).all(axis=1)
+    kept = (single.status == CONVERGED) & (gain >= -slack(best.violation)) & fair
     ends = best.replaced(kept, single)
     if m == 1:
         return ends
