@@ -46,8 +46,10 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
     1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
-    2. One guarded solve from each point; the best point of each objective is first solved for the least value of that objective.
-    3. Solves for each point from the positions of its neighbours, as long as this finds better points.
+    2. One guarded solve from each point that no solve has found; the best point of each objective is first solved for the least value of
+       that objective.
+    3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two objectives and
+       few solves, each from the point that is nearest to dominating it.
     4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap
        is too far, places nearer to its sides. The ends are then solved once more from their neighbours.
 
@@ -68,11 +70,12 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
     """
     if not len(archive):
         return archive
+    solved = np.empty((0, archive.F.shape[1]))
     if archive.F.shape[1] > CURVE:
-        archive = _cover(archive, solves, limit, exponent, guide)
+        archive, solved = _cover(archive, solves, limit, exponent, guide)
         if not solves.left:
             return archive
-    archive, waiting = _descend(archive, solves, exponent, guide)
+    archive, waiting = _descend(archive, solves, solved, exponent, guide)
     for _ in range(ROUNDS):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:
@@ -107,28 +110,34 @@ def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | N
     return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent, guide=guide))
 
 
-def _descend(archive: Archive, solves: CountedSolves, exponent: float | None, guide: Guide | None) -> tuple[Archive, Archive]:
-    """The points after one guarded solve each, with the ends of the front, and the points that are left out for want of solves."""
+def _descend(
+    archive: Archive, solves: CountedSolves, solved: np.ndarray, exponent: float | None, guide: Guide | None
+) -> tuple[Archive, Archive]:
+    """The points after one guarded solve each, but for those with objectives (k, m) that were `solved` already, with the ends of the front,
+    unless these were; and the points that are left out for want of solves."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
-    everyone = np.ones(len(archive), dtype=bool)
-    chosen = archives.spread(archive.F, most, exponent=exponent, guide=guide) if most < len(archive) else everyone
-    archive, waiting = archive.take(chosen), archive.take(~chosen)
-    found = solves(archive.Z, archive.F, np.tile(span, (len(archive), 1)))
-    kept = feasible_and_no_worse(found, archive.F, archive.violation, span)
-    archive = archive.replaced(kept, found)
-    return _front(_ends(archive, span, solves).joined(archive), span), waiting
+    fresh = ~(archive.F[:, None] == solved).all(axis=2).any(axis=1)
+    chosen = fresh.copy()
+    if most < np.count_nonzero(fresh):
+        chosen[fresh] = archives.spread(archive.F[fresh], most, exponent=exponent, guide=guide)
+    archive, waiting, chosen = archive.take(chosen | ~fresh), archive.take(fresh & ~chosen), chosen[chosen | ~fresh]
+    points = archive.take(chosen)
+    found = solves(points.Z, points.F, np.tile(span, (len(points), 1)))
+    kept = feasible_and_no_worse(found, points.F, points.violation, span)
+    archive = points.replaced(kept, found).joined(archive.take(~chosen))
+    return _front(archive if len(solved) else _ends(archive, span, solves).joined(archive), span), waiting
 
 
-def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
-    """The ends of the front, and results of solves to `limit` places between them: always the place farthest from all known points, in
-    distances multiplied by the factors of a guide."""
+def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None, guide: Guide | None) -> tuple[Archive, np.ndarray]:
+    """The points with the ends of the front, and results of solves to `limit` places between them: always the place farthest from all known
+    points, in distances multiplied by the factors of a guide. Also the objectives (k, m) of what the solves found."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves)
     pool = _front(ends.joined(archive), span)
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
-    known = across((ends.F - ideal) / between)
+    known, solved = across((ends.F - ideal) / between), ends.F
     lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
@@ -147,9 +156,9 @@ def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         found = solves(pool.Z[start : start + 1], reference[None], between[None])
         known = np.vstack([known, place])
         if found.status[0] == CONVERGED:
-            known = np.vstack([known, across((found.F - ideal) / between)])
+            known, solved = np.vstack([known, across((found.F - ideal) / between)]), np.vstack([solved, found.F])
             pool = Archive.of(found, np.arange(1)).joined(pool)
-    return _thinned(_front(pool, between), limit, exponent, guide)
+    return _thinned(_front(pool, between), limit, exponent, guide), solved
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
@@ -173,12 +182,14 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
 def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.ndarray | None = None) -> Archive:
     """The archive after guarded solves of all, or the chosen, points from their neighbours; the archive itself if none is better or solves
     are too few."""
-    span = ranges(archive.F)
-    pairs = [
-        (i, j)
-        for i in (range(len(archive)) if chosen is None else np.unique(chosen))
-        for j in nearest(archive.F[i], archive.F, span)[1 : archive.F.shape[1] + 1]
-    ]
+    span, m = ranges(archive.F), archive.F.shape[1]
+    rows = range(len(archive)) if chosen is None else np.unique(chosen).tolist()
+    pairs = [(i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]]
+    if len(pairs) > solves.left and m > CURVE:
+        # What another point nearly dominates most likely lies in a poorer valley.
+        worse = ((archive.F[None] - archive.F[:, None]) / span).max(axis=2)
+        np.fill_diagonal(worse, np.inf)
+        pairs = [(i, int(worse[i].argmin())) for i in sorted(rows, key=lambda i: worse[i].min())[: solves.left // 2]]
     if not 0 < len(pairs) <= solves.left:
         return archive
     own, other = (np.array(index) for index in zip(*pairs, strict=True))

@@ -115,7 +115,7 @@ def problem(
         "method": "DFET",
         "settings": {"elements": 48, "order": 3, "control_order": 1, "basis": "bernstein", "mesh": MESHES},
     }
-    problem.default_evaluations = 700
+    problem.default_evaluations = 2_000
     problem.default_inner, problem.default_start = "propagate", "smooth"
     return problem
 
