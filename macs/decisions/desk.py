@@ -24,6 +24,7 @@ from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import MISSES, VERIFY, objective_scales, verified
 from ..gradient_tools import AUTO, PART, Terms, meshes_to_begin_on, payoff
+from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
@@ -174,7 +175,8 @@ class Desk:
                 amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
-            said.append(self._not_optimal(chosen.optimality or 0.0))
+            reason = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
+            said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{reason}")
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
         values = np.nan_to_num(order.values[order.order[0]], posinf=np.inf).tolist()
@@ -186,8 +188,10 @@ class Desk:
         """What the residual of the conditions of optimality says."""
         if not np.isfinite(residual):
             return "whether it is Pareto-optimal is not known: a derivative is no number, or its equations do not determine the states"
-        gains = zip(self.problem.goals, residual * objective_scales(self.known), strict=True)
-        each = ", ".join(f"'{goal.name}' by {shown(float(gain), goal)}" for goal, gain in gains)
+        each = f"by {residual:.1e} of their scales"
+        if len(self.known):
+            gains = zip(self.problem.goals, (residual * objective_scales(self.known)).tolist(), strict=True)
+            each = ", ".join(f"'{goal.name}' by {shown(gain, goal)}" for goal, gain in gains)
         return f"not Pareto-optimal: to first order all objectives can get better together, for each span of the free variables {each}"
 
     def _degrees(self, preference: Preference, J: np.ndarray) -> dict[str, float]:
