@@ -34,7 +34,7 @@ from ..preferences.stage import SLACK, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
 from .judging import exceeded, excess_stage, keeps, meets, unmet, with_all_limits
-from .stages import SAME, Kept, Known, Outcome, StageSolver
+from .stages import ONLY_NEAR, SAME, Kept, Known, Outcome, StageSolver
 
 NOTHING_BETTER = "no better point was found than the best that was known"
 """Message where a known point is the choice."""
@@ -174,9 +174,11 @@ class Desk:
             if others:
                 amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
+        if ONLY_NEAR in chosen.note:
+            said.append(ONLY_NEAR)
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
-            reason = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
-            said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{reason}")
+            why = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
+            said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{why}")
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
         values = np.nan_to_num(order.values[order.order[0]], posinf=np.inf).tolist()
@@ -252,39 +254,40 @@ class Desk:
     def _mended(self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, about: Mapping[str, float]) -> Point:
         """What was found, as a point; solved again if a simulation does not confirm it, unless a transcription was given.
 
-        It is solved again for the value of its last stage. Where that is not confirmed either, since what stages before attained cannot be
-        kept on finer meshes, it is solved again in the objectives themselves, from where it is on; and all stages once more on the mesh
-        which that leads to.
+        The first stage is solved again for its value. What later ones led to, or where that is not confirmed either, is solved again in the
+        objectives themselves, from where it is on; and all stages once more on the mesh which that leads to.
         """
         point, verify = self._point(outcome), self._terms.verify
         if self._transcription is not None or verify is None or not self._to_mend(point):
             return point
         limits = stages[0]
 
-        def noted(again: Outcome) -> Point:
+        def noted(again: Outcome) -> None:
             words = "; ".join(part for part in point.note.split("; ") if part.startswith(MISSES))
             self._noted(preference, stages[-1] if outcome.lifted is None else outcome.lifted.stage, again, about, f"solved again: {words}")
-            return self._point(again)
 
         # Asked to end in the middle of it, the point stays as it is.
         with suppress(Stopped):
             for part in (1.0, PART):
                 again, confirmed = self._solver.again(outcome, part * verify)
                 if again is not outcome:
-                    outcome, point = again, noted(again)
+                    noted(again)
+                    outcome, point = again, self._point(again)
                     if not self._to_mend(point):
                         return point
                 # Where the derived problem has it right, but not the problem itself, objectives are better than they are said to be.
                 if not confirmed:
                     break
             near = self._solver.nearest(outcome, verify, self.known)
-            rival = point if near is outcome else noted(near)
+            rival = point if near is outcome else self._point(near)
             if rival.verified and (keeps(limits, rival, verify) or not keeps(limits, point, verify)):
-                point = rival
+                noted(near)
+                point, steps = rival, len(self.history)
                 best, message = self._chain(preference, stages, about, lambda stage: self._solver.on_mesh(stage, (), near.known, 1))
                 rival = self._point(best)
                 if rival.verified and not message:
-                    point = rival
+                    return rival
+                del self.history[steps:]
         return point
 
     def _to_mend(self, point: Point) -> bool:

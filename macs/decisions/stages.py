@@ -40,6 +40,9 @@ KEEPS, SAME = 1e-7, 1e-6
 """What a stage attained may be exceeded by in the stages after it, and by how much values may differ that are as good as each other: these
 parts of its size, and of 1 at least."""
 
+ONLY_NEAR = "it is not the optimum of the preference on its mesh, but near the one that was found on another"
+"""Note of a point that was solved again in the objectives themselves."""
+
 
 @dataclass(frozen=True, eq=False)
 class Known:
@@ -52,9 +55,10 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class Lifted:
-    """The optimum of a stage in the derived problem: a vector z of its NLP."""
+    """The optimum of a stage in the derived problem: a vector z of its NLP; `first`: no stages before it are kept."""
 
     stage: Stage
+    first: bool
     derived: Valued
     nlp: NLP
     z: np.ndarray
@@ -118,7 +122,7 @@ class StageSolver:
             derived = self._derived(stage, kept, known)
             nlp = known.nlp.transcription.transcribe(derived.problem)
             solved = self._multistart(derived, nlp, known, starts)
-            outcome = self._outcome(stage, derived, nlp, known.nlp, solved.z, solved.status, solved.message)
+            outcome = self._outcome(stage, not kept, derived, nlp, known.nlp, solved.z, solved.status, solved.message)
             if widened == WIDENED or solved.status != CONVERGED or not self._widened(derived, nlp, solved.z):
                 break
             known = outcome.known
@@ -146,7 +150,7 @@ class StageSolver:
 
             found = found_optimum(loop, REFERENCE, WEIGHTS, given, 1, self.rng, meshes)
             own = found.nlp.transcription.transcribe(self.problem)
-            outcome = self._outcome(stage, derived, found.nlp, own, found.z, found.status, found.note)
+            outcome = self._outcome(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
             if widened == WIDENED or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
                 break
         return outcome
@@ -155,15 +159,16 @@ class StageSolver:
         """The outcome solved again for the value of its stage, within hard limits, where a simulation of the derived problem does not
         confirm it: on finer meshes, or inside the limits that it exceeds; itself where that leads nowhere. And whether one confirms it now.
         """
-        if outcome.lifted is None:
-            return outcome, False
         before = outcome.lifted
+        if before is None or not before.first:
+            # What stages before attained on this mesh is not what they attain on others.
+            return outcome, False
         found = self._mended(before.nlp, before.z, outcome.note, verify)
         z, method, confirmed = found[0].decision, from_dict(found[0].transcription or {}), bool(found.verified[0])
         if method == before.nlp.transcription and np.array_equal(z, before.z):
             return outcome, confirmed
         nlp, own = method.nlp(before.derived.problem), method.nlp(self.problem)
-        return self._outcome(before.stage, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note), confirmed
+        return self._outcome(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note), confirmed
 
     def nearest(self, outcome: Outcome, verify: float, known: Points) -> Outcome:
         """The outcome solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where
@@ -172,7 +177,8 @@ class StageSolver:
         z, method = found[0].decision, from_dict(found[0].transcription or {})
         if method == outcome.nlp.transcription and np.array_equal(z, outcome.z):
             return outcome
-        return Outcome(method.nlp(self.problem), z, found.F[0], CONVERGED, unmarked(found)[0].note)
+        note = "; ".join(filter(None, [ONLY_NEAR, unmarked(found)[0].note]))
+        return Outcome(method.nlp(self.problem), z, found.F[0], CONVERGED, note)
 
     def _mended(self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None) -> Points:
         """A converged vector as a point that is mended as those of other gradient tools are, beside others of a front, which are confirmed;
@@ -217,10 +223,10 @@ class StageSolver:
                 break
         return solver.better(found, REFERENCE, WEIGHTS)
 
-    def _outcome(self, stage: Stage, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
+    def _outcome(self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
         """What was found, as a vector of the problem itself."""
         own_z = own.tighten(derived.dropped(nlp.variables, own.variables, z)[None])
-        return Outcome(own, own_z[0], own.evaluate(own_z)[0][0], status, note, Lifted(stage, derived, nlp, z))
+        return Outcome(own, own_z[0], own.evaluate(own_z)[0][0], status, note, Lifted(stage, first, derived, nlp, z))
 
 
 def _confirmed_ends(known: Points) -> Points:
