@@ -23,7 +23,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import MISSES, VERIFY, objective_scales, verified
-from ..gradient_tools import AUTO, PART, Terms, meshes_to_begin_on, payoff
+from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
 from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
@@ -268,16 +268,12 @@ class Desk:
 
         # Asked to end in the middle of it, the point stays as it is.
         with suppress(Stopped):
-            for part in (1.0, PART):
-                again, confirmed = self._solver.again(outcome, part * verify)
-                if again is not outcome:
-                    noted(again)
-                    outcome, point = again, self._point(again)
-                    if not self._to_mend(point):
-                        return point
-                # Where the derived problem has it right, but not the problem itself, objectives are better than they are said to be.
-                if not confirmed:
-                    break
+            again = self._solver.again(outcome, verify)
+            if again is not outcome:
+                noted(again)
+                outcome, point = again, self._point(again)
+                if not self._to_mend(point):
+                    return point
             near = self._solver.nearest(outcome, verify, self.known)
             rival = point if near is outcome else self._point(near)
             if rival.verified and (keeps(limits, rival, verify) or not keeps(limits, point, verify)):

@@ -155,20 +155,19 @@ class StageSolver:
                 break
         return outcome
 
-    def again(self, outcome: Outcome, verify: float) -> tuple[Outcome, bool]:
+    def again(self, outcome: Outcome, verify: float) -> Outcome:
         """The outcome solved again for the value of its stage, within hard limits, where a simulation of the derived problem does not
-        confirm it: on finer meshes, or inside the limits that it exceeds; itself where that leads nowhere. And whether one confirms it now.
-        """
+        confirm it: on finer meshes, or inside the limits that it exceeds; itself where that leads nowhere."""
         before = outcome.lifted
         if before is None or not before.first:
             # What stages before attained on this mesh is not what they attain on others.
-            return outcome, False
+            return outcome
         found = self._mended(before.nlp, before.z, outcome.note, verify)
-        z, method, confirmed = found[0].decision, from_dict(found[0].transcription or {}), bool(found.verified[0])
+        z, method = found[0].decision, from_dict(found[0].transcription or {})
         if method == before.nlp.transcription and np.array_equal(z, before.z):
-            return outcome, confirmed
+            return outcome
         nlp, own = method.nlp(before.derived.problem), method.nlp(self.problem)
-        return self._outcome(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note), confirmed
+        return self._outcome(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note)
 
     def nearest(self, outcome: Outcome, verify: float, known: Points) -> Outcome:
         """The outcome solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where

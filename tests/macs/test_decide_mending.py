@@ -1,4 +1,4 @@
-"""decide: points that a simulation does not confirm are solved again for the same preference; which of several is chosen, and what is said."""
+"""decide: points that a simulation does not confirm are solved again for the same preference; which of several is chosen; what is said."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ from macs.decisions import (
     Ranges,
     ReferencePoint,
     Smaller,
-    WeightedSum,
     decide,
     satisfy,
 )
@@ -114,7 +113,7 @@ def best_time(preference: Preference) -> float:
 @pytest.mark.parametrize(("preference", "T"), WISHES, ids=[repr(one[0]) for one in WISHES])
 def test_the_mended_point_answers_the_preference(monkeypatch, no_work, preference: Preference, T: float, by_value: bool) -> None:
     if not by_value:
-        monkeypatch.setattr(StageSolver, "again", lambda self, outcome, verify: (outcome, False))
+        monkeypatch.setattr(StageSolver, "again", lambda self, outcome, verify: outcome)
     T = T or best_time(preference)
     choice = asked(preference)
     assert choice.point.verified and choice.message == "" and again(choice)
@@ -166,7 +165,7 @@ def test_who_asks_at_the_same_desk_has_it_too(no_work) -> None:
 
 
 def test_where_only_the_objectives_could_be_kept_the_message_says_so(monkeypatch, no_work) -> None:
-    monkeypatch.setattr(StageSolver, "again", lambda self, outcome, verify: (outcome, False))
+    monkeypatch.setattr(StageSolver, "again", lambda self, outcome, verify: outcome)
     chain, calls = Desk._chain, []
 
     def once(self, preference, stages, about, first) -> tuple[Outcome, str]:
@@ -265,4 +264,3 @@ def test_conditions_of_optimality_are_in_units_or_not_known() -> None:
     text = desk.work(lambda: desk._not_optimal(0.01))
     assert f"'end' by {0.01 * wide[0]:.6g} m, 'time' by {0.01 * wide[1]:.6g} s" in text
     assert "is not known" in desk._not_optimal(np.inf) and "inf" not in desk._not_optimal(np.inf)
-    assert isinstance(WeightedSum({"end": 1.0}), Preference)
