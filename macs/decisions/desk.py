@@ -257,34 +257,52 @@ class Desk:
         The first stage is solved again for its value. What later ones led to, or where that is not confirmed either, is solved again in the
         objectives themselves, from where it is on; and all stages once more on the mesh which that leads to.
         """
-        point, verify = self._point(outcome), self._terms.verify
-        if self._transcription is not None or verify is None or not self._to_mend(point):
+        point = self._point(outcome)
+        if self._transcription is not None or self._terms.verify is None or not self._to_mend(point):
             return point
-        limits = stages[0]
-
-        def noted(again: Outcome) -> None:
-            words = "; ".join(part for part in point.note.split("; ") if part.startswith(MISSES))
-            self._noted(preference, stages[-1] if outcome.lifted is None else outcome.lifted.stage, again, about, f"solved again: {words}")
-
         # Asked to end in the middle of it, the point stays as it is.
         with suppress(Stopped):
+            outcome, point = self._by_value(preference, outcome, point, about)
+            if self._to_mend(point):
+                point = self._by_objectives(preference, stages, outcome, point, about)
+        # With what led nowhere.
+        return point.alone().replace(stats={**point.alone().stats, **self.stats()})[0]
+
+    def _by_value(self, preference: Preference, outcome: Outcome, point: Point, about: Mapping[str, float]) -> tuple[Outcome, Point]:
+        """What a first stage led to, solved again for its value where a simulation does not confirm it."""
+        verify = self._terms.verify or VERIFY
+        for refined in (False, True):
+            # On a mesh of its own it may be moved inside of its limits, if these are all that it misses.
+            if not self._to_mend(point) or (refined and (point.defect or 0.0) > verify):
+                break
             again = self._solver.again(outcome, verify)
-            if again is not outcome:
-                noted(again)
-                outcome, point = again, self._point(again)
-                if not self._to_mend(point):
-                    return point
-            near = self._solver.nearest(outcome, verify, self.known)
-            rival = point if near is outcome else self._point(near)
-            if rival.verified and (keeps(limits, rival, verify) or not keeps(limits, point, verify)):
-                noted(near)
-                point, steps = rival, len(self.history)
-                best, message = self._chain(preference, stages, about, lambda stage: self._solver.on_mesh(stage, (), near.known, 1))
-                rival = self._point(best)
-                if rival.verified and not message:
-                    return rival
-                del self.history[steps:]
-        return point
+            if again is outcome or outcome.lifted is None:
+                break
+            self._noted(preference, outcome.lifted.stage, again, about, _again(point))
+            outcome, point = again, self._point(again)
+        return outcome, point
+
+    def _by_objectives(
+        self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, point: Point, about: Mapping[str, float]
+    ) -> Point:
+        """What was found, solved again in its objectives, and on the mesh of that for the preference; the point itself where that leads
+        nowhere, or beyond the hard limits that it keeps."""
+        limits, verify = stages[0], self._terms.verify or VERIFY
+        near = self._solver.nearest(outcome, verify, self.known)
+        rival = point if near is outcome else self._point(near)
+        if not rival.verified or (keeps(limits, point, verify) and not keeps(limits, rival, verify)):
+            return point
+        last = stages[-1] if outcome.lifted is None else outcome.lifted.stage
+        self._noted(preference, last, near, about, _again(point))
+        steps = len(self.history)
+        with suppress(Stopped):
+            best, message = self._chain(preference, stages, about, lambda stage: self._solver.on_mesh(stage, (), near.known, 1))
+            if not message:
+                _, reached = self._by_value(preference, best, self._point(best), about)
+                if reached.verified:
+                    return reached
+        del self.history[steps:]
+        return rival
 
     def _to_mend(self, point: Point) -> bool:
         """Whether a point is one that a simulation contradicts, and there is time."""
@@ -380,6 +398,11 @@ class Desk:
             reproducible=not (counts.clocked or stopped),
             **({"stopped": stopped} if stopped else {}),
         )
+
+
+def _again(point: Point) -> str:
+    """Why a point was solved again."""
+    return f"solved again: {'; '.join(part for part in point.note.split('; ') if part.startswith(MISSES))}"
 
 
 def _check_start(start: Points, problem: CompiledProblem) -> None:

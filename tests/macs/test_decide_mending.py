@@ -34,7 +34,7 @@ from macs.decisions.judging import exceeded, keeps
 from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
 from macs.gradient_tools import Terms
 from macs.gradients.front_polish import KEPT_INSIDE
-from problems import Problem
+from problems import Problem, load
 from transcription import DFET
 
 COARSE = DFET(2, 1, basis="bernstein")
@@ -140,6 +140,17 @@ def test_what_it_costs_is_counted(monkeypatch, no_work) -> None:
     assert mended.stats["reproducible"]
 
 
+def test_what_led_nowhere_is_counted_too(monkeypatch, no_work) -> None:
+    def in_vain(self: StageSolver, outcome: Outcome, *_) -> Outcome:
+        self.solves.counts.gradient_solves += 10
+        return outcome
+
+    monkeypatch.setattr(StageSolver, "again", in_vain)
+    monkeypatch.setattr(StageSolver, "nearest", in_vain)
+    choice = asked(WISHES[0][0])
+    assert choice.point.verified is False and choice.stats["gradient_solves"] > 20 and choice.stats["verify"] == 1e-3
+
+
 def test_the_same_bits(no_work) -> None:
     one, other = asked(WISHES[0][0]), asked(WISHES[0][0])
     assert one.point.decision.tobytes() == other.point.decision.tobytes()
@@ -193,6 +204,18 @@ def test_points_that_exceed_a_limit_between_nodes_are_moved_inside(no_work) -> N
     # At the optimum both are as far from what is hoped for.
     one, other = choice.degrees.values()
     assert one == pytest.approx(other, abs=1e-2) and KEPT_INSIDE in choice.point.note and choice.message == ""
+
+
+@pytest.mark.slow
+def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> None:
+    mesh = DFET(6, 4)
+    start = payoff(load("skip"), mesh)
+    wide = Ranges({"terminal mass": 89006.6, "terminal speed": 7802.88}, {"terminal mass": 36571.0, "terminal speed": 4805.46})
+    wanted = PhysicalProgramming({"terminal mass": Larger.even(89000, 64000), "terminal speed": Larger.even(7800, 5500)})
+    choice = decide(load("skip"), wanted, ranges=wide, start=start)
+    assert not start.verified.any() and choice.point.verified and len(again(choice)) == 2 and ONLY_NEAR not in choice.message
+    # On the mesh where it began, states were off by a third of their bounds.
+    assert choice.objectives["terminal mass"] >= 64000 and choice.objectives["terminal speed"] >= 5500 and choice.point.defect < 1e-3
 
 
 # Which of several
