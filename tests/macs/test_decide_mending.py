@@ -35,14 +35,14 @@ from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
 from macs.gradient_tools import Terms
 from macs.gradients.front_polish import KEPT_INSIDE
 from problems import Problem, load
-from transcription import DFET
+from transcription import DFET, from_dict
 
 COARSE = DFET(2, 1, basis="bernstein")
 """On it the controls of the swing have two values of a few: its objectives are off by a tenth of their ranges."""
 
 
 @cache
-def swing() -> Problem:
+def swing(more: float = 0.0) -> Problem:
     """x'' = u - x with |u| <= 0.3, from rest at 1. The largest end after T from pi to 2 pi takes u = 0.3 sign(sin(T - t)):
     cos T + 0.3 (3 + cos T)."""
     problem = Problem("swing")
@@ -50,7 +50,7 @@ def swing() -> Problem:
     x, v = phase.state("x", bounds=(-3, 3), initial=1.0), phase.state("v", bounds=(-3, 3), initial=0.0)
     u = phase.control("u", bounds=(-0.3, 0.3))
     phase.dynamics(x=v, v=u - x)
-    problem.maximize("end", phase.final(x), unit="m")
+    problem.maximize("end", phase.final(x) + more, unit="m")
     problem.minimize("time", phase.tf, unit="s")
     return problem
 
@@ -218,6 +218,20 @@ def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> No
     assert choice.objectives["terminal mass"] >= 64000 and choice.objectives["terminal speed"] >= 5500 and choice.point.defect < 1e-3
 
 
+def test_objectives_are_judged_by_the_ranges_of_what_is_known() -> None:
+    """Off by a twentieth of its range is nothing in an objective of a thousand."""
+    problem = swing(1000.0)
+    known, vague = payoff(problem), decide(problem, COARSE, ReferencePoint({"time": 4.5}), start=payoff(problem, COARSE)).point
+    assert known.verified.all() and np.ptp(known.F[:, 0]) == pytest.approx(WIDE, rel=1e-2)
+    off = abs(vague.objectives["end"] - vague.simulated["end"])
+    assert vague.defect < 6e-2 and 6e-2 * WIDE < off < 1e-3 * 1000
+    begun = Outcome(COARSE.nlp(problem.compile()), vague.decision, vague.F, "converged")
+    desk = Desk(problem, None, None, Terms(known, "auto", 0, 1e-6, 6e-2, 500, None, None))
+    found = desk.work(lambda: desk._solver.nearest(begun, 6e-2, known))
+    assert desk._solver.nearest(begun, 6e-2, known.take([])) is begun
+    assert -found.F[0] == pytest.approx(1000 + end(found.F[1]), abs=6e-2 * WIDE)
+
+
 # Which of several
 
 
@@ -243,6 +257,16 @@ def test_a_hard_limit_is_not_given_up_for_an_error_that_is_known() -> None:
     choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=_at(3.8))
     assert choice.point.verified and choice.objectives["time"] == pytest.approx(3.8, abs=0.02)
     assert "was found, but not confirmed: simulated, " in choice.message or "no better point" in choice.message
+
+
+def test_limits_that_are_kept_are_not_given_up_for_a_point_nearby(monkeypatch, no_work) -> None:
+    known = _at(5.0)[0]
+    nlp = from_dict(known.transcription).nlp(swing().compile())
+    beyond = Outcome(nlp, known.decision, known.F, "converged")
+    monkeypatch.setattr(StageSolver, "again", lambda self, outcome, verify: outcome)
+    monkeypatch.setattr(StageSolver, "nearest", lambda self, outcome, verify, front: beyond)
+    choice = asked(QUICK)
+    assert choice.objectives["time"] <= 4.0 + 1e-5 and choice.point.verified is False and not again(choice)
 
 
 def test_what_was_simulated_is_to_keep_the_limits_too() -> None:
