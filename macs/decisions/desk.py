@@ -219,6 +219,7 @@ class Desk:
         stages = with_all_limits(stages, len(self.problem.goals))
         limits = stages[0]
         begun: Outcome | None = None
+        nearest: Point | None = None
         if limits.limit_names and not any(meets(limits, point) for point in candidates):
             begun = self._within_limits(preference, limits, candidates, about)
             if begun.status == CONVERGED and limits.excess((begun.F * self.problem.signs)[None])[0] > SLACK:
@@ -228,6 +229,11 @@ class Desk:
                 # On its own mesh there is room.
                 candidates, begun = [nearest, *candidates], None
         outcome, message = self._chain(preference, stages, about, lambda stage: self._first(stage, candidates, begun))
+        if outcome.status != CONVERGED:
+            # What is within the limits stands.
+            if nearest is not None:
+                return nearest, message
+            outcome = begun if begun is not None and begun.status == CONVERGED else outcome
         point = self._mended(preference, stages, outcome, about)
         missed = f"; {nearest_violation(point)}" if message and point.violation > self.solves.tolerance else ""
         return point, f"{message}{missed}"

@@ -281,6 +281,21 @@ def test_what_was_simulated_is_to_keep_the_limits_too() -> None:
     assert not keeps(stage, front.replace(simulated_F=F * np.nan, verified=[False])[0], 1e-2)
 
 
+@pytest.mark.parametrize(("method", "until"), [(None, 4.6), (COARSE, 5.0)], ids=["mended", "as it was found"])
+def test_what_is_within_the_limits_stands_where_the_next_solve_fails(monkeypatch, no_work, method, until: float) -> None:
+    first = Desk._first
+
+    def failed(self: Desk, *arguments) -> Outcome:
+        return replace(first(self, *arguments), status="failed", note="it did not converge", lifted=None)
+
+    monkeypatch.setattr(Desk, "_first", failed)
+    wanted = Nimbus({"end": end(4.5), "time": 4.5}, improve=["end"], until={"time": until})
+    choice = decide(swing(), method, wanted, ranges=BOTH, start=rough())
+    assert choice.objectives["time"] <= until + 1e-5 and choice.objectives["end"] >= end(4.5) - 1e-5
+    assert choice.message.startswith("achievement: it did not converge") and choice.point.status == "converged"
+    assert choice.point.verified is (method is None) and np.isfinite(choice.value)
+
+
 # What is said
 
 
