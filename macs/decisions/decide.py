@@ -44,7 +44,8 @@ def decide(
     problem : Problem
     transcription : Transcription, optional
         It may be left out: `decide(problem, preference)`. Default: a mesh that is found, as by `optimize`; stages after the first are
-        solved on the mesh of that.
+        solved on the mesh of that. A point that is not verified there is solved again, on finer meshes or inside the limits that it
+        exceeds, for the same preference. On a transcription that is given, points are only marked.
     preference : Preference
     ranges : Ranges, optional
         By which objectives are normalised. Default: those of `start`, or of the payoff table, which is found first.
@@ -59,7 +60,8 @@ def decide(
     Returns
     -------
     Choice
-        Its `message` says what is to be known: hard limits that no point was found to meet together, a solve that did not converge.
+        Its `message` says what is to be known: hard limits that no point was found to meet together, a solve that did not converge. A
+        point within all hard limits that a simulation does not confirm is chosen before confirmed ones beyond them.
 
     Raises
     ------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -21,17 +22,19 @@ from ..fronts.builders import OPTIMAL, certified, nearest_violation, vectors_poi
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
-from ..fronts.verified import VERIFY, objective_scales, verified
+from ..fronts.verified import MISSES, VERIFY, objective_scales, verified
 from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
+from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
+from ..preferences.checks import shown
 from ..preferences.ranges import confidence
 from ..preferences.stage import SLACK, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
-from .judging import excess_stage, meets, unmet, with_all_limits
-from .stages import SAME, Kept, Known, Outcome, StageSolver
+from .judging import exceeded, excess_stage, keeps, meets, unmet, with_all_limits
+from .stages import ONLY_NEAR, SAME, Kept, Known, Outcome, StageSolver
 
 NOTHING_BETTER = "no better point was found than the best that was known"
 """Message where a known point is the choice."""
@@ -130,6 +133,11 @@ class Desk:
     def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
         """The choice by a preference, never worse than a known point.
 
+        A point that was found and those that are known are put in this order: those that a simulation confirms, or that were not simulated,
+        within the hard limits; those within them that none confirms; then confirmed points beyond them, by how much they exceed them; then
+        others. What a simulation does not confirm is within the limits only if what was simulated is, too, but for what points may miss. So
+        a limit that is said to be hard is not given up for an error that is known, and the message says either.
+
         Parameters
         ----------
         preference : Preference
@@ -147,27 +155,46 @@ class Desk:
             if not candidates:
                 self._end(str(reason))
         points: list[Point] = [*([] if found is None else [found]), *candidates]
+        limits = with_all_limits(stages, len(self.problem.goals))[0]
         objectives = np.array([list(point.objectives.values()) for point in points])
         sure = np.concatenate([confidence(point.alone()) for point in points])
-        order = ordering(stages, objectives, sure, same=SAME)
+        beyond = ~np.array([keeps(limits, point, self._terms.verify or VERIFY) for point in points])
+        order = ordering(stages, objectives, np.where(sure < 2, sure + 2 * beyond, 4), same=SAME)
         chosen = points[order.order[0]]
         said, is_new = [message], chosen is found
         if found is not None and not is_new and not message:
             better = ordering(stages, objectives, np.zeros(len(points)), same=SAME).order[0] == 0
             said.append(f"a better point was found, but not confirmed: {found.note}" if better else NOTHING_BETTER)
-        limits = with_all_limits(stages, len(self.problem.goals))[0]
-        if not message and limits.limit_names and not meets(limits, chosen):
-            said.append(unmet(limits, self.problem.goals, objectives[order.order[0]]))
+        if not meets(limits, chosen) and not (message and is_new):
+            of_chosen = self.problem.goals, objectives[order.order[0]]
+            said.append(f"of the best that was known, {exceeded(limits, *of_chosen)}" if message else unmet(limits, *of_chosen))
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
+            others = [i for i in order.order if sure[i] == 0]
+            if others:
+                amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
+                said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
+        if ONLY_NEAR in chosen.note:
+            said.append(ONLY_NEAR)
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
-            said.append(f"not Pareto-optimal: the conditions of optimality are missed by {chosen.optimality:.1e}")
+            why = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
+            said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{why}")
         message = "; ".join(filter(None, said))
         J = np.array([list(chosen.objectives.values())])
         values = np.nan_to_num(order.values[order.order[0]], posinf=np.inf).tolist()
         return Choice(
             chosen, tuple(values), self._degrees(preference, J), tuple(self.history), preference, self.ranges, message, self._reason()
         )
+
+    def _not_optimal(self, residual: float) -> str:
+        """What the residual of the conditions of optimality says."""
+        if not np.isfinite(residual):
+            return "whether it is Pareto-optimal is not known: a derivative is no number, or its equations do not determine the states"
+        each = f"by {residual:.1e} of their scales"
+        if len(self.known):
+            gains = zip(self.problem.goals, (residual * objective_scales(self.known)).tolist(), strict=True)
+            each = ", ".join(f"'{goal.name}' by {shown(gain, goal)}" for goal, gain in gains)
+        return f"not Pareto-optimal: to first order all objectives can get better together, for each span of the free variables {each}"
 
     def _degrees(self, preference: Preference, J: np.ndarray) -> dict[str, float]:
         """Degrees by name at objectives (1, m)."""
@@ -191,37 +218,108 @@ class Desk:
         """The point that solves of all stages lead to, and what is to be said of it."""
         stages = with_all_limits(stages, len(self.problem.goals))
         limits = stages[0]
-        outcome: Outcome | None = None
+        begun: Outcome | None = None
+        nearest: Point | None = None
         if limits.limit_names and not any(meets(limits, point) for point in candidates):
-            outcome = self._within_limits(preference, limits, candidates, about)
-            J = outcome.F * self.problem.signs
-            if outcome.status == CONVERGED and limits.excess(J[None])[0] > SLACK:
-                return self._point(outcome), unmet(limits, self.problem.goals, J)
+            begun = self._within_limits(preference, limits, candidates, about)
+            if begun.status == CONVERGED and limits.excess((begun.F * self.problem.signs)[None])[0] > SLACK:
+                nearest = self._mended(preference, [excess_stage(limits)], begun, about)
+                if not meets(limits, nearest):
+                    return nearest, unmet(limits, self.problem.goals, np.array([*nearest.objectives.values()]))
+                # On its own mesh there is room.
+                candidates, begun = [nearest, *candidates], None
+        outcome, message = self._chain(preference, stages, about, lambda stage: self._first(stage, candidates, begun))
+        if outcome.status != CONVERGED:
+            # What is within the limits stands.
+            if nearest is not None:
+                return nearest, message
+            outcome = begun if begun is not None and begun.status == CONVERGED else outcome
+        point = self._mended(preference, stages, outcome, about)
+        missed = f"; {nearest_violation(point)}" if message and point.violation > self.solves.tolerance else ""
+        return point, f"{message}{missed}"
+
+    def _chain(
+        self, preference: Preference, stages: Sequence[Stage], about: Mapping[str, float], first: Callable[[Stage], Outcome]
+    ) -> tuple[Outcome, str]:
+        """What solves of all stages lead to, each after the first on the mesh of that, and what is to be said of it."""
+        outcome: Outcome | None = None
         kept: list[Kept] = []
         for stage in stages:
             if stage.after_zero and kept and kept[-1].value > SAME:
                 break
-            if kept and outcome is not None:
-                reached = self._solver.on_mesh(stage, kept, outcome.known, 1)
-            else:
-                reached = self._first(stage, candidates, outcome)
+            reached = first(stage) if outcome is None else self._solver.on_mesh(stage, kept, outcome.known, 1)
             value = self._noted(preference, stage, reached, about)
             if reached.status != CONVERGED:
                 # What the stages before attained stands.
-                point = self._point(outcome if kept and outcome is not None else reached)
-                missed = f"; {nearest_violation(point)}" if point.violation > self.solves.tolerance else ""
-                return point, f"{stage.name}: {reached.note}{missed}"
+                return reached if outcome is None else outcome, f"{stage.name}: {reached.note}"
             outcome = reached
             kept.append(Kept(stage, value))
         assert outcome is not None
-        return self._point(outcome), ""
+        return outcome, ""
 
-    def _noted(self, preference: Preference, stage: Stage, outcome: Outcome, about: Mapping[str, float]) -> float:
+    def _mended(self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, about: Mapping[str, float]) -> Point:
+        """What was found, as a point; solved again if a simulation does not confirm it, unless a transcription was given.
+
+        The first stage is solved again for its value. What later ones led to, or where that is not confirmed either, is solved again in the
+        objectives themselves, from where it is on; and all stages once more on the mesh which that leads to.
+        """
+        point = self._point(outcome)
+        if self._transcription is not None or self._terms.verify is None or not self._to_mend(point):
+            return point
+        # Asked to end in the middle of it, the point stays as it is.
+        with suppress(Stopped):
+            outcome, point = self._by_value(preference, outcome, point, about)
+            if self._to_mend(point):
+                point = self._by_objectives(preference, stages, outcome, point, about)
+        # With what led nowhere.
+        return point.alone().replace(stats={**point.alone().stats, **self.stats()})[0]
+
+    def _by_value(self, preference: Preference, outcome: Outcome, point: Point, about: Mapping[str, float]) -> tuple[Outcome, Point]:
+        """What a first stage led to, solved again for its value where a simulation does not confirm it."""
+        verify = self._terms.verify or VERIFY
+        for refined in (False, True):
+            # On a mesh of its own it may be moved inside of its limits, if these are all that it misses.
+            if not self._to_mend(point) or (refined and (point.defect or 0.0) > verify):
+                break
+            again = self._solver.again(outcome, verify)
+            if again is outcome or outcome.lifted is None:
+                break
+            self._noted(preference, outcome.lifted.stage, again, about, _again(point))
+            outcome, point = again, self._point(again)
+        return outcome, point
+
+    def _by_objectives(
+        self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, point: Point, about: Mapping[str, float]
+    ) -> Point:
+        """What was found, solved again in its objectives, and on the mesh of that for the preference; the point itself where that leads
+        nowhere, or beyond the hard limits that it keeps."""
+        limits, verify = stages[0], self._terms.verify or VERIFY
+        near = self._solver.nearest(outcome, verify, self.known)
+        rival = point if near is outcome else self._point(near)
+        if not rival.verified or (keeps(limits, point, verify) and not keeps(limits, rival, verify)):
+            return point
+        last = stages[-1] if outcome.lifted is None else outcome.lifted.stage
+        self._noted(preference, last, near, about, _again(point))
+        steps = len(self.history)
+        with suppress(Stopped):
+            best, message = self._chain(preference, stages, about, lambda stage: self._solver.on_mesh(stage, (), near.known, 1))
+            if not message:
+                _, reached = self._by_value(preference, best, self._point(best), about)
+                if reached.verified:
+                    return reached
+        del self.history[steps:]
+        return rival
+
+    def _to_mend(self, point: Point) -> bool:
+        """Whether a point is one that a simulation contradicts, and there is time."""
+        return point.verified is False and point.status == CONVERGED and not self.stopped
+
+    def _noted(self, preference: Preference, stage: Stage, outcome: Outcome, about: Mapping[str, float], words: str = "") -> float:
         """The value of a stage, of which the step becomes a part of the history."""
         J = (outcome.F * self.problem.signs)[None]
         value = float(stage.numbers(J)[0])
         objectives = dict(zip((goal.name for goal in self.problem.goals), J[0].tolist(), strict=True))
-        note = outcome.note if outcome.status != CONVERGED else ""
+        note = outcome.note if outcome.status != CONVERGED else words
         self.history.append(Step(stage.name, value, objectives, self._degrees(preference, J), outcome.status, dict(about), note))
         return value
 
@@ -306,6 +404,11 @@ class Desk:
             reproducible=not (counts.clocked or stopped),
             **({"stopped": stopped} if stopped else {}),
         )
+
+
+def _again(point: Point) -> str:
+    """Why a point was solved again."""
+    return f"solved again: {'; '.join(part for part in point.note.split('; ') if part.startswith(MISSES))}"
 
 
 def _check_start(start: Points, problem: CompiledProblem) -> None:

@@ -9,17 +9,23 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.valued import Box, Valued, valued
+from transcription import from_dict
 from transcription.base import NLP
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, Counts
+from ..fronts.builders import certified, vectors_points
+from ..fronts.points import Points
+from ..fronts.provenance import costs
+from ..fronts.verified import unmarked
 from ..gradient_tools import MESHES, MOST_WORK, PART
 from ..gradients.multistart import GradientSolves, MultistartSolver
 from ..preferences import Stage
 from ..refinement.found_optimum import found_optimum
+from ..refinement.mending import solved_again
 from ..refinement.mesh_loop import MeshLoop, Programs
 
 REFERENCE, WEIGHTS = np.zeros(1), np.ones(1)
@@ -34,6 +40,9 @@ KEEPS, SAME = 1e-7, 1e-6
 """What a stage attained may be exceeded by in the stages after it, and by how much values may differ that are as good as each other: these
 parts of its size, and of 1 at least."""
 
+ONLY_NEAR = "it is not the optimum of the preference on its mesh, but near the one that was found on another"
+"""Note of a point that was solved again in the objectives themselves."""
+
 
 @dataclass(frozen=True, eq=False)
 class Known:
@@ -45,14 +54,27 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
+class Lifted:
+    """The optimum of a stage in the derived problem: a vector z of its NLP; `first`: no stages before it are kept."""
+
+    stage: Stage
+    first: bool
+    derived: Valued
+    nlp: NLP
+    z: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Outcome:
-    """A stage solved: the vector z of the NLP of the problem itself, its objectives F (m,), minimised, and what is to be said of it."""
+    """A stage solved: the vector z of the NLP of the problem itself, its objectives F (m,), minimised, and what is to be said of it; and
+    the same in the derived problem in which it was found."""
 
     nlp: NLP
     z: np.ndarray
     F: np.ndarray
     status: str
     note: str = ""
+    lifted: Lifted | None = None
 
     @property
     def known(self) -> Known:
@@ -100,7 +122,7 @@ class StageSolver:
             derived = self._derived(stage, kept, known)
             nlp = known.nlp.transcription.transcribe(derived.problem)
             solved = self._multistart(derived, nlp, known, starts)
-            outcome = self._outcome(derived, nlp, known.nlp, solved.z, solved.status, solved.message)
+            outcome = self._outcome(stage, not kept, derived, nlp, known.nlp, solved.z, solved.status, solved.message)
             if widened == WIDENED or solved.status != CONVERGED or not self._widened(derived, nlp, solved.z):
                 break
             known = outcome.known
@@ -128,10 +150,44 @@ class StageSolver:
 
             found = found_optimum(loop, REFERENCE, WEIGHTS, given, 1, self.rng, meshes)
             own = found.nlp.transcription.transcribe(self.problem)
-            outcome = self._outcome(derived, found.nlp, own, found.z, found.status, found.note)
+            outcome = self._outcome(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
             if widened == WIDENED or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
                 break
         return outcome
+
+    def again(self, outcome: Outcome, verify: float) -> Outcome:
+        """The outcome solved again for the value of its stage, within hard limits, where a simulation of the derived problem does not
+        confirm it: on finer meshes, or inside the limits that it exceeds; itself where that leads nowhere."""
+        before = outcome.lifted
+        if before is None or not before.first:
+            # What stages before attained on this mesh is not what they attain on others.
+            return outcome
+        found = self._mended(before.nlp, before.z, outcome.note, verify)
+        z, method = found[0].decision, from_dict(found[0].transcription or {})
+        if method == before.nlp.transcription and np.array_equal(z, before.z):
+            return outcome
+        nlp, own = method.nlp(before.derived.problem), method.nlp(self.problem)
+        return self._outcome(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note)
+
+    def nearest(self, outcome: Outcome, verify: float, known: Points) -> Outcome:
+        """The outcome solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where
+        that leads nowhere. Objectives are judged by the ranges of known points."""
+        found = self._mended(outcome.nlp, outcome.z, outcome.note, verify, _confirmed_ends(known).replace(problem=self.problem))
+        z, method = found[0].decision, from_dict(found[0].transcription or {})
+        if method == outcome.nlp.transcription and np.array_equal(z, outcome.z):
+            return outcome
+        note = "; ".join(filter(None, [ONLY_NEAR, unmarked(found)[0].note]))
+        return Outcome(method.nlp(self.problem), z, found.F[0], CONVERGED, note)
+
+    def _mended(self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None) -> Points:
+        """A converged vector as a point that is mended as those of other gradient tools are, beside others of a front, which are confirmed;
+        what that costs is counted."""
+        about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
+        point = vectors_points(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
+        found = solved_again(point if among is None else unmarked(Points.concatenate([point, among])), verify)
+        spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work")}
+        self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
+        return found[[0]]
 
     def _derived(self, stage: Stage, kept: Sequence[Kept], known: Known) -> Valued:
         """The problem with the value of the stage as its objective."""
@@ -166,10 +222,17 @@ class StageSolver:
                 break
         return solver.better(found, REFERENCE, WEIGHTS)
 
-    def _outcome(self, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
+    def _outcome(self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
         """What was found, as a vector of the problem itself."""
-        z = own.tighten(derived.dropped(nlp.variables, own.variables, z)[None])
-        return Outcome(own, z[0], own.evaluate(z)[0][0], status, note)
+        own_z = own.tighten(derived.dropped(nlp.variables, own.variables, z)[None])
+        return Outcome(own, own_z[0], own.evaluate(own_z)[0][0], status, note, Lifted(stage, first, derived, nlp, z))
+
+
+def _confirmed_ends(known: Points) -> Points:
+    """Those confirmed points that have the least or the largest value of an objective."""
+    rows = np.flatnonzero(known.verified)
+    F = known.F[rows]
+    return known[sorted({int(rows[k]) for k in [*F.argmin(axis=0), *F.argmax(axis=0)]} if len(rows) else [])]
 
 
 def _none(J: Sequence[object]) -> list[object]:

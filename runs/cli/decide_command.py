@@ -283,9 +283,13 @@ def _value(text: str, name: str, goals: Sequence[Objective]) -> float:
 
 
 def _assignments(text: str, goals: Sequence[Objective]) -> dict[str, float]:
-    """{name: value} of "NAME=VALUE, NAME=VALUE"."""
-    found: dict[str, float] = {}
+    """{name: value} of "NAME=VALUE, NAME=VALUE", of which names may have commas."""
+    parts: list[str] = []
     for part in text.split(",") if text.strip() else []:
+        # What has no value yet goes on after the comma.
+        parts[-1:] = [f"{parts[-1]},{part}"] if parts and "=" not in parts[-1] else [*parts[-1:], part]
+    found: dict[str, float] = {}
+    for part in parts:
         name, equals, value = part.rpartition("=")
         if not equals:
             raise ValueError(f"'{part.strip()}': write NAME=VALUE")

@@ -12,11 +12,13 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from macs import Front, sweep
 from macs.decisions import Dialogue, Larger, PhysicalProgramming, ReferencePoint, Smaller, to_dict
 from problems import load
+from problems.compiled import Objective
 from runs.cli import main
 from transcription import DFET
 
@@ -143,6 +145,26 @@ def test_wrong_calls_are_one_line(fronts: Path, here: Path, capsys: pytest.Captu
     ]:
         more = outs if not {"--out", "--json", "--plot"} & {*call} else []
         assert words in wrong(capsys, *call, *more), call
+
+
+def test_names_with_commas(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    goals = (Objective("load, largest", unit="kN"), Objective("mass, dry"), Objective("time"))
+    F = np.array([[1.0, 5.0, 9.0], [2.0, 3.0, 4.0], [5.0, 1.0, 2.0]])
+    Front(F=F, decision=np.zeros((3, 0)), violation=np.zeros(3), status=["converged"] * 3, goals=goals).save("box.nc")
+    wanted = ReferencePoint({"load, largest": 2.0, "mass, dry": 3.0, "time": 4.0})
+    one, other = "load, largest=2 kN, mass, dry=3, time=4", ["time=4", "mass, dry=3", "load, largest=2"]
+    for call in (["--reference", one], [word for each in other for word in ("--reference", each)]):
+        assert main(["decide", "box.nc", *call, "--json", "c.json"]) == 0
+        assert Dialogue.load("c.json").history[-1].preference == wanted
+    assert main(["decide", "box.nc", "--improve", "mass, dry", "--giving", "load, largest=5, time=9"]) == 0
+    capsys.readouterr()
+    for text, words in (
+        ("load, largest", "'load, largest': write NAME=VALUE"),
+        ("load=2", "unknown objective 'load'"),
+        ("time, load, largest=2", "unknown objective 'time, load, largest'"),
+        ("time=4,", "'': write NAME=VALUE"),
+    ):
+        assert words in wrong(capsys, "box.nc", "--reference", text), text
 
 
 def test_commands_in_a_terminal(fronts: Path, here: Path) -> None:
