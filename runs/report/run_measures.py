@@ -60,12 +60,12 @@ def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
 
 
 def histories(comparison: Comparison, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:
-    """{solver: histories} of an indicator over a cost, of the runs whose history is known."""
+    """{solver: histories} of an indicator over a cost, of the runs whose history is known and had any of it: a sweep has no evaluations."""
     key, _ = AXES[axis]
     return {
         solver: known
         for solver, runs in comparison.runs.items()
-        if (known := [_history(run, reference, name, key) for run in runs if run.history.get("F")])
+        if (known := [_history(run, reference, name, key) for run in runs if run.history.get("F") and any(run.history[key])])
     }
 
 
