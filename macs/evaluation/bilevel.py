@@ -11,7 +11,7 @@ from transcription.inner import InnerSolver
 from transcription.nlp.scalarized import scalarize
 from transcription.smooth import Smooth
 
-from .evaluator import CONVERGED, Counts, Evaluation, Evaluator
+from .evaluator import Counts, Evaluation, Evaluator
 
 PATIENCE = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
@@ -105,8 +105,7 @@ class Bilevel(Evaluator):
             Z=np.array([solved.z for solved in found]).reshape(-1, starts.shape[1]),
             F=np.array([solved.F for solved in found]).reshape(-1, references.shape[1]),
             violation=np.array([solved.violation for solved in found]),
-            # What ran out of iterations is not optimal, but feasible all the same.
-            status=np.array([CONVERGED if solved.violation <= self.tolerance else solved.status for solved in found], dtype="<U10"),
+            status=np.array([solved.status for solved in found], dtype="<U10"),
             clocked=any(solved.clocked for solved in found),
         )
         return evaluation, sum(solved.iterations for solved in found)

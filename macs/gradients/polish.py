@@ -42,7 +42,14 @@ GAIN = 0.995
 """A slide is tried only if it is expected to lower the energy of the point at least to this fraction."""
 
 
-def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None = None, guide: Guide | None = None) -> Archive:
+def polish(
+    archive: Archive,
+    solves: CountedSolves,
+    limit: int,
+    exponent: float | None = None,
+    guide: Guide | None = None,
+    optima: np.ndarray | None = None,
+) -> Archive:
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
     1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
@@ -67,12 +74,14 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         See `archive.pair_energies`.
     guide : Guide, optional
         How densely points are wanted. Default: evenly.
+    optima : array (k, m), optional
+        Objectives of points that gradient solves have found already.
     """
     if not len(archive):
         return archive
-    solved = np.empty((0, archive.F.shape[1]))
+    solved = np.empty((0, archive.F.shape[1])) if optima is None else optima
     if archive.F.shape[1] > CURVE:
-        archive, solved = _cover(archive, solves, limit, exponent, guide)
+        archive, solved = _cover(archive, solves, solved, limit, exponent, guide)
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
@@ -88,13 +97,13 @@ def polish(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         if not (len(references) and solves.left):
             break
         found = solves(starts, references, np.tile(span, (len(references), 1)))
-        pool = pool.joined(Archive.of(found, found.status == CONVERGED))
+        pool = pool.joined(Archive.of(found, solves.feasible(found)))
         failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
         if len(failed) and solves.left:
             near, far = failed.ravel(), failed[:, ::-1].ravel()
             nearer = archive.F[near] + NEARER * (archive.F[far] - archive.F[near])
             found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
-            pool = pool.joined(Archive.of(found, found.status == CONVERGED))
+            pool = pool.joined(Archive.of(found, solves.feasible(found)))
         pool = _front(pool, span)
         before, archive = archive, _thinned(pool, limit, exponent, guide)
         if np.array_equal(before.F, archive.F):
@@ -113,11 +122,11 @@ def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | N
 def _descend(
     archive: Archive, solves: CountedSolves, solved: np.ndarray, exponent: float | None, guide: Guide | None
 ) -> tuple[Archive, Archive]:
-    """The points after one guarded solve each, but for those with objectives (k, m) that were `solved` already, with the ends of the front,
-    unless these were; and the points that are left out for want of solves."""
+    """The points after one guarded solve each, but for those with objectives (k, m) that were `solved` already, with the ends of the front;
+    and the points that are left out for want of solves."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
-    fresh = ~(archive.F[:, None] == solved).all(axis=2).any(axis=1)
+    fresh = ~_among(archive.F, solved)
     chosen = fresh.copy()
     if most < np.count_nonzero(fresh):
         chosen[fresh] = archives.spread(archive.F[fresh], most, exponent=exponent, guide=guide)
@@ -126,18 +135,25 @@ def _descend(
     found = solves(points.Z, points.F, np.tile(span, (len(points), 1)))
     kept = feasible_and_no_worse(found, points.F, points.violation, span)
     archive = points.replaced(kept, found).joined(archive.take(~chosen))
-    return _front(archive if len(solved) else _ends(archive, span, solves).joined(archive), span), waiting
+    return _front(_ends(archive, span, solves, solved).joined(archive), span), waiting
 
 
-def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float | None, guide: Guide | None) -> tuple[Archive, np.ndarray]:
+def _among(F: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the rows of F (n, m) that are rows of `known` (k, m)."""
+    return (F[:, None] == known).all(axis=2).any(axis=1)
+
+
+def _cover(
+    archive: Archive, solves: CountedSolves, solved: np.ndarray, limit: int, exponent: float | None, guide: Guide | None
+) -> tuple[Archive, np.ndarray]:
     """The points with the ends of the front, and results of solves to `limit` places between them: always the place farthest from all known
-    points, in distances multiplied by the factors of a guide. Also the objectives (k, m) of what the solves found."""
+    points, in distances multiplied by the factors of a guide. Also the objectives (k, m) of what these and earlier solves found."""
     m, span = archive.F.shape[1], ranges(archive.F)
-    ends = _ends(archive, span, solves)
+    ends = _ends(archive, span, solves, solved)
     pool = _front(ends.joined(archive), span)
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
-    known, solved = across((ends.F - ideal) / between), ends.F
+    known, solved = across((ends.F - ideal) / between), np.vstack([solved, ends.F])
     lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
     for _ in range(limit):
         if solves.left <= 0:
@@ -155,16 +171,18 @@ def _cover(archive: Archive, solves: CountedSolves, limit: int, exponent: float 
         start = np.argmin(((pool.F - reference) / between).max(axis=1))
         found = solves(pool.Z[start : start + 1], reference[None], between[None])
         known = np.vstack([known, place])
-        if found.status[0] == CONVERGED:
+        if solves.feasible(found)[0]:
             known, solved = np.vstack([known, across((found.F - ideal) / between)]), np.vstack([solved, found.F])
             pool = Archive.of(found, np.arange(1)).joined(pool)
     return _thinned(_front(pool, between), limit, exponent, guide), solved
 
 
-def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves) -> Archive:
-    """One point for each objective: its least value, and for that the least values of the others."""
+def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.ndarray) -> Archive:
+    """One point for each objective: its least value, and for that the least values of the others; as they are where all were `solved`."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
+    if _among(best.F, solved).all():
+        return best
     one = np.eye(m, dtype=bool)
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
     gain = (np.diag(best.F) - np.diag(single.F)) / span
@@ -312,6 +330,10 @@ class CountedSolves:
             self.left -= 1
             Z[one], F[one], violation[one], status[one] = found.Z, found.F, found.violation, found.status
         return Evaluation(Z, F, violation, status)
+
+    def feasible(self, found: Evaluation) -> np.ndarray:
+        """Mask (k,) of the feasible results: those that ran out of iterations may be, too."""
+        return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
 
     def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
         """The result of the next solve, one row, from the log or made now; no row if asked to end early."""

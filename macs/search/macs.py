@@ -14,9 +14,10 @@ from problems.peaks import refuse_peaks
 from transcription.base import Transcription
 from transcription.catalogue import parse
 from transcription.meshed import Meshed
+from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.evaluator import Evaluation, Evaluator
+from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
 from ..gradients.front_polish import polished
@@ -89,13 +90,15 @@ class MACS(Settings, Solver):
             credit=no_credit(),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
+            optima=np.empty((0, m)),
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
         infeasible = not (seen.violation <= evaluator.tolerance).any()
-        if self.refines and infeasible and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
+        if self.refines and infeasible and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
             optima = gradient_action.first_optima(seen, evaluator, rng)
             remember(state, [optima], self, evaluator)
+            state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
@@ -133,7 +136,8 @@ class MACS(Settings, Solver):
         if state.polishing is None:
             state.polishing = PolishLog.of(state.archive)
         solves = CountedSolves(evaluator, state.evaluations // self.polish_every - state.refinements, state.polishing)
-        state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator))
+        guide = guide_of(self.prefer, evaluator)
+        state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide, state.optima)
         if not solves.stopped:
             state.polishing = None
 

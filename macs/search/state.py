@@ -98,6 +98,8 @@ class SearchState:
         For each breeding operator, the number of offspring that the archive kept and of all offspring; see `breeding.updated_credit`.
     iteration, evaluations, refinements : int
         Iterations done; evaluations counted by the evaluator; gradient solves of agents.
+    optima : array (k, m)
+        Objectives of the optima that the search began with.
     rng : numpy.random.Generator
         The generator of all random numbers; a checkpoint keeps its `bit_generator.state`.
     polishing : PolishLog, optional
@@ -114,6 +116,7 @@ class SearchState:
     credit: np.ndarray
     iteration: int
     evaluations: int
+    optima: np.ndarray
     rng: np.random.Generator
     refinements: int = 0
     polishing: PolishLog | None = None

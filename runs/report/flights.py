@@ -82,7 +82,8 @@ class Flights:
                 points, many = (tuple(front[i] for i in representatives(front, count)) for count in (4, MANY))
                 address = front.source.address if front.source is not None else ""
                 place = module_of(address) if address and not address.rpartition(":")[0].endswith(".py") else None
-                ends, note = _ends(front)
+                known = _known_ends(comparison)
+                ends, note = (known, "") if known is not None else _ends(front)
                 laws = {getattr(place, "LAW", LAW): _laws(place, points), ALONE: _alone(points, ends)}
                 return cls(comparison, comparison.against, solver, points, many, place, laws, ends, note)
         return None
@@ -171,6 +172,14 @@ def time_histories(point: Point) -> dict[str, np.ndarray]:
         for name in names:
             parts[name].append(along(phase, name)[1] if name in own else np.full(len(times), np.nan))
     return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def _known_ends(comparison: Comparison) -> Front | None:
+    """The ends that a solver of the comparison found, in the order of the objectives; None if none of them looked for these."""
+    for front in (front for fronts in comparison.fronts.values() for front in fronts):
+        if front.solver.get("name") == "payoff" and len(front) == len(front.goals):
+            return front[front.F.argmin(axis=0)]
+    return None
 
 
 def _ends(front: Front) -> tuple[Front, str]:

@@ -135,7 +135,7 @@ def test_damage_is_refused_in_one_line(file, monkeypatch, damage: Callable[[byte
     [
         (b"", "is no checkpoint: it is empty"),
         (b"to do: buy milk\n", "is no checkpoint: it is a file of something else"),
-        (b"MACS checkpoint 2: buy milk\n", "is damaged: its first line"),
+        (b"MACS checkpoint 3: buy milk\n", "is damaged: its first line"),
         (b"MACS checkpoint 2", "is damaged: its first line"),
         (
             zipped({"document.npy": npy(np.zeros(3, np.uint8))}),
