@@ -30,6 +30,8 @@ from .tables import Cell, Column, Table, table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+GRADIENT_TOOLS = ("optimize", "payoff", "sweep")
+"""Names of solvers whose points are optima."""
 MANY = 100
 LAW, ALONE = "known law", "single objective"
 """Names of the dashed and dotted lines; a case may have a `LAW` of its own."""
@@ -175,11 +177,13 @@ def time_histories(point: Point) -> dict[str, np.ndarray]:
 
 
 def _known_ends(comparison: Comparison) -> Front | None:
-    """The ends that a solver of the comparison found, in the order of the objectives; None if none of them looked for these."""
-    for front in (front for fronts in comparison.fronts.values() for front in fronts):
+    """The ends that a solver of the comparison found, in the order of the objectives; none where all solvers are gradient tools, whose
+    points are optima themselves; None where they are to be found."""
+    found = [front for fronts in comparison.fronts.values() for front in fronts if len(front)]
+    for front in found:
         if front.solver.get("name") == "payoff" and len(front) == len(front.goals):
             return front[front.F.argmin(axis=0)]
-    return None
+    return found[0][:0] if all(front.solver.get("name") in GRADIENT_TOOLS for front in found) else None
 
 
 def _ends(front: Front) -> tuple[Front, str]:
