@@ -149,9 +149,8 @@ class Phase:
         """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints.
 
         `casadi.fabs(...)` in it, alone or as a term of a sum, times a number or not, is no obstacle to gradients where it is minimised or
-        bounded above: a transcription may write it with bounds on both signs, which are smooth. Other expressions that have a kink
-        (`casadi.fmax(u, -u)`, `casadi.fabs(u) * x`) stay as they are; for a factor that is never negative, write
-        `casadi.fabs(u * x)`.
+        bounded above: a transcription may write it with bounds on both signs, which are smooth. Other expressions with a kink stay as they
+        are (`casadi.fmax(u, -u)`, `casadi.fabs(u) * x`): write `casadi.fabs(u)`, and `casadi.fabs(u * x)` where x is never negative.
         """
         terms = absolute_terms(self._expression(expr, f"phase '{self.name}': the expression of integral(...)"))
         (factor, first), *others = ((factor, self._quantity("integral", term)) for factor, term in terms)
