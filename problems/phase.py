@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from . import checks
+from .absolute import absolute_terms
 from .compiled import CompiledPhase, Limit, Variable, vector_function
 
 _KINDS = ("initial", "final", "integral", "peak")
@@ -147,10 +148,14 @@ class Phase:
     def integral(self, expr: Any) -> ca.MX:
         """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints.
 
-        One of `casadi.fabs(...)` as it stands, minimised or bounded above, is no obstacle to gradients: a transcription may write it with
-        bounds on both signs, which are smooth.
+        `casadi.fabs(...)` in it, alone or as a term of a sum, times a number or not, is no obstacle to gradients where it is minimised or
+        bounded above: a transcription may write it with bounds on both signs, which are smooth. Other expressions with a kink stay as they
+        are (`casadi.fmax(u, -u)`, `casadi.fabs(u) * x`): write `casadi.fabs(u)`, and `casadi.fabs(u * x)` where x is never negative.
         """
-        return self._quantity("integral", expr)
+        terms = absolute_terms(self._expression(expr, f"phase '{self.name}': the expression of integral(...)"))
+        (factor, first), *others = ((factor, self._quantity("integral", term)) for factor, term in terms)
+        whole = first if factor == 1.0 else factor * first
+        return sum((factor * one for factor, one in others), whole)
 
     def peak(self, expr: Any) -> ca.MX:
         """The maximum over time of an expression of the phase's symbols, for use in objectives and constraints.

@@ -145,9 +145,7 @@ class ElementsPhase(PhaseWriter):
 
     def _with_sizes(self, totals: ca.MX, S: ca.MX, sizes: ca.MX, lengths: tuple[ca.MX, ca.MX], rows: Rows) -> ca.MX:
         """The integrals, those of absolute values as sums of the variables S (sizes, n k), which are not to be less than these."""
-        scales = np.tile([v.scale for v in self._sizes], sizes.shape[1])
-        for sign in (1.0, -1.0):
-            rows.add(sign * sizes - S, -np.inf, 0.0, scales, f"absolute values in '{self.phase.name}'", propagated=True)
+        self.add_sizes(rows, sizes, S, self.phase.size_scales)
         entries = ca.vertsplit(totals)
         (weighted,) = rows.at_points(times_half_length(self.phase, len(self._sizes)), S, *lengths)
         for row, one in zip(self.phase.sized, ca.vertsplit(weighted), strict=True):

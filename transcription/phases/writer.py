@@ -351,6 +351,12 @@ class PhaseWriter(ABC):
             label = f"path '{limit.name}' of '{self.phase.name}'"
             rows.add_samples(self.phase.name, "path", samples, limit.lower, limit.upper, limit.scale, label)
 
+    def add_sizes(self, rows: Rows, sizes: ca.MX, S: ca.MX, scales: Sequence[float]) -> None:
+        """Add the rows that keep the variables S (n, k), of these scales (n,), from being less than the absolute values of sizes (n, k)."""
+        for sign in (1.0, -1.0):
+            of_all = np.tile(scales, sizes.shape[1])
+            rows.add(sign * sizes - S, -np.inf, 0.0, of_all, f"absolute values in '{self.phase.name}'", propagated=True)
+
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial
     ) -> PhaseTrajectory:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase
+from problems.compiled import CompiledPhase, Variable
 
 from ..numerics.batched import CHAIN, Batched, widened, work
 from ..numerics.polynomials import lobatto_nodes
@@ -28,10 +28,10 @@ LONG = 3_000_000
 class ShootingPhase(PhaseWriter):
     """One phase on M intervals.
 
-    Slots: `U` (values, nu) of the controls and, where the intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends,
-    which are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of each shot; `Y`
-    (M - 1, nx), states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) samples of path
-    constraints and peaks.
+    Slots: `U` (values, nu) of the controls, `S` (values, k) of the absolute values that are constant where the controls are, and, where the
+    intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends, which are unknowns of their own. Hidden: `R` (shots, nx),
+    where the states arrive from the left at the end of each shot; `Y` (M - 1, nx), states at the nodes that are no variables (single
+    shooting); `Q` integrals; `W` (points, rows) samples of path constraints and peaks.
     """
 
     def __init__(
@@ -51,6 +51,10 @@ class ShootingPhase(PhaseWriter):
         self.Q = layout.add_hidden(phase.integrands.size1_out(0))
         points = mesh.steps * len(step.points) + (1.0 not in step.points)
         self.W = layout.add_hidden(points if step.rows else 0, step.rows)
+        self._sized = _sized_by_controls(phase) if law.jumps else []
+        sizes = [Variable(f"size[{k}]", -np.inf, np.inf, "", phase.size_scales[k]) for k in self._sized]
+        self.S = layout.add_table(prefix, sizes, law.count, 1)[:, 0]
+        self.magnitudes = self.S.ravel()
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
         self.compilable, self.wide = step.symbolic, step.plain
 
@@ -69,7 +73,25 @@ class ShootingPhase(PhaseWriter):
         seen = pick(extended, self.W)
         self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
-        return Written(self.step.controls(first, 0.0), self.step.controls(last, 1.0), pick(extended, self.Q), seen[len(phase.paths) :, :])
+        integrals, sizes = self._with_sizes(extended, rows)
+        ends = self.step.controls(first, 0.0), self.step.controls(last, 1.0)
+        return Written(*ends, integrals, seen[len(phase.paths) :, :], ca.vec(ca.fabs(sizes)))
+
+    def _with_sizes(self, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
+        """The integrals, those of absolute values that are constant where the controls are as sums of the variables S; and what these
+        values are of, (k, values)."""
+        pick, phase = self.layout.pick, self.phase
+        integrals, U = pick(extended, self.Q), pick(extended, self.U)
+        if not self._sized:
+            return integrals, ca.MX(0, 1)
+        S, s = pick(extended, self.S), pick(extended, self.ends.statics)
+        sizes = phase.sizes.map(self.law.count)(0, U, 0, ca.repmat(s, 1, self.law.count))[self._sized, :]
+        self.add_sizes(rows, sizes, S, [phase.size_scales[k] for k in self._sized])
+        entries = ca.vertsplit(integrals)
+        totals = (s[1] - s[0]) * (S @ ca.DM(np.diff(self.law.edges)))
+        for k, total in zip(self._sized, ca.vertsplit(totals), strict=True):
+            entries[phase.sized[k]] = total
+        return ca.vertcat(*entries), sizes
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.state_nodes`."""
@@ -262,6 +284,12 @@ class ShootingPhase(PhaseWriter):
             ca.vertcat(controls[i * each : (i + 1) * each, :], statics[0, :] + length * places[i], length * widths[i], statics)
             for i in range(n)
         ]
+
+
+def _sized_by_controls(phase: CompiledPhase) -> list[int]:
+    """Which of the phase's `sizes` depend on nothing that varies in time but controls."""
+    varying = {row for i in (0, 2) for row in phase.sizes.jac_sparsity(0, i).row()}
+    return [k for k in range(len(phase.sized)) if k not in varying]
 
 
 def _by_step(values: ca.MX, k: int, n: int) -> ca.MX:
