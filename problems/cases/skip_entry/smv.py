@@ -32,7 +32,7 @@ from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
 
 __all__ = ["REFERENCE", "plot", "problem", "reference", "track"]
 
-REFERENCE = "the front that gradients and MACS found"
+REFERENCE = "the front that gradients found"
 
 HEATING = 200.0
 """Btu/ft2/s."""
