@@ -172,8 +172,10 @@ def _cover(
         found = solves(pool.Z[start : start + 1], reference[None], between[None])
         known = np.vstack([known, place])
         if solves.feasible(found)[0]:
-            known, solved = np.vstack([known, across((found.F - ideal) / between)]), np.vstack([solved, found.F])
+            known = np.vstack([known, across((found.F - ideal) / between)])
             pool = Archive.of(found, np.arange(1)).joined(pool)
+        # What ran out of iterations is to go on.
+        solved = np.vstack([solved, found.F[found.status == CONVERGED]])
     return _thinned(_front(pool, between), limit, exponent, guide), solved
 
 

@@ -170,7 +170,7 @@ def flown(trajectory) -> dict[str, np.ndarray]:
 
 
 def test_the_nominal_flight_flies():
-    """It leads down to where it should and exceeds no limit by more than 2 %, when flown by code of its own."""
+    """It keeps all limits and leads down to where it should, when flown by code of its own."""
     problem = load("smv")
     compiled = problem.compile()
     down = compiled.phases[0]
@@ -184,7 +184,7 @@ def test_the_nominal_flight_flies():
     spans = np.array([v.upper - v.lower for v in down.states])
     assert (np.abs(found.y - guessed).max(axis=1) < 2e-3 * spans).all()
     assert abs(found.y[0, -1] - 50e3) < 300 and abs(math.degrees(found.y[4, -1])) < 0.1
-    assert np.max([np.array(in_the_air(y)[3]) / [200, 13406.4583, 2.5] for y in found.y.T]) < 1.02
+    assert np.max([np.array(in_the_air(y)[3]) / [200, 13406.4583, 2.5] for y in found.y.T]) < 1.0
 
 
 def test_pictures_show_commands_and_limits(tmp_path):
@@ -210,12 +210,12 @@ def test_pictures_show_commands_and_limits(tmp_path):
 
 
 def test_a_solve_from_the_nominal_flight_is_confirmed():
-    """The fastest flight near it, flown by code of its own, ends at 79.248 km within 20 m and keeps its limits."""
+    """The greatest terminal speed is its bound; flown by code of its own, the flight ends at 79.248 km within 20 m and keeps its limits."""
     from macs import optimize
 
     problem = load("smv")
-    point = optimize(problem, stated(problem.default_transcription), objective="flight time", verify=None)
-    assert point.status == "converged" and point.objectives["flight time"] < problem.compile().phases[0].guesses["altitude"][0][-1] + 51.1
+    point = optimize(problem, stated(problem.default_transcription), objective="terminal speed", verify=None)
+    assert point.status == "converged" and point.objectives["terminal speed"] == pytest.approx(7802.88, abs=1e-3)
     found = flown(point.trajectory)
     assert abs(found["descent"][0] - 50e3) < 20 and abs(found["ascent"][0] - 79248.0) < 20
     assert found["limits"].max() < 1.005

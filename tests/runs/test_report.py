@@ -11,6 +11,7 @@ import pytest
 from misbehaving import Crashing, Plain, glide
 
 from macs import Front
+from macs.gradient_solvers import Payoff, Sweep
 from problems import load
 from runs import Study, gd, igd
 from runs.batch.store import Store
@@ -54,6 +55,20 @@ def folder(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def told(folder) -> str:
     return str(study().report(folder))
+
+
+@pytest.mark.parametrize("solvers", [{"ends": Payoff()}, {"front": Sweep(points=3)}])
+def test_gradient_tools_alone_need_no_ends_and_no_figures_over_evaluations(solvers, tmp_path, monkeypatch):
+    def unasked(*_):
+        raise AssertionError("ends that are known, or not needed, were sought")
+
+    monkeypatch.setattr("runs.report.flights.payoff", unasked)
+    ours = study(solvers=solvers, runs=1, paper=[])
+    ours.run(tmp_path / "out")
+    told = str(ours.report(tmp_path / "out"))
+    assert ("distance alone" in told) == ("ends" in solvers)
+    names = {path.name for path in (tmp_path / "out" / "report").iterdir()}
+    assert any("over-time.png" in name for name in names) and not any("over-evaluations" in name for name in names)
 
 
 def test_everything_is_told_and_written(folder, told):

@@ -66,8 +66,8 @@ COMMON: Options = (
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
 SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS. Where limits of objectives leave nothing strictly inside, those that are not scaled make iterations up to
-thirty times as long."""
+"""Scaling of matrices by MUMPS. Where limits of objectives leave nothing strictly inside, those that are not scaled make iterations many
+times as long."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -203,7 +203,8 @@ def scalarize(
         Most iterations of IPOPT by all strategies together, and the time of each run. The time is a safety net: what it ends is not
         reproducible.
     persistent : bool
-        Give each strategy a share of the iterations. Otherwise the first may take them all, and others what is left where it ended badly.
+        Give each strategy a share of the iterations, at least `LEAST`. Otherwise the first may take them all, and others what is left
+        where it ended badly.
     near : bool
         Look near the start only, though it is not feasible yet: it is the optimum of almost the same, as on another mesh.
 

@@ -44,3 +44,17 @@ def test_optima_that_are_not_given_are_found():
     solver = solver_of_two_valleys()
     ends = solver.ends()
     assert len(ends) == 2 and ends[0].F[0] < 1e-10 and ends[1].F[0] == pytest.approx(1.0, abs=1e-5)
+
+
+def test_an_end_is_also_sought_from_those_of_the_others():
+    problem = Problem("valleys of one")
+    run = problem.phase("run", t0=0.0, tf=1.0)
+    x, p = run.state("x", bounds=(-2, 2), initial=0), problem.parameter("p", bounds=(-2, 2))
+    run.dynamics(x=run.control("u", bounds=(-1, 1)))
+    problem.minimize("valleys", (p**2 - 1) ** 2 + 0.2 * p + run.final(x) ** 2)
+    problem.minimize("bowl", (p + 1.5) ** 2 + (run.final(x) - 0.5) ** 2)
+    solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
+    (poor, place), (other, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
+    assert poor.z[place] > 0 > other.z[place], "the one that was found is in the poor valley"
+    end = solver.ends([poor, other])[0]
+    assert end.z[place] == pytest.approx(np.roots([4, 0, -4, 0.2]).real.min(), abs=1e-5) and end.F[0] < poor.F[0] - 0.3

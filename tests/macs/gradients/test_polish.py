@@ -11,7 +11,7 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
-from macs.gradients.polish import CountedSolves, polish
+from macs.gradients.polish import CountedSolves, _ends, _helped_by_neighbours, polish
 from macs.pareto.archive import Archive
 from macs.search.gradient_action import allowed
 from macs.search.state import SearchState
@@ -313,3 +313,55 @@ def test_a_peak_that_is_maximised_leaves_the_search_without_derivatives() -> Non
     problem.minimize("effort", phase.integral(u**2))
     front = MACS(archive=4).solve(problem, DFET(2, 2), evaluations=100, seed=1)
     assert len(front) == 4 and front.stats["gradient_solves"] == 0 and front[0].optimality is None
+
+
+@pytest.mark.parametrize("kind", [AskingCircle, AskingSphere])
+def test_optima_that_are_known_are_not_solved_again(kind) -> None:
+    size = len(kind().free) - 1
+    Z = np.column_stack([np.ones(6), np.random.default_rng(2).uniform(0.1, 1.4, (6, size))])
+    archive = Archive(Z, kind.objectives(Z), np.zeros(6))
+
+    def again(known: np.ndarray | None) -> int:
+        """How many of the points are solved for their own objectives from where they are."""
+        evaluator, asked = kind(), []
+        descend = evaluator.descend
+
+        def noted(starts, references, weights):
+            asked.extend(np.hstack([starts, references]))
+            return descend(starts, references, weights)
+
+        evaluator.descend = noted
+        polish(archive, CountedSolves(evaluator, 200), 6, optima=known)
+        return sum((row == np.hstack([Z, archive.F])).all(axis=1).any() for row in asked)
+
+    assert again(None) > 0 and again(archive.F) == 0
+
+
+class Answers:
+    """Gives prepared objectives, and notes from where they were asked."""
+
+    tolerance = 1e-6
+
+    def __init__(self, *F: list[float]) -> None:
+        self.F, self.starts = iter(np.array(F)), []
+
+    def descend(self, starts, references, weights) -> Evaluation:
+        self.starts.append(starts[0])
+        return Evaluation(starts + 100.0, next(self.F)[None], np.zeros(1), np.array([CONVERGED]))
+
+
+def test_an_end_gives_way_to_a_flight_that_is_far_worse_only_for_a_gain() -> None:
+    archive = Archive(np.array([[1.0], [2.0]]), np.array([[0.0, 1.0], [1.0, 0.0]]), np.zeros(2))
+    for gain, place in ((1e-6, 1.0), (1e-3, 101.0)):
+        # The least of objective 0 with a worse objective 1; then nothing new.
+        evaluator = Answers([-gain, 5.0], [1.0, 0.0], [9.0, 9.0], [9.0, 9.0])
+        found = _ends(archive, np.ones(2), CountedSolves(evaluator, 4), np.empty((0, 2)))  # type: ignore[arg-type]
+        assert found.Z[0, 0] == place
+
+
+def test_with_few_solves_poor_points_start_from_what_nearly_dominates_them() -> None:
+    F = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.4, 0.4, 0.4], [0.9, 0.9, 0.35], [0.35, 0.8, 0.9]])
+    archive = Archive(np.arange(6.0)[:, None], F, np.zeros(6))
+    evaluator = Answers(*[[9.0, 9.0, 9.0]] * 4)
+    assert _helped_by_neighbours(archive, CountedSolves(evaluator, 4)) is archive  # type: ignore[arg-type]
+    assert [start[0] for start in evaluator.starts] == [3.0, 3.0], "of four solves two, from the point in the middle"

@@ -1,0 +1,43 @@
+"""What a search begins with where none of its first candidates is feasible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from macs import MACS, payoff
+from macs.evaluation.bilevel import Bilevel
+from macs.search.state import SearchState
+from problems import load
+from transcription import Collocation
+from transcription.inner import inner_solver
+from transcription.stopping import stopped_by
+
+METHOD = Collocation(2, 4)
+
+
+def evaluator_of_vectors() -> Bilevel:
+    """Candidates are whole vectors: random states do not obey the dynamics."""
+    inner = inner_solver("none")
+    return Bilevel(inner.program(METHOD.nlp(load("goddard").compile())), inner, 1e-6)
+
+
+def begun(evaluator: Bilevel, **settings) -> SearchState:
+    return MACS(agents=4, **settings).begin(evaluator, 200, np.random.default_rng(0))
+
+
+def test_the_ends_of_the_front_and_a_compromise() -> None:
+    evaluator = evaluator_of_vectors()
+    state = begun(evaluator)
+    ends = payoff(load("goddard"), METHOD, verify=None)
+    np.testing.assert_allclose(np.diag(state.optima[:2]), np.diag(ends.F), rtol=1e-6)
+    assert len(state.optima) == 3 and (state.optima[2] > state.optima[:2].min(axis=0)).all()
+    assert len(state.archive) == 3 and evaluator.counts.gradient_solves >= 5
+
+
+def test_without_gradients_or_time_there_are_none() -> None:
+    assert not len(begun(evaluator_of_vectors(), refine=False).optima)
+    evaluator = evaluator_of_vectors()
+    evaluator.evaluate(evaluator.first_guess(evaluator.lower[None]))  # builds what it needs, which is not begun either
+    with stopped_by(lambda: True):
+        state = begun(evaluator)
+    assert not len(state.optima) and evaluator.counts.gradient_solves == 0
