@@ -27,7 +27,7 @@ from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 PEAK_SAMPLES = 1024
 TRUSTED = 1e-3
-"""Largest error of costates by the adjoint equation that are preferred to those of a method."""
+"""Largest error at t0 of costates by the adjoint equation that are preferred to those of a method."""
 
 WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
 
@@ -332,7 +332,11 @@ def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultip
     if known is not None and not writer.limited(multipliers):
         return Adjoint(known)
     found = writer.swept(extended, multipliers)
-    return found if known is None or (found.error or 0.0) <= TRUSTED else Adjoint(known)
+    if known is None:
+        return found
+    # Only at t0 is the error one of the integration alone: elsewhere it is also that jumps are taken to lie at nodes.
+    trusted = (found.error or 0.0) <= TRUSTED
+    return found.beside(known, np.array([v.scale for v in writer.phase.states])) if trusted else Adjoint(known)
 
 
 def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:

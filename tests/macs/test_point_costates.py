@@ -55,6 +55,26 @@ def test_with_a_free_end_the_hamiltonian_is_minus_the_weight_of_the_time(ascents
         assert along == pytest.approx(np.full(len(along), -point.weights["flight time"]), rel=1e-5)
 
 
+def test_costates_jump_where_edges_have_moved_to():
+    """A ball below a ceiling at 1/9: it is there from 1/3 to 2/3 of the time, and the costate of v is -u (Bryson and Ho, 3.11). The default
+    mesh has edges near these times, which moved there."""
+    problem = Problem("ball")
+    move = problem.phase("move", t0=0.0, tf=1.0)
+    x = move.state("x", bounds=(-0.1, 1 / 9), initial=0, final=0)
+    v = move.state("v", bounds=(-2, 2), initial=1, final=-1)
+    u = move.control("u", bounds=(-20, 20))
+    move.dynamics(x=v, v=u)
+    problem.minimize("effort", move.integral(u**2 / 2))
+    point = optimize(problem)
+    mesh, edges = point.transcription["settings"]["mesh"]["move"], point.trajectory["move"].state.edges
+    assert max(abs(edges[k] - mesh["edges"][k]) for k in mesh["moving"]) > 0.05, "else this test says nothing"
+    costates, flown = point.costates["move"], point.trajectory["move"]
+    assert costates["v"] == pytest.approx(-flown["u"], abs=0.01 * 6)
+    on = (flown.time > 0.36) & (flown.time < 0.64)
+    assert on.any() and np.abs(costates["x"][on]).max() < 0.02 * 18
+    assert costates.error < 1e-6
+
+
 def test_the_optimum_of_one_objective_has_weight_one():
     """Even at the quickest ascent, where each control is on a bound and other weights would do as well."""
     point = optimize(load("goddard"), parse("dfet:6x4"))

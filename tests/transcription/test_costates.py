@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -16,6 +17,8 @@ from transcription import parse
 from transcription.nlp.costates import costates
 from transcription.nlp.optimality import Conditions
 from transcription.nlp.scalarized import scalarize
+from transcription.phases.adjoint import Adjoint
+from transcription.trajectories.trajectory import PiecewisePolynomial
 
 WORDS = [
     "gauss:8x6",
@@ -48,7 +51,7 @@ def solved(problem, word, reference=None, weights=None):
     return nlp, found
 
 
-def adjoint(problem, word: str, *, swept: bool = False, **task):
+def adjoint(problem, word, *, swept: bool = False, **task):
     """The trajectory of an optimum, and its costates."""
     nlp, found = solved(problem, word, **task)
     conditions = Conditions.of(nlp, found.z)
@@ -302,6 +305,17 @@ def test_costates_jump_where_a_state_enters_and_leaves_its_limit(word):
     assert move["x"][clear] == pytest.approx(expected[clear], abs=0.02 * 18)
     u = np.where(time < 1 / 3, -6 * (1 - 3 * time), np.where(time < 2 / 3, 0.0, -6 * (3 * time - 2)))
     assert move["v"][clear] == pytest.approx(-u[clear], abs=0.02 * 6)
+
+
+@pytest.mark.parametrize(("jump", "error"), [(0.25, 0.0), (0.5, 0.0), (0.2, 0.5), (0.7, 0.5)])
+def test_the_error_tells_of_jumps_in_the_wrong_place(jump, error):
+    """Costates fall from 2 to 1; those of the method do so between the ends of its first two elements."""
+    found = PiecewisePolynomial(np.unique([0.0, 0.25, jump, 0.5, 1.0]), np.empty(0), "lobatto")
+    steps = np.where(found.edges[:-1] < jump, 2.0, 1.0)[:, None, None] * np.ones((1, 2, 1))
+    own = np.array([2.0, 1.0, 1.0])[:, None, None] * np.ones((1, 2, 1))
+    known = PiecewisePolynomial(np.array([0.0, 0.25, 0.5, 1.0]), own, "lobatto")
+    adjoints = Adjoint(replace(found, coefficients=steps), 1e-9)
+    assert adjoints.beside(known, np.ones(1)).error == pytest.approx(max(error, 1e-9))
 
 
 @pytest.mark.parametrize(

@@ -154,9 +154,14 @@ class ElementsPhase(PhaseWriter):
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.state_nodes`."""
-        inside = self.mesh.inside(self.tables.nodes).ravel()
-        slots = np.vstack([self.B[1:], self.X.reshape(len(inside), self.B.shape[1])])
-        return slots, np.concatenate([self.mesh.edges[1:], inside])
+        return np.vstack([self.B[1:], self.X.reshape(-1, self.B.shape[1])]), self._state_places(self.mesh)
+
+    def state_places(self, extended: np.ndarray) -> np.ndarray:
+        """See `PhaseWriter.state_places`."""
+        return self._state_places(self.mesh.found_in(self._edges(extended)))
+
+    def _state_places(self, mesh: PhaseMesh) -> np.ndarray:
+        return np.concatenate([mesh.edges[1:], mesh.inside(self.tables.nodes).ravel()])
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         """See `PhaseWriter.control_nodes`."""

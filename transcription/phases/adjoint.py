@@ -53,11 +53,24 @@ class PhaseMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Adjoint:
-    """Costates of one phase on their own elements, and their error where it is known: the largest difference at t0 from what the
-    multipliers say there, as a part of the largest costate, all of them in scales of their states."""
+    """Costates of one phase on their own elements, and their error where it is known: the largest difference from what the multipliers say
+    at t0, and where it is known at the end of each element, as a part of the largest costate, all in scales of their states."""
 
     costates: PiecewisePolynomial
     error: float | None = None
+
+    def beside(self, known: PiecewisePolynomial, units: np.ndarray) -> Adjoint:
+        """The same, with the error that they have beside costates of the method where its elements end; states are in these units.
+
+        There a method has jumps of its coefficients before its own costate or after it: any value within a jump is right.
+        """
+        begin, end = self.costates.ends()
+        k = np.abs(self.costates.edges[:, None] - known.edges[1:-1]).argmin(axis=0)
+        before, after, own = end[k - 1], begin[k], known.ends()[1][:-1]
+        apart = np.maximum(np.minimum(before, after) - own, own - np.maximum(before, after))
+        size = float(np.abs(self.costates.coefficients * units).max(initial=0.0))
+        largest = float((apart * units).max(initial=0.0)) / (size if size > 0 else 1.0)
+        return Adjoint(self.costates, max(self.error or 0.0, largest))
 
 
 @dataclass(frozen=True, eq=False)

@@ -178,6 +178,10 @@ class PhaseWriter(ABC):
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
         """The phase's trajectory from one extended vector; `trajectory` completes what the method knows."""
 
+    def state_places(self, extended: np.ndarray) -> np.ndarray:
+        """Where the states of `state_nodes` lie (k,) in one extended vector: elsewhere where its mesh has moved."""
+        return self.state_nodes()[1]
+
     def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
         """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
         None: what these say between their places is not known."""
@@ -193,7 +197,7 @@ class PhaseWriter(ABC):
         dynamics, limits, mixed = (np.array(one).ravel() for one in self._by_states(extended, *self._columns(multipliers)))
         mine = multipliers.variables
         limits = limits + np.concatenate([mine, np.zeros(len(limits) - len(mine))])
-        slots, places = self.state_nodes()
+        slots, places = self.state_nodes()[0], self.state_places(extended)
         inside = (slots != self.ends.final).any(axis=1)
         index = self.layout.index
         ending = Ending(

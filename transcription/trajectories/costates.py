@@ -27,8 +27,9 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     polynomial : PiecewisePolynomial
         The costates between the nodes.
     error : float or None
-        Of costates that were integrated backward: the largest difference at t0 from what the multipliers say there, as a part of the
-        largest costate, all in scales of their states. None for those that are multipliers themselves, or follow from these exactly.
+        Of costates that were integrated backward: the largest difference from what the multipliers say at t0, and at the end of
+        each element where these are costates (DFET, Gauss, Radau), as a part of the largest costate, all in scales of their states. None
+        for those that are multipliers themselves, or follow from these exactly.
     """
 
     names: tuple[str, ...]
