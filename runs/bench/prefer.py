@@ -13,9 +13,11 @@ from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.directions import simplex_lattice
-from macs.preferences import Preference, ReferencePoint, WeightedSum
+from macs.preferences import Preference, Ranges, ReferencePoint, WeightedSum
+from macs.search.region import PART, Region
 from problems import load
 from problems.cases import goddard
+from problems.compiled import Objective
 from transcription import parse
 
 from ..measures.interest import Interest
@@ -31,6 +33,10 @@ DENSE = 2001
 """Points of a dense front of two objectives."""
 SWEPT = 25
 """Points of a sweep that it goes through, where no closed form is known."""
+SURVEYED = 165
+"""Points, at most, of each sweep over a surface."""
+NARROWED = 2
+"""Sweeps of a surface in its region of interest."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +126,35 @@ def flights(name: str, word: str | None, solver: MACS, evaluations: int, seed: i
 def swept(name: str, word: str) -> np.ndarray:
     """The front of a case with two objectives on a mesh, by gradients."""
     return through(sweep(load(name), parse(word), points=SWEPT, starts=1, verify=None).objectives)
+
+
+def surveyed(name: str, word: str, preference: ReferencePoint) -> np.ndarray:
+    """The front of a case with more objectives on a mesh, by gradients: sparse everywhere, and dense in the region of interest.
+
+    A sweep of the whole front has the ranges. Then others go over what is left of it if no objective may be worse than in the region, as
+    far as that is known: the first finds better points in it, so that it is smaller for the next.
+    """
+    whole = sweep(load(name), parse(word), points=SURVEYED, starts=1, verify=None)
+    goals, found = whole.goals, whole.objectives
+    spans = Ranges.over(goals, found).spans(goals)
+    for _ in range(NARROWED):
+        problem, worst = load(name), worst_inside(preference, goals, found)
+        for goal, value, span in zip(goals, worst, spans, strict=True):
+            limit = {"upper": value} if goal.sign > 0 else {"lower": value}
+            problem.constraint(f"limit of {goal.name}", problem.objectives[goal.name], scale=span, **limit)
+        nearest = whole[int(Region.of(preference, goals, found).away(whole.objectives).argmin())]
+        inside = sweep(problem, parse(word), points=SURVEYED, start=nearest.decision[None], starts=1, verify=None)
+        found = np.vstack([found, inside.objectives])
+    return found
+
+
+def worst_inside(preference: ReferencePoint, goals: Sequence[Objective], front: np.ndarray) -> list[float]:
+    """The worst value of each objective in the region of interest on a front (n, m)."""
+    ranges, region = Ranges.over(goals, front), Region.of(preference, goals, front)
+    best, worst = (np.array([values[goal.name] for goal in goals]) for values in (ranges.best, ranges.worst))
+    upper, lower = preference.degrees(goals, ranges, np.stack([best, worst]))  # linear
+    least = 1.0 - (region.best + PART * region.spread)
+    return (best + (worst - best) * (upper - least) / (upper - lower)).tolist()
 
 
 SKIP = "dfet:6x4:bernstein:1"
