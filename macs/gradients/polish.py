@@ -155,7 +155,7 @@ def _cover(
     between = np.where(between > 0.0, between, span)
     known, solved = across((ends.F - ideal) / between), np.vstack([solved, ends.F])
     lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
-    for _ in range(limit):
+    for _ in range(limit if guide is None else solves.left):
         if solves.left <= 0:
             break
         places = lattice
@@ -164,8 +164,11 @@ def _cover(
             places = np.vstack([lattice, *(best + closer * (lattice - best) for closer in CLOSER)])
         apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
         if guide is not None:
-            beneath = np.linalg.norm(places[:, None] - across((pool.F - ideal) / between), axis=2).argmin(axis=1)
-            apart *= guide.factors(pool.F, pool.F)[beneath]
+            front = (pool.F - ideal) / between
+            beneath = np.linalg.norm(places[:, None] - across(front), axis=2).argmin(axis=1)
+            # The front is about as far up the diagonal as at the nearest point that is known.
+            expected = ideal + between * (places + front.mean(axis=1)[beneath, None])
+            apart *= guide.factors(pool.F, expected)
         place = places[np.argmax(apart)]
         reference = ideal + between * place
         start = np.argmin(((pool.F - reference) / between).max(axis=1))
