@@ -18,7 +18,8 @@ PLACES = 500
 
 
 CLOSER = (1 / 3, 1 / 9)
-"""With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small."""
+"""With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small, and it may lie
+beyond the simplex between the ends."""
 
 
 FAIR, LOSS = 1e-4, 0.05
@@ -161,7 +162,7 @@ def _cover(
         places = lattice
         if guide is not None:
             best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
-            places = np.vstack([lattice, *(best + closer * (lattice - best) for closer in CLOSER)])
+            places = np.vstack([lattice, *(best + closer * (lattice - lattice.mean(axis=0)) for closer in CLOSER)])
         apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
         if guide is not None:
             front = (pool.F - ideal) / between
