@@ -159,6 +159,9 @@ def worst_inside(preference: ReferencePoint, goals: Sequence[Objective], front: 
 
 SKIP = "dfet:6x4:bernstein:1"
 """A coarse mesh, on which a gradient solve takes a tenth of the time."""
+ENTRY = "dfet:8x4:bernstein:1"
+"""Likewise."""
+RANGE = ReferencePoint({"cross-range": 28.0, "heat load": 80.0, "oscillation": 0.2, "peak heating rate": 85.0})
 MASS = ReferencePoint({"terminal mass": 65e3, "terminal speed": 6500.0})
 SPEED = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 CASES = (
@@ -169,6 +172,15 @@ CASES = (
     Guided("goddard", partial(flights, "goddard", None), goddard.reference, SPEED, 1000, True),
     Guided("goddard, no derivatives", partial(flights, "goddard", None), goddard.reference, SPEED, 10_000, refine=False),
     Guided("skip", partial(flights, "skip", SKIP), partial(swept, "skip", SKIP), MASS, 1500),
+    Guided(
+        "reentry_case1",
+        partial(flights, "reentry_case1", ENTRY),
+        partial(surveyed, "reentry_case1", ENTRY, RANGE),
+        RANGE,
+        1000,
+        archive=20,
+        known=False,
+    ),
 )
 
 
