@@ -13,7 +13,7 @@ from problems.compiled import Objective
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Guide
 from ..pareto.dominance import extremes
-from ..pareto.ranges import ranges
+from ..pareto.ranges import CURVE, ranges
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
 from .region import PART, Region
@@ -23,8 +23,8 @@ OUTSIDE = 0.005
 FADING = 0.1
 """At its border, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
 WITHIN = 10.0
-"""So many points are thought of inside the region: they are wanted away from its border by the distance of as many neighbours. A point
-covers what is around it, of which much lies outside where it is on the border; the more objectives, the more points would be there."""
+"""Of a surface, so many points are thought of inside the region: they are wanted away from its border by the distance of as many neighbours.
+A point covers what is around it, of which much lies outside where it is on the border; the more objectives, the more points would be there."""
 FARTHER = 0.1
 """The worst value of an objective is kept if it is worse than at all ends of the front by this part of the range."""
 
@@ -47,7 +47,8 @@ class PreferenceGuide:
             region = self._region(front)
         except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
             return np.ones(len(points))
-        border = 1.0 - WITHIN ** (-1.0 / max(front.shape[1] - 1, 1))
+        m = front.shape[1]
+        border = 1.0 if m <= CURVE else 1.0 - WITHIN ** (-1.0 / (m - 1))
         beyond = np.maximum(region.away(points * self._signs) / PART - border, 0.0)
         return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
 
