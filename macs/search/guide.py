@@ -23,8 +23,8 @@ OUTSIDE = 0.005
 FADING = 0.1
 """At its border, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
 WITHIN = 10.0
-"""Of a surface, so many points are thought of inside the region: they are wanted away from its border by the distance of as many neighbours.
-A point covers what is around it, of which much lies outside where it is on the border; the more objectives, the more points would be there."""
+"""On a surface, so many points are thought of inside the region: they are wanted away from its border by the distance of as many
+neighbours. A point covers what is around it, of which much lies outside where it is on the border."""
 FARTHER = 0.1
 """The worst value of an objective is kept if it is worse than at all ends of the front by this part of the range."""
 
