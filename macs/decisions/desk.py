@@ -54,6 +54,8 @@ class Desk:
         None: those of the points that are known.
     terms : Terms
         The other arguments of `decide`.
+    mends : bool, optional
+        Whether points that a simulation does not confirm are solved again. Default: where no transcription is given.
 
     Attributes
     ----------
@@ -67,9 +69,15 @@ class Desk:
     ranges: Ranges
 
     def __init__(
-        self, statement: Problem | CompiledProblem, transcription: Transcription | None, ranges: Ranges | None, terms: Terms
+        self,
+        statement: Problem | CompiledProblem,
+        transcription: Transcription | None,
+        ranges: Ranges | None,
+        terms: Terms,
+        mends: bool | None = None,
     ) -> None:
         self.problem = statement.compile()
+        self._mends = (transcription is None) if mends is None else mends
         self._statement, self._transcription, self._given, self._terms = statement, transcription, ranges, terms
         self._start: Points | None = terms.start.alone() if isinstance(terms.start, Point) else terms.start
         if self._start is not None:
@@ -116,6 +124,8 @@ class Desk:
             max_iterations=terms.max_iterations,
             progress=terms.progress,
         )
+        if self._mends and terms.verify is not None and self._transcription is not None:
+            ends = ends.mended(progress=terms.progress)
         self._costs = dict(ends.stats)
         return ends
 
@@ -258,13 +268,13 @@ class Desk:
         return outcome, ""
 
     def _mended(self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, about: Mapping[str, float]) -> Point:
-        """What was found, as a point; solved again if a simulation does not confirm it, unless a transcription was given.
+        """What was found, as a point; solved again if a simulation does not confirm it, where points are mended.
 
         The first stage is solved again for its value. What later ones led to, or where that is not confirmed either, is solved again in the
         objectives themselves, from where it is on; and all stages once more on the mesh which that leads to.
         """
         point = self._point(outcome)
-        if self._transcription is not None or self._terms.verify is None or not self._to_mend(point):
+        if not self._mends or self._terms.verify is None or not self._to_mend(point):
             return point
         # Asked to end in the middle of it, the point stays as it is.
         with suppress(Stopped):

@@ -326,3 +326,13 @@ def test_conditions_of_optimality_are_in_units_or_not_known() -> None:
     text = desk.work(lambda: desk._not_optimal(0.01))
     assert f"'end' by {0.01 * wide[0]:.6g} m, 'time' by {0.01 * wide[1]:.6g} s" in text
     assert "is not known" in desk._not_optimal(np.inf) and "inf" not in desk._not_optimal(np.inf)
+
+
+def test_a_solver_on_a_mesh_that_is_given_mends_where_it_is_asked_to():
+    """Also the ends of the front, which it finds first."""
+    choices = {"even": ReferencePoint(dict(BOTH.best))}
+    fixed, mended = (Decide(choices=choices, ranges=BOTH, mesh=mesh).solve(swing(), COARSE, seed=0) for mesh in ("fixed", "mended"))
+    assert not fixed.verified.any()
+    assert mended.verified.all() and len(mended) == 1
+    assert mended.objectives[0, 1] == pytest.approx(BALANCED, abs=2e-3)
+    assert mended.simulated_F[0] == pytest.approx([-end(BALANCED), BALANCED], abs=2e-3)
