@@ -286,17 +286,11 @@ class Desk:
 
     def _by_value(self, preference: Preference, outcome: Outcome, point: Point, about: Mapping[str, float]) -> tuple[Outcome, Point]:
         """What a first stage led to, solved again for its value where a simulation does not confirm it."""
-        verify = self._terms.verify or VERIFY
-        for refined in (False, True):
-            # On a mesh of its own it may be moved inside of its limits, if these are all that it misses.
-            if not self._to_mend(point) or (refined and (point.defect or 0.0) > verify):
-                break
-            again = self._solver.again(outcome, verify)
-            if again is outcome or outcome.lifted is None:
-                break
-            self._noted(preference, outcome.lifted.stage, again, about, _again(point))
-            outcome, point = again, self._point(again)
-        return outcome, point
+        again = self._solver.again(outcome, self._terms.verify or VERIFY) if self._to_mend(point) else outcome
+        if again is outcome or outcome.lifted is None:
+            return outcome, point
+        self._noted(preference, outcome.lifted.stage, again, about, _again(point))
+        return again, self._point(again)
 
     def _by_objectives(
         self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, point: Point, about: Mapping[str, float]
