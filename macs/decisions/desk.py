@@ -29,11 +29,11 @@ from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
 from ..preferences.checks import shown
-from ..preferences.ranges import confidence
-from ..preferences.stage import SLACK, ordering
+from ..preferences.ranking import BEYOND, CONFIRMED, standing
+from ..preferences.stage import SLACK, exceeded, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
-from .judging import exceeded, excess_stage, keeps, meets, unmet, with_all_limits
+from .judging import excess_stage, keeps, meets, unmet, with_all_limits
 from .stages import ONLY_NEAR, SAME, Kept, Known, Outcome, StageSolver
 
 NOTHING_BETTER = "no better point was found than the best that was known"
@@ -133,10 +133,8 @@ class Desk:
     def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
         """The choice by a preference, never worse than a known point.
 
-        A point that was found and those that are known are put in this order: those that a simulation confirms, or that were not simulated,
-        within the hard limits; those within them that none confirms; then confirmed points beyond them, by how much they exceed them; then
-        others. What a simulation does not confirm is within the limits only if what was simulated is, too, but for what points may miss. So
-        a limit that is said to be hard is not given up for an error that is known, and the message says either.
+        A point that was found and those that are known are put in the order of a ranking, see `standing`; the message says what is to be
+        known of the first.
 
         Parameters
         ----------
@@ -157,9 +155,8 @@ class Desk:
         points: list[Point] = [*([] if found is None else [found]), *candidates]
         limits = with_all_limits(stages, len(self.problem.goals))[0]
         objectives = np.array([list(point.objectives.values()) for point in points])
-        sure = np.concatenate([confidence(point.alone()) for point in points])
-        beyond = ~np.array([keeps(limits, point, self._terms.verify or VERIFY) for point in points])
-        order = ordering(stages, objectives, np.where(sure < 2, sure + 2 * beyond, 4), same=SAME)
+        rank = np.concatenate([standing([limits], point.alone(), self._terms.verify) for point in points])
+        order = ordering(stages, objectives, rank, same=SAME)
         chosen = points[order.order[0]]
         said, is_new = [message], chosen is found
         if found is not None and not is_new and not message:
@@ -170,7 +167,7 @@ class Desk:
             said.append(f"of the best that was known, {exceeded(limits, *of_chosen)}" if message else unmet(limits, *of_chosen))
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
-            others = [i for i in order.order if sure[i] == 0]
+            others = [i for i in order.order if rank[i] in (CONFIRMED, BEYOND)]
             if others:
                 amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")

@@ -30,10 +30,12 @@ from macs.decisions import (
     satisfy,
 )
 from macs.decisions.desk import Desk
-from macs.decisions.judging import exceeded, keeps
+from macs.decisions.judging import keeps
 from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
+from macs.fronts.points import Points
 from macs.gradient_tools import Terms
 from macs.gradients.front_polish import KEPT_INSIDE
+from macs.preferences.stage import exceeded
 from problems import Problem, load
 from transcription import DFET, from_dict
 
@@ -257,6 +259,18 @@ def test_a_hard_limit_is_not_given_up_for_an_error_that_is_known() -> None:
     choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=_at(3.8))
     assert choice.point.verified and choice.objectives["time"] == pytest.approx(3.8, abs=0.02)
     assert "was found, but not confirmed: simulated, " in choice.message or "no better point" in choice.message
+
+
+@pytest.mark.parametrize("until", [4.0, 3.5])
+def test_what_stands_is_what_a_ranking_has_first(until: float) -> None:
+    """A point at 5 that is confirmed, and one at 3.8 that is not: within a limit of 4, and beyond one of 3.5."""
+    known = Points.concatenate([_at(5.0), _at(3.8).replace(verified=[False])])
+    wanted = Nimbus({"end": end(3.4), "time": 3.4}, improve=["end"], until={"time": until})
+    best = wanted.rank(known, BOTH).best
+    choice = decide(swing(), COARSE, wanted, ranges=BOTH, start=known, max_iterations=1)
+    assert choice.objectives == best.objectives and best.objectives["time"] == pytest.approx(3.8 if until > 3.8 else 5.0, abs=0.02)
+    over = f"'time at most {until:g} s' is missed by {known.F[0, 1] - until:.6g} s"
+    assert over in choice.message and (over in wanted.rank(known, BOTH).message) is (until > 3.8)
 
 
 def test_limits_that_are_kept_are_not_given_up_for_a_point_nearby(monkeypatch, no_work) -> None:
