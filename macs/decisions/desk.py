@@ -6,13 +6,14 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from transcription.base import Transcription, check_freedom
+from transcription.base import FAILED, Transcription, check_freedom
 from transcription.catalogue import from_dict
 from transcription.meshed import Meshed
 from transcription.stopping import Stopped
@@ -36,6 +37,8 @@ from .choice import Choice, Step
 from .judging import excess_stage, keeps, meets, unmet, with_all_limits
 from .stages import ONLY_NEAR, SAME, Kept, Known, Outcome, StageSolver
 
+NO_OPTIMUM = "it is feasible, but where a solve ended before its optimum"
+"""Note of a point at which a solve failed."""
 NOTHING_BETTER = "no better point was found than the best that was known"
 """Message where a known point is the choice."""
 BEST = 3
@@ -171,8 +174,7 @@ class Desk:
             if others:
                 amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
-        if ONLY_NEAR in chosen.note:
-            said.append(ONLY_NEAR)
+        said += [words for words in (ONLY_NEAR, NO_OPTIMUM) if words in chosen.note]
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
             why = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
             said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{why}")
@@ -230,10 +232,19 @@ class Desk:
             # What is within the limits stands.
             if nearest is not None:
                 return nearest, message
-            outcome = begun if begun is not None and begun.status == CONVERGED else outcome
+            outcome = self._standing(stages, outcome, begun)
         point = self._mended(preference, stages, outcome, about)
         missed = f"; {nearest_violation(point)}" if message and point.violation > self.solves.tolerance else ""
         return point, f"{message}{missed}"
+
+    def _standing(self, stages: Sequence[Stage], failed: Outcome, begun: Outcome | None) -> Outcome:
+        """What stands where a solve failed: where it ended, if that is feasible and better than what was begun within the hard limits."""
+        F, violation = failed.nlp.evaluate(failed.z[None])
+        feasible = failed.status == FAILED and np.isfinite(F).all() and violation[0] <= self.solves.tolerance
+        rivals = [replace(failed, status=CONVERGED, note=f"{failed.note}; {NO_OPTIMUM}")] if feasible else []
+        rivals += [begun] if begun is not None and begun.status == CONVERGED else []
+        J = np.array([one.F * self.problem.signs for one in rivals])
+        return rivals[ordering(stages, J, np.zeros(len(J)), same=SAME).order[0]] if rivals else failed
 
     def _chain(
         self, preference: Preference, stages: Sequence[Stage], about: Mapping[str, float], first: Callable[[Stage], Outcome]

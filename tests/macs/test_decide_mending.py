@@ -29,7 +29,7 @@ from macs.decisions import (
     decide,
     satisfy,
 )
-from macs.decisions.desk import Desk
+from macs.decisions.desk import NO_OPTIMUM, Desk
 from macs.decisions.judging import keeps
 from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
 from macs.fronts.points import Points
@@ -308,6 +308,24 @@ def test_what_is_within_the_limits_stands_where_the_next_solve_fails(monkeypatch
     assert choice.objectives["time"] <= until + 1e-5 and choice.objectives["end"] >= end(4.5) - 1e-5
     assert choice.message.startswith("achievement: it did not converge") and choice.point.status == "converged"
     assert choice.point.verified is (method is None) and np.isfinite(choice.value)
+
+
+@pytest.mark.parametrize("ended", ["better", "worse", "infeasible"])
+def test_of_what_was_begun_and_where_the_next_solve_failed_the_better_stands(monkeypatch, ended: str) -> None:
+    first = Desk._first
+
+    def failed(self: Desk, *arguments) -> Outcome:
+        one = first(self, *arguments)
+        z = {"better": one.z, "worse": rough()[1].decision, "infeasible": one.z * 1.01}[ended]
+        return replace(one, z=z, F=one.nlp.evaluate(z[None])[0][0], status="failed", note="it did not converge", lifted=None)
+
+    monkeypatch.setattr(Desk, "_first", failed)
+    choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=rough())
+    assert rough()[1].objectives["time"] < 3.3 and not keeps(QUICK.stages(swing().compile().goals, BOTH)[0], rough()[1], 1e-3)
+    assert choice.message.startswith("achievement: it did not converge") and (NO_OPTIMUM in choice.message) is (ended == "better")
+    assert choice.objectives["time"] <= 4.0 + 1e-5 and choice.point.status == "converged"
+    begun, last = choice.history
+    assert choice.objectives == pytest.approx((last if ended == "better" else begun).objectives) and last.status == "failed"
 
 
 # What is said
