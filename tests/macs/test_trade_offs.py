@@ -6,12 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import null_space
-from smooth_problems import nlp_of, shuttle, slide, two_wells, vector
+from smooth_problems import nlp_of, shuttle, slide, still, two_wells, vector
 from synthetic_fronts import black_box
 
 from macs import Front, optimize, sweep
 from macs.decisions import Ranges, WeightedSum, decide, front_rates, plot_rates, trade_offs
-from macs.decisions.trade_offs import rates
+from macs.decisions.trade_offs import TradeOffs, rates
 from macs.fronts.builders import vectors_points
 from problems import Problem, load
 from problems.cases import goddard
@@ -192,8 +192,58 @@ def test_what_is_active_is_held_and_what_has_no_multiplier_may_be_left():
     nlp = nlp_of(wall)
     found = trade_offs(as_front(nlp, vector(nlp, p=0.3, q=0.0))[0])
     assert found.matrix == pytest.approx(np.array([[1.0, np.nan], [-0.3 / 0.7, 1.0]]), nan_ok=True)
-    assert found.messages == ("the row of 'from left' is degenerate: within what is active it can get no better",)
+    assert found.messages == (
+        "the row of 'from left' is degenerate: within what is active it can get no better",
+        "an end, a corner or a sharp bend of the front: one more in 'from left' changes 'from right' by -inf to -2.333",
+    )
+    assert found.bounds("from right", "from left") == pytest.approx((-np.inf, -0.7 / 0.3), rel=1e-4)
     assert trade_offs(as_front(nlp, vector(nlp, p=0.1, q=0.0))[0]).messages[0] == "not feasible: the violation is 2.0e-01"
+
+
+def faces(*normals: tuple[float, ...], signs: tuple[int, ...] | None = None) -> TradeOffs:
+    """At a corner of a front with flat faces of these normals, all through the point where each objective is 1."""
+    problem = still("faces")
+    x = [problem.parameter(f"p{k}", bounds=(-5, 5)) for k in range(len(normals[0]))]
+    for k, (one, sign) in enumerate(zip(x, signs or (1,) * len(x), strict=True)):
+        (problem.minimize if sign > 0 else problem.maximize)(f"J{k}", sign * one)
+    for number, normal in enumerate(normals):
+        problem.constraint(f"face {number}", sum(part * one for part, one in zip(normal, x, strict=True)), lower=sum(normal))
+    nlp = nlp_of(problem)
+    return trade_offs(as_front(nlp, vector(nlp, **{f"p{k}": 1.0 for k in range(len(x))}))[0])
+
+
+def test_at_a_corner_the_rates_of_both_sides_are_said():
+    found = faces((2.0, 1.0), (1.0, 2.0))
+    assert found.bounds("J1", "J0") == pytest.approx((-2.0, -0.5), rel=1e-3)
+    assert found.bounds("J0", "J1") == pytest.approx((-2.0, -0.5), rel=1e-3) and found.bounds(0, 0) == (1.0, 1.0)
+    assert -2.0 <= found.rate("J1", "J0") <= -0.5
+    assert "an end, a corner or a sharp bend of the front: one more in" in found.messages[-1] and "by -2 to -0.5" in found.messages[-1]
+    # What is maximised gets more for more of the other.
+    assert faces((2.0, 1.0), (1.0, 2.0), signs=(1, -1)).bounds("J1", "J0") == pytest.approx((0.5, 2.0), rel=1e-3)
+    # Within a face all weights are known.
+    flat = faces((2.0, 1.0))
+    assert flat.bounds("J1", "J0") == pytest.approx((-2.0, -2.0), rel=1e-3) and not flat.messages
+
+
+def test_at_an_edge_of_three_objectives_the_rates_of_both_sides_are_said():
+    found = faces((1.0, 1.0, 2.0), (2.0, 1.0, 1.0))
+    assert found.bounds("J0", "J2") == pytest.approx((-2.0, -0.5), rel=1e-3)
+    assert found.bounds("J0", "J1") == pytest.approx((-1.0, -0.5), rel=1e-3)
+    assert "an end, a corner or a sharp bend of the front" in found.messages[-1]
+
+
+def test_weights_are_not_moved_by_what_tells_multipliers_apart():
+    """An objective p + d q with p above a wall, another r - d q with r on its bound: what q has on one side the other loses. The less d,
+    the less of the residual is lost by other weights, which have smaller multipliers of the wall."""
+    for d in (1e-4, 1e-5):
+        problem = still("see-saw")
+        p, q, r = (problem.parameter(name, bounds=(lower, 1)) for name, lower in (("p", -1), ("q", -1), ("r", 0)))
+        problem.minimize("one", p + d * q)
+        problem.minimize("other", r - d * q)
+        problem.constraint("wall", p + 0 * q, lower=0)
+        nlp = nlp_of(problem)
+        found = trade_offs(as_front(nlp, vector(nlp, p=0.0, q=0.3, r=0.0))[0])
+        assert found.rate("one", "other") == pytest.approx(-1.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", [DFET(4, 4), parse("radau:6x3")], ids=str)
@@ -270,7 +320,13 @@ def test_rates_are_the_slope_of_the_front_in_closed_form(ascents):
         if time > 249.9:
             # The time may be no longer, only shorter.
             exact[1, 0] = np.nan
-            assert found.messages == ("the row of 'horizontal speed' is degenerate: within what is active it can get no better",)
+            assert found.messages[0] == "the row of 'horizontal speed' is degenerate: within what is active it can get no better"
+            # At an end of the front: the rate there, and that of a limit.
+            assert "an end" in found.messages[1] and len(found.messages) == 2
+            assert found.bounds("flight time", "horizontal speed") == pytest.approx((1 / slope, np.inf), rel=1e-3)
+        else:
+            assert not found.messages
+            assert found.bounds("flight time", "horizontal speed") == pytest.approx((1 / slope, 1 / slope), rel=1e-3)
         assert found.matrix == pytest.approx(exact, rel=1e-3, nan_ok=True)
 
 
