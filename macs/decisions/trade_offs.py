@@ -21,7 +21,7 @@ from problems.derived import remembered
 from problems.problem import Problem
 from transcription import from_dict
 from transcription.nlp.projection import Projection, projection
-from transcription.nlp.weight_bounds import weight_bounds
+from transcription.nlp.weight_bounds import ratio_bounds, ratio_residual
 
 from ..fronts.builders import OPTIMAL
 from ..fronts.point import Point
@@ -149,10 +149,8 @@ class TradeOffs:
         one, other = self._number(i), self._number(j)
         if one == other:
             return 1.0, 1.0
-        _, found, each = self.weights, self._projection, np.eye(len(self.goals))
-        ends = np.array(weight_bounds(found.conditions, each[other], each[one], self._residual))
-        if np.isinf(ends).all() and ends[0] > ends[1]:
-            ends = np.full(2, np.inf)  # The one has no weight.
+        _, found = self.weights, self._projection
+        ends = np.array(ratio_bounds(found.conditions, one, other, self._residual))
         low, high = sorted(-self._signs[one] * self._signs[other] * found.scales[one] / found.scales[other] * ends)
         return float(low), float(high)
 
@@ -263,23 +261,25 @@ class TradeOffs:
 
     @property
     def _corner(self) -> list[str]:
-        """What is to be said where weights that differ do as well, of the objectives of which the rate is least determined."""
-        found, m = self._projection, len(self.goals)
+        """What is to be said where weights that differ do as well."""
+        found = self._projection
         if self.left > LEFT:
             return []
-        ends = [weight_bounds(found.conditions, one, np.ones(m), self._residual) for one in np.eye(m)]
-        spread = np.nan_to_num([(high - low) / max(high, LEFT) for low, high in ends])
-        if not max(spread) > ALIKE:
-            return []
-        # The one that varies most, by the one that varies least.
-        i, j = int(np.argmax(spread)), int(np.argmin(spread[::-1]))
-        return [self._between(i, m - 1 - j if m - 1 - j != i else (i + 1) % m)]
+        heaviest = int(np.argmax(found.weights))
+        for k, weight in enumerate(found.weights):
+            ratio = weight / found.weights[heaviest]
+            trials = (ratio / (1.0 + ALIKE), ratio * (1.0 + ALIKE)) if weight > LEFT * ALIKE else (LEFT,)
+            if k != heaviest and any(ratio_residual(found.conditions, heaviest, k, one) <= self._residual for one in trials):
+                return [self._between(heaviest, k)]
+        return []
 
     def _between(self, i: int, j: int) -> str:
         """Text with the bounds of a rate."""
         low, high = self.bounds(i, j)
         name, other = self.goals[i].name, self.goals[j].name
-        return f"an end, a corner or a sharp bend of the front: one more in '{other}' changes '{name}' by {low:.4g} to {high:.4g}"
+        left = self._projection.conditions.residual
+        why = "an end, a corner or a sharp bend of the front" if left <= EXACT else f"its conditions of optimality hold to {left:.1e} only"
+        return f"{why}: one more in '{other}' changes '{name}' by {low + 0.0:.4g} to {high + 0.0:.4g}"
 
     @property
     def _residual(self) -> float:

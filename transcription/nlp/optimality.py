@@ -164,6 +164,14 @@ class Conditions:
         except (RuntimeError, np.linalg.LinAlgError):
             return float("inf")
 
+    def residual_of(self, mixtures: np.ndarray) -> float:
+        """The least residual of weights that are mixtures of those in the columns (used, p), which are not negative and each of sum 1."""
+        m = len(self.linear.of_objectives)
+        try:
+            return _least(np.hstack([self.reduced[:, :m] @ mixtures, self.reduced[:, m:]]), self.linear.slack)[0]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return float("inf")
+
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Multipliers (used,) of the objectives and (k,) of the inequalities, in units, that leave the least residual; None where none are
