@@ -29,11 +29,13 @@ from macs.decisions import (
     decide,
     satisfy,
 )
-from macs.decisions.desk import Desk
-from macs.decisions.judging import exceeded, keeps
+from macs.decisions.desk import NO_OPTIMUM, Desk
+from macs.decisions.judging import keeps
 from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
+from macs.fronts.points import Points
 from macs.gradient_tools import Terms
 from macs.gradients.front_polish import KEPT_INSIDE
+from macs.preferences.stage import exceeded
 from problems import Problem, load
 from transcription import DFET, from_dict
 
@@ -260,6 +262,18 @@ def test_a_hard_limit_is_not_given_up_for_an_error_that_is_known() -> None:
     assert "was found, but not confirmed: simulated, " in choice.message or "no better point" in choice.message
 
 
+@pytest.mark.parametrize("until", [4.0, 3.5])
+def test_what_stands_is_what_a_ranking_has_first(until: float) -> None:
+    """A point at 5 that is confirmed, and one at 3.8 that is not: within a limit of 4, and beyond one of 3.5."""
+    known = Points.concatenate([_at(5.0), _at(3.8).replace(verified=[False])])
+    wanted = Nimbus({"end": end(3.4), "time": 3.4}, improve=["end"], until={"time": until})
+    best = wanted.rank(known, BOTH).best
+    choice = decide(swing(), COARSE, wanted, ranges=BOTH, start=known, max_iterations=1)
+    assert choice.objectives == best.objectives and best.objectives["time"] == pytest.approx(3.8 if until > 3.8 else 5.0, abs=0.02)
+    over = f"'time at most {until:g} s' is missed by {known.F[0, 1] - until:.6g} s"
+    assert over in choice.message and (over in wanted.rank(known, BOTH).message) is (until > 3.8)
+
+
 def test_limits_that_are_kept_are_not_given_up_for_a_point_nearby(monkeypatch, no_work) -> None:
     known = _at(5.0)[0]
     nlp = from_dict(known.transcription).nlp(swing().compile())
@@ -295,6 +309,24 @@ def test_what_is_within_the_limits_stands_where_the_next_solve_fails(monkeypatch
     assert choice.objectives["time"] <= until + 1e-5 and choice.objectives["end"] >= end(4.5) - 1e-5
     assert choice.message.startswith("achievement: it did not converge") and choice.point.status == "converged"
     assert choice.point.verified is (method is None) and np.isfinite(choice.value)
+
+
+@pytest.mark.parametrize("ended", ["better", "worse", "infeasible"])
+def test_of_what_was_begun_and_where_the_next_solve_failed_the_better_stands(monkeypatch, ended: str) -> None:
+    first = Desk._first
+
+    def failed(self: Desk, *arguments) -> Outcome:
+        one = first(self, *arguments)
+        z = {"better": one.z, "worse": rough()[1].decision, "infeasible": one.z * 1.01}[ended]
+        return replace(one, z=z, F=one.nlp.evaluate(z[None])[0][0], status="failed", note="it did not converge", lifted=None)
+
+    monkeypatch.setattr(Desk, "_first", failed)
+    choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=rough())
+    assert rough()[1].objectives["time"] < 3.3 and not keeps(QUICK.stages(swing().compile().goals, BOTH)[0], rough()[1], 1e-3)
+    assert choice.message.startswith("achievement: it did not converge") and (NO_OPTIMUM in choice.message) is (ended == "better")
+    assert choice.objectives["time"] <= 4.0 + 1e-5 and choice.point.status == "converged"
+    begun, last = choice.history
+    assert choice.objectives == pytest.approx((last if ended == "better" else begun).objectives) and last.status == "failed"
 
 
 # What is said
