@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, ClassVar
 
-from problems.checks import check_count, unknown
+from problems.checks import check_choice, check_count, unknown
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Transcription
@@ -45,7 +45,9 @@ class Decide(GradientSolver):
         lambda until the order of priority is kept (`satisfy`).
     starts : int or "auto"
         Number of starts of each solve; see `decide`.
-    mesh : "fixed"
+    mesh : "fixed" or "mended"
+        Choices, and the ends of the front where these are found first, stay on the transcription that is given and are only marked; or
+        those that a simulation does not confirm are solved again, as by `decide` without a transcription.
     sweep : int
         Points of a sweep that is made first, whose points are known then; 0: the ends of the front alone.
     known : str, optional
@@ -65,13 +67,12 @@ class Decide(GradientSolver):
     known: str | None = None
     ranges: Any = None
 
-    MESH: ClassVar[str] = "fixed"
+    MESHES: ClassVar[tuple[str, ...]] = ("fixed", "mended")
 
     def __post_init__(self) -> None:
         if self.starts != AUTO:
             check_count("Decide: starts", self.starts, 1)
-        if self.mesh != self.MESH:
-            raise ValueError(f"Decide: mesh must be {self.MESH!r}, not {self.mesh!r}: each choice is a point on the mesh of its solve")
+        check_choice("Decide: mesh", self.mesh, self.MESHES)
         if self.sweep != 0:
             check_count("Decide: sweep", self.sweep, 2)
         if self.known is not None and (not isinstance(self.known, str) or self.sweep):
@@ -117,7 +118,8 @@ class Decide(GradientSolver):
             if limit is not None and (limit := limit - before.stats["wall_time"]) <= 0.0:
                 return before.take([]).replace(message="time limit before the first choice")
         asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
-        desk = Desk(problem, transcription, None if self.ranges is None else _ranges(self.ranges), asked)
+        ranges = None if self.ranges is None else _ranges(self.ranges)
+        desk = Desk(problem, transcription, ranges, asked, transcription is None or self.mesh == "mended")
         found = desk.work(lambda: _choices(desk, preferences))
         stats = {"versions": versions(), **desk.stats()}
         if before is not None:
@@ -129,6 +131,10 @@ class Decide(GradientSolver):
         return Front.of(
             points.replace(solver=self.about(), stats={**stats, "ranges": _data(desk.ranges), "choices": about}, message=_message(found))
         )
+
+    def remeshed(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
+        """The front as it is: each choice is mended when it is made."""
+        return front
 
 
 def _choices(desk: Desk, preferences: list[tuple[str, Preference, bool]]) -> list[tuple[str, Choice]]:

@@ -90,11 +90,16 @@ class GradientSolver(Solver):
         front = self.find(problem, transcription, **terms, verify=None if remeshed else verify)
         left = None if time_limit is None else time_limit - front.stats["wall_time"]
         if transcription is not None and "stopped" not in front.stats and len(front) and (left is None or left > 0.0):
-            if self.mesh == "mended":
-                front = front.mended(time_limit=left, progress=progress)
-            elif remeshed:
-                front = front.refine_mesh(more=self.mesh == "adaptive", time_limit=left, progress=progress)
+            front = self.remeshed(front, left, progress)
         return front.verify(verify) if remeshed and verify is not None else front
+
+    def remeshed(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
+        """What was found on a transcription that was given, on the meshes that the setting asks for."""
+        if self.mesh == "fixed":
+            return front
+        if self.mesh == "mended":
+            return front.mended(time_limit=time_limit, progress=progress)
+        return front.refine_mesh(more=self.mesh == "adaptive", time_limit=time_limit, progress=progress)
 
     @property
     def certifies(self) -> bool:

@@ -6,13 +6,14 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from transcription.base import Transcription, check_freedom
+from transcription.base import FAILED, Transcription, check_freedom
 from transcription.catalogue import from_dict
 from transcription.meshed import Meshed
 from transcription.stopping import Stopped
@@ -29,13 +30,15 @@ from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
 from ..preferences.checks import shown
-from ..preferences.ranges import confidence
-from ..preferences.stage import SLACK, ordering
+from ..preferences.ranking import BEYOND, CONFIRMED, standing
+from ..preferences.stage import SLACK, exceeded, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
-from .judging import exceeded, excess_stage, keeps, meets, unmet, with_all_limits
+from .judging import excess_stage, keeps, meets, unmet, with_all_limits
 from .stages import ONLY_NEAR, SAME, Kept, Known, Outcome, StageSolver
 
+NO_OPTIMUM = "it is feasible, but where a solve ended before its optimum"
+"""Note of a point at which a solve failed."""
 NOTHING_BETTER = "no better point was found than the best that was known"
 """Message where a known point is the choice."""
 BEST = 3
@@ -54,6 +57,8 @@ class Desk:
         None: those of the points that are known.
     terms : Terms
         The other arguments of `decide`.
+    mends : bool, optional
+        Whether points that a simulation does not confirm are solved again. Default: where no transcription is given.
 
     Attributes
     ----------
@@ -67,9 +72,15 @@ class Desk:
     ranges: Ranges
 
     def __init__(
-        self, statement: Problem | CompiledProblem, transcription: Transcription | None, ranges: Ranges | None, terms: Terms
+        self,
+        statement: Problem | CompiledProblem,
+        transcription: Transcription | None,
+        ranges: Ranges | None,
+        terms: Terms,
+        mends: bool | None = None,
     ) -> None:
         self.problem = statement.compile()
+        self._mends = (transcription is None) if mends is None else mends
         self._statement, self._transcription, self._given, self._terms = statement, transcription, ranges, terms
         self._start: Points | None = terms.start.alone() if isinstance(terms.start, Point) else terms.start
         if self._start is not None:
@@ -116,6 +127,8 @@ class Desk:
             max_iterations=terms.max_iterations,
             progress=terms.progress,
         )
+        if self._mends and terms.verify is not None and self._transcription is not None:
+            ends = ends.mended(progress=terms.progress)
         self._costs = dict(ends.stats)
         return ends
 
@@ -133,10 +146,8 @@ class Desk:
     def decided(self, preference: Preference, about: Mapping[str, float] | None = None, also: Sequence[Point] = ()) -> Choice:
         """The choice by a preference, never worse than a known point.
 
-        A point that was found and those that are known are put in this order: those that a simulation confirms, or that were not simulated,
-        within the hard limits; those within them that none confirms; then confirmed points beyond them, by how much they exceed them; then
-        others. What a simulation does not confirm is within the limits only if what was simulated is, too, but for what points may miss. So
-        a limit that is said to be hard is not given up for an error that is known, and the message says either.
+        A point that was found and those that are known are put in the order of a ranking, see `standing`; the message says what is to be
+        known of the first.
 
         Parameters
         ----------
@@ -157,9 +168,8 @@ class Desk:
         points: list[Point] = [*([] if found is None else [found]), *candidates]
         limits = with_all_limits(stages, len(self.problem.goals))[0]
         objectives = np.array([list(point.objectives.values()) for point in points])
-        sure = np.concatenate([confidence(point.alone()) for point in points])
-        beyond = ~np.array([keeps(limits, point, self._terms.verify or VERIFY) for point in points])
-        order = ordering(stages, objectives, np.where(sure < 2, sure + 2 * beyond, 4), same=SAME)
+        rank = np.concatenate([standing([limits], point.alone(), self._terms.verify) for point in points])
+        order = ordering(stages, objectives, rank, same=SAME)
         chosen = points[order.order[0]]
         said, is_new = [message], chosen is found
         if found is not None and not is_new and not message:
@@ -170,12 +180,11 @@ class Desk:
             said.append(f"of the best that was known, {exceeded(limits, *of_chosen)}" if message else unmet(limits, *of_chosen))
         if chosen.verified is False and chosen.status == CONVERGED:
             said.append(f"not confirmed by a simulation: {chosen.note}")
-            others = [i for i in order.order if sure[i] == 0]
+            others = [i for i in order.order if rank[i] in (CONFIRMED, BEYOND)]
             if others:
                 amounts = exceeded(limits, self.problem.goals, objectives[others[0]])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
-        if ONLY_NEAR in chosen.note:
-            said.append(ONLY_NEAR)
+        said += [words for words in (ONLY_NEAR, NO_OPTIMUM) if words in chosen.note]
         if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
             why = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
             said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{why}")
@@ -233,10 +242,19 @@ class Desk:
             # What is within the limits stands.
             if nearest is not None:
                 return nearest, message
-            outcome = begun if begun is not None and begun.status == CONVERGED else outcome
+            outcome = self._standing(stages, outcome, begun)
         point = self._mended(preference, stages, outcome, about)
         missed = f"; {nearest_violation(point)}" if message and point.violation > self.solves.tolerance else ""
         return point, f"{message}{missed}"
+
+    def _standing(self, stages: Sequence[Stage], failed: Outcome, begun: Outcome | None) -> Outcome:
+        """What stands where a solve failed: where it ended, if that is feasible and better than what was begun within the hard limits."""
+        F, violation = failed.nlp.evaluate(failed.z[None])
+        feasible = failed.status == FAILED and np.isfinite(F).all() and violation[0] <= self.solves.tolerance
+        rivals = [replace(failed, status=CONVERGED, note=f"{failed.note}; {NO_OPTIMUM}")] if feasible else []
+        rivals += [begun] if begun is not None and begun.status == CONVERGED else []
+        J = np.array([one.F * self.problem.signs for one in rivals])
+        return rivals[ordering(stages, J, np.zeros(len(J)), same=SAME).order[0]] if rivals else failed
 
     def _chain(
         self, preference: Preference, stages: Sequence[Stage], about: Mapping[str, float], first: Callable[[Stage], Outcome]
@@ -258,13 +276,13 @@ class Desk:
         return outcome, ""
 
     def _mended(self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, about: Mapping[str, float]) -> Point:
-        """What was found, as a point; solved again if a simulation does not confirm it, unless a transcription was given.
+        """What was found, as a point; solved again if a simulation does not confirm it, where points are mended.
 
         The first stage is solved again for its value. What later ones led to, or where that is not confirmed either, is solved again in the
         objectives themselves, from where it is on; and all stages once more on the mesh which that leads to.
         """
         point = self._point(outcome)
-        if self._transcription is not None or self._terms.verify is None or not self._to_mend(point):
+        if not self._mends or self._terms.verify is None or not self._to_mend(point):
             return point
         # Asked to end in the middle of it, the point stays as it is.
         with suppress(Stopped):
@@ -276,17 +294,11 @@ class Desk:
 
     def _by_value(self, preference: Preference, outcome: Outcome, point: Point, about: Mapping[str, float]) -> tuple[Outcome, Point]:
         """What a first stage led to, solved again for its value where a simulation does not confirm it."""
-        verify = self._terms.verify or VERIFY
-        for refined in (False, True):
-            # On a mesh of its own it may be moved inside of its limits, if these are all that it misses.
-            if not self._to_mend(point) or (refined and (point.defect or 0.0) > verify):
-                break
-            again = self._solver.again(outcome, verify)
-            if again is outcome or outcome.lifted is None:
-                break
-            self._noted(preference, outcome.lifted.stage, again, about, _again(point))
-            outcome, point = again, self._point(again)
-        return outcome, point
+        again = self._solver.again(outcome, self._terms.verify or VERIFY) if self._to_mend(point) else outcome
+        if again is outcome or outcome.lifted is None:
+            return outcome, point
+        self._noted(preference, outcome.lifted.stage, again, about, _again(point))
+        return again, self._point(again)
 
     def _by_objectives(
         self, preference: Preference, stages: Sequence[Stage], outcome: Outcome, point: Point, about: Mapping[str, float]

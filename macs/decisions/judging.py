@@ -13,12 +13,11 @@ from problems.compiled import Objective
 from ..fronts.point import Point
 from ..preferences import Stage
 from ..preferences.checks import shown
-from ..preferences.stage import SLACK
+from ..preferences.ranking import BEYOND, standing
+from ..preferences.stage import SLACK, exceeded
 
 ALIKE = 0.5
 """Part of the largest excess from which on a limit is in conflict with others."""
-STEP = 1e-4
-"""Part of an objective, or of 1, by which it is moved to see in which unit a limit is."""
 
 
 def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
@@ -48,11 +47,8 @@ def meets(limits: Stage, point: Point) -> bool:
 
 
 def keeps(limits: Stage, point: Point, verify: float) -> bool:
-    """Whether a point is within the limits of a stage; of one that a simulation contradicts, whether what was simulated is, too, but for
-    `verify`, which points may miss."""
-    if point.verified is not False or point.simulated is None:
-        return meets(limits, point)
-    return meets(limits, point) and bool(limits.excess(np.array([list(point.simulated.values())]))[0] <= verify)
+    """Whether a feasible point is within the limits of a stage, as far as `standing` tells."""
+    return bool(standing([limits], point.alone(), verify)[0] < BEYOND)
 
 
 def unmet(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
@@ -63,28 +59,6 @@ def unmet(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     nearest = ", ".join(f"{goal.name} {shown(float(value), goal)}" for goal, value in zip(goals, J, strict=True))
     what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
     return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
-
-
-def exceeded(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
-    """Text with each limit that objectives (m,) exceed, and by how much."""
-    unknown = [f"'{goal.name}'" for goal, value in zip(goals, J, strict=True) if not np.isfinite(value)]
-    if unknown:
-        return f"{', '.join(unknown)} is no number"
-    excess = limits.excesses(J[None])[0]
-    return ", ".join(
-        f"'{name}' is missed by {_amount(limits, k, goals, J)}"
-        for k, (name, one) in enumerate(zip(limits.limit_names, excess, strict=True))
-        if one > SLACK
-    )
-
-
-def _amount(limits: Stage, k: int, goals: Sequence[Objective], J: np.ndarray) -> str:
-    """By how much objectives (m,) exceed a limit: in the unit of its objective, where it is a limit of one."""
-    here = float(limits.excesses(J[None])[0, k])
-    steps = STEP * np.maximum(np.abs(J), 1.0)
-    slopes = (limits.excesses(J + np.diag(steps))[:, k] - here) / steps
-    (own,) = np.nonzero(slopes)
-    return f"{here:.3g}" if len(own) != 1 else shown(here / abs(float(slopes[own[0]])), goals[own[0]])
 
 
 def _nothing(J: Sequence[Any]) -> list[Any]:

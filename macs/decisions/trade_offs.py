@@ -21,6 +21,7 @@ from problems.derived import remembered
 from problems.problem import Problem
 from transcription import from_dict
 from transcription.nlp.projection import Projection, projection
+from transcription.nlp.weight_bounds import ratio_bounds, ratio_residual
 
 from ..fronts.builders import OPTIMAL
 from ..fronts.point import Point
@@ -34,6 +35,10 @@ LEFT = 1e-3
 """Largest part of the longest of the weighted gradients that is left of their sum at a point that is taken to be Pareto-optimal."""
 NOTHING = 1e-3
 """Part of its gradient below which nothing is left of it within what is active."""
+EXACT, ROOM = 1e-6, 1.01
+"""Residual of the conditions of optimality that weights may leave at a point that is solved; elsewhere, so many times what is left."""
+ALIKE = 0.1
+"""Part of weights by which others are different."""
 NEGLIGIBLE = 1e-6
 """Part of the largest weight, in ranges of the front, below which others are round-off."""
 
@@ -119,7 +124,10 @@ class TradeOffs:
 
         It is infinite where objective i has weight 0, as the others have at the end of a front, and not a number where both have. At a
         corner, as at an end of a front where limits hold all that could vary, several weights do as well, and the rates are those of one of
-        them.
+        them: see `bounds`.
+
+        It is a derivative, of the local optima that this point is one of. How far it holds is another question: fronts of flights with
+        many active limits bend sharply, and other optima nearby, which may be better, have rates of their own.
 
         Raises
         ------
@@ -127,6 +135,24 @@ class TradeOffs:
             If there is no such objective, and as for `weights`.
         """
         return float(self.rates[self._number(i), self._number(j)])
+
+    def bounds(self, i: str | int, j: str | int) -> tuple[float, float]:
+        """The least and the largest dJ_i/dJ_j of all weights with which the point is as optimal as points are, to `EXACT`, or as it is
+        with its own. At a corner of the front, these are the rates of its sides; where it bends sharply, they say how well the rate is
+        known.
+
+        Raises
+        ------
+        ValueError
+            As for `rate` and `matrix`.
+        """
+        one, other = self._number(i), self._number(j)
+        if one == other:
+            return 1.0, 1.0
+        _, found = self.weights, self._projection
+        ends = np.array(ratio_bounds(found.conditions, one, other, self._residual))
+        low, high = sorted(-self._signs[one] * self._signs[other] * found.scales[one] / found.scales[other] * ends)
+        return float(low), float(high)
 
     @property
     def matrix(self) -> np.ndarray:
@@ -180,7 +206,7 @@ class TradeOffs:
     @cached_property
     def messages(self) -> tuple[str, ...]:
         """What the projection says of the point: that it is not Pareto-optimal, which objectives can get better together with all others,
-        and which can get no better along what is active; or why there is none."""
+        and which can get no better along what is active; or why there is none. And whether weights that differ do as well, see `bounds`."""
         violation = self.point.violation
         found = [] if violation <= OPTIMAL else [f"not feasible: the violation is {violation:.1e}"]
         try:
@@ -193,7 +219,7 @@ class TradeOffs:
                 found.append(f"the row of '{goal.name}' is degenerate: within what is active it can get no better")
             elif (np.delete(gains[i], i) > LEFT).all():
                 found.append(f"the row of '{goal.name}' has no negative entry: it and all others can get better together")
-        return tuple(found)
+        return (*found, *self._corner)
 
     def table(self) -> str:
         """What all objectives change by when one gets better by one unit, as plain text: along the front with the others held; of more than
@@ -232,6 +258,33 @@ class TradeOffs:
             with suppress(ValueError):
                 tables["where it gets better fastest"] = self.matrix
         return draw_trade_offs(self.goals, np.nan_to_num(self.point.ranges), tables, figure)
+
+    @property
+    def _corner(self) -> list[str]:
+        """What is to be said where weights that differ do as well."""
+        found = self._projection
+        if self.left > LEFT:
+            return []
+        heaviest = int(np.argmax(found.weights))
+        for k, weight in enumerate(found.weights):
+            ratio = weight / found.weights[heaviest]
+            trials = (ratio / (1.0 + ALIKE), ratio * (1.0 + ALIKE)) if weight > LEFT * ALIKE else (LEFT,)
+            if k != heaviest and any(ratio_residual(found.conditions, heaviest, k, one) <= self._residual for one in trials):
+                return [self._between(heaviest, k)]
+        return []
+
+    def _between(self, i: int, j: int) -> str:
+        """Text with the bounds of a rate."""
+        low, high = self.bounds(i, j)
+        name, other = self.goals[i].name, self.goals[j].name
+        left = self._projection.conditions.residual
+        why = "an end, a corner or a sharp bend of the front" if left <= EXACT else f"its conditions of optimality hold to {left:.1e} only"
+        return f"{why}: one more in '{other}' changes '{name}' by {low + 0.0:.4g} to {high + 0.0:.4g}"
+
+    @property
+    def _residual(self) -> float:
+        """What weights that do as well may leave."""
+        return max(EXACT, ROOM * self._projection.conditions.residual)
 
     @property
     def _signs(self) -> np.ndarray:

@@ -109,9 +109,12 @@ def verified(
         worst, violation[i] = worst_violation(problem, simulation)
         defect[i], F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
         off = missed(simulation, points[int(i)].objectives, scales)
+        apart = np.abs(F[i] - points.F[i])
         agrees[i] = points.status[i] == CONVERGED and max(defect[i], violation[i], off) <= tolerance
         if not agrees[i]:
-            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), off, tolerance, remark)
+            k = int(np.where(np.isfinite(apart), apart / scales, np.inf).argmax())
+            other = "" if off <= tolerance else f"its '{points.names[k]}' differs by {apart[k]:.2g} {points.goals[k].unit}".rstrip()
+            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), other, tolerance, remark)
             notes[i] = "; ".join([*filter(None, [notes[i]]), *reasons])
     return points.replace(
         defect=defect,
@@ -173,17 +176,17 @@ def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray
 
 
 def _misses(
-    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], off: float, tolerance: float, remark: bool
+    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], other: str, tolerance: float, remark: bool
 ) -> list[str]:
-    """In words, what a point misses by more than the tolerance."""
+    """In words, what a point misses by more than the tolerance; `other` of its objectives."""
     label, violation = worst
     found = []
     if not defect <= tolerance:
         found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance) if remark else ''}")
     if not violation <= tolerance:
         found.append(f"it violates '{label}' by {violation:.1e}")
-    if not off <= tolerance:
-        found.append(f"its objectives differ by {off:.1e} of the front's range")
+    if other:
+        found.append(other)
     return [MISSES + ", ".join(found)] if found else []
 
 

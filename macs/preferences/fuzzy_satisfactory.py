@@ -94,7 +94,9 @@ class FuzzySatisfactory(Preference):
             return sum(peaks[1:]) / len(found) + self.regulating * peaks[0]
 
         def groups(J: Sequence[Operand]) -> list[list[Operand]]:
-            return [self._excesses_of_order(found, J), *([0.0, *aim.excesses(J)] for aim in found.values())]
+            # The largest of these is kappa. Without a kink in what rises: a solve would not end at an optimum that lies there.
+            order = [part - found[r].deviation(J) for s, r in self._pairs() for part in found[s].parts(J)]
+            return [order, *([0.0, *aim.excesses(J)] for aim in found.values())]
 
         def limits(J: Sequence[Operand]) -> list[Operand]:
             return [*tolerances(J), *(self._excesses_of_order(found, J) if self.ordered else ())]

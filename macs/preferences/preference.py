@@ -81,9 +81,10 @@ class Preference(ABC):
     def rank(self, front: Any, ranges: Ranges | None = None) -> Ranking:
         """The points of a front in the order of this preference. Instant: no problem is solved, so that black boxes have it, too.
 
-        Points that are not feasible come last, and before them those that a simulation did not confirm. Points that exceed a hard limit of
-        the preference have the value infinity; they are ordered by how much they exceed it. Where values are equal, the point with the
-        smaller sum of normalised objectives is first.
+        Points within the hard limits of the preference come first: those that a simulation confirms, or that were not simulated, then the
+        others; then points that exceed a hard limit, the same way, which have the value infinity and are ordered by how much they exceed
+        it; at last those that are not feasible. See `macs.preferences.ranking.standing`; `decide` has the same order. Where values are
+        equal, the point with the smaller sum of normalised objectives is first.
 
         Parameters
         ----------

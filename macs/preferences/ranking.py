@@ -11,15 +11,18 @@ import numpy as np
 
 from ..fronts.point import Point
 from ..fronts.points import Points
+from ..fronts.verified import VERIFY
 from ..io.text import counted, numbers, text_table
 from .ranges import Ranges, confidence, usable
-from .stage import SLACK, Stage, ordering
+from .stage import SLACK, Stage, exceeded, ordering
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHOWN = 20
 """Rows of a table."""
+CONFIRMED, DOUBTFUL, BEYOND, BEYOND_AND_DOUBTFUL, INFEASIBLE = range(5)
+"""Standings of points, see `standing`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +43,8 @@ class Ranking:
     order : array (n,) of int
         Rows of the front, best first.
     message : str
-        What is to be known about the best point: no point meets the hard limits, or none was confirmed by a simulation.
+        What is to be known about the best point: that it exceeds hard limits, as all points do; that no simulation confirms it, and by how
+        much confirmed points exceed the hard limits, if there are any.
     """
 
     front: Points
@@ -124,11 +128,10 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
         raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
     ranges = Ranges.of(front) if ranges is None else ranges
     stages: Sequence[Stage] = preference.stages(front.goals, ranges)
-    J, kind = front.objectives, confidence(front)
+    J, rank = front.objectives, standing(stages, front)
     with np.errstate(invalid="ignore"):
         tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)
-    found = ordering(stages, J, kind, tie)
-    best = found.order[0]
+    found = ordering(stages, J, rank, tie)
     return Ranking(
         front,
         preference,
@@ -136,18 +139,51 @@ def ranked(preference: Any, front: Points, ranges: Ranges | None = None) -> Rank
         found.values,
         preference.degrees(front.goals, ranges, J),
         found.order,
-        _message(stages, J[kind < 2], found.excess[best] > 0.0, kind[best] > 0),
+        _message(stages, front, rank, found.order),
         tuple(stage.name for stage in stages),
     )
 
 
-def _message(stages: Sequence[Stage], J: np.ndarray, exceeded: bool, unconfirmed: bool) -> str:
+def standing(stages: Sequence[Stage], points: Points, verify: float | None = None) -> np.ndarray:
+    """What comes before all preference: the standing (n,) of each point among others; less is better.
+
+    0: within the hard limits, and no simulation contradicts it; 1: within them, but a simulation contradicts it; 2, 3: the same beyond
+    them; 4: not feasible. A point beyond a hard limit is no choice, whatever confirms it; one within that is not confirmed is a doubtful
+    choice. So a limit that is said to be hard is not given up for an error that is known. What a simulation contradicts is within the
+    limits only if what was simulated is, too, but for `verify`.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        Of which the hard limits are.
+    points : Points
+    verify : float, optional
+        By how much what was simulated may exceed a limit. Default: what the points were verified by.
+    """
+    sure, missed = confidence(points), verify or points.stats.get("verify") or VERIFY
+    claimed, simulated = (
+        np.max([stage.excess(J) for stage in stages], axis=0) for J in (points.objectives, points.simulated_F * points.signs)
+    )
+    beyond = (claimed > SLACK) | ((sure == DOUBTFUL) & (simulated > missed))
+    return np.where(sure <= DOUBTFUL, sure + np.where(beyond, BEYOND, CONFIRMED), INFEASIBLE)
+
+
+def _message(stages: Sequence[Stage], front: Points, rank: np.ndarray, order: np.ndarray) -> str:
     """What is to be known about the best point."""
-    parts = []
-    if exceeded:
+    best, parts = rank[order[0]], []
+    if best >= BEYOND:
+        J = front.objectives[rank < INFEASIBLE]
         most = [(np.min(stage.excesses(J), axis=0), stage.limit_names) for stage in stages]
         never = [name for least, names in most for value, name in zip(least, names, strict=True) if value > SLACK]
-        parts.append(f"No point meets all hard limits{'; none has ' + ', nor '.join(never) if never else ' together'}.")
-    if unconfirmed:
+        claimed = (np.max([stage.excess(J) for stage in stages], axis=0) <= SLACK).any()
+        how = "; none has " + ", nor ".join(dict.fromkeys(never)) if never else " when simulated" if claimed else " together"
+        parts.append(f"No point meets all hard limits{how}.")
+    nearest = [int(i) for i in order if rank[i] == BEYOND]
+    if best == DOUBTFUL and nearest:
+        # Stages may share their limits.
+        each = dict.fromkeys(exceeded(stage, front.goals, front.objectives[nearest[0]]) for stage in stages)
+        missed = ", ".join(filter(None, each))
+        parts.append(f"The best point is not confirmed by a simulation; confirmed ones exceed hard limits: of the nearest, {missed}.")
+    elif best in (DOUBTFUL, BEYOND_AND_DOUBTFUL):
         parts.append("No point was confirmed by a simulation.")
     return " ".join(parts)

@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from problems.compiled import Objective
+
+from .checks import shown
+
 Operand = Any
 """A number, an array (n,), or a symbol of CasADi: only operators and the functions of `operands` are applied to it."""
 
@@ -16,6 +20,8 @@ SLACK = 1e-6
 """A hard limit counts as met by points that exceed it by less than this, in its own scale: optima lie on limits up to rounding."""
 ATTAINED = 1e-9
 """A value that is not larger counts as zero."""
+STEP = 1e-4
+"""Part of an objective, or of 1, by which it is moved to see in which unit a limit is."""
 
 
 def _nothing(J: Sequence[Operand]) -> list[Any]:
@@ -72,6 +78,28 @@ class Stage:
             rows = [np.asarray(limit, dtype=float) + np.zeros(len(objectives)) for limit in self.limits(J)]
         found = np.stack(rows, axis=1) if rows else np.zeros((len(objectives), 0))
         return np.where(good[:, None], found, np.inf)
+
+
+def exceeded(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
+    """Text with each limit that objectives (m,) exceed, and by how much."""
+    unknown = [f"'{goal.name}'" for goal, value in zip(goals, J, strict=True) if not np.isfinite(value)]
+    if unknown:
+        return f"{', '.join(unknown)} is no number"
+    excess = limits.excesses(J[None])[0]
+    return ", ".join(
+        f"'{name}' is missed by {_amount(limits, k, goals, J)}"
+        for k, (name, one) in enumerate(zip(limits.limit_names, excess, strict=True))
+        if one > SLACK
+    )
+
+
+def _amount(limits: Stage, k: int, goals: Sequence[Objective], J: np.ndarray) -> str:
+    """By how much objectives (m,) exceed a limit: in the unit of its objective, where it is a limit of one."""
+    here = float(limits.excesses(J[None])[0, k])
+    steps = STEP * np.maximum(np.abs(J), 1.0)
+    slopes = (limits.excesses(J + np.diag(steps))[:, k] - here) / steps
+    (own,) = np.nonzero(slopes)
+    return f"{here:.3g}" if len(own) != 1 else shown(here / abs(float(slopes[own[0]])), goals[own[0]])
 
 
 def _columns(objectives: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:

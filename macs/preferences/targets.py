@@ -82,6 +82,10 @@ class Aim:
         """Excess over the target on each side; the largest of them and 0 is the deviation."""
         return [slope * (J[self.place] - target) for slope, target in self.sides]
 
+    def parts(self, J: Sequence[Operand]) -> list[Operand]:
+        """Of which the largest is the deviation."""
+        return self.excesses(J) if self.best else [0.0, *self.excesses(J)]
+
     def deviation(self, J: Sequence[Operand]) -> Operand:
         """The deviation from the target; not cut off at zero, where it would have a kink, if nothing is better than the target."""
         if self.best:

@@ -127,9 +127,11 @@ class _Mending:
             again = self.marked(solved_on(again, every, fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
-        again = self._inside(again, _slightly_outside(again, self.verify), LOSS)
+        again = tried = self._inside(again, _slightly_outside(again, self.verify), LOSS)
         again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
-        again = self._as_before(again)
+        # On a finer mesh, too, a point may exceed limits between nodes, and by less.
+        anew = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
+        again = self._as_before(self._inside(again, anew, LOSS))
         beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
         return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
 

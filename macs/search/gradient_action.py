@@ -11,7 +11,7 @@ import numpy as np
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
-from ..gradients.multistart import GradientSolves, MultistartSolver
+from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
 from ..pareto.archive import Guide
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
@@ -26,15 +26,25 @@ def allowed(evaluations: int, every: int, solves: int) -> int:
     return max(evaluations // every - solves, 0)
 
 
-def first_optima(seen: Evaluation, evaluator: Bilevel, rng: np.random.Generator) -> Evaluation:
+def first_optima(seen: Evaluation, given: np.ndarray | None, evaluator: Bilevel, rng: np.random.Generator) -> Evaluation:
     """The ends of the front, and a compromise of them, for a search that begins with nothing feasible; fewer if asked to end early, or
-    where none was found. They are sought from the candidate that misses least."""
-    known = np.flatnonzero(np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1))
-    if not len(known):
-        return seen.take(known)
+    where none was found.
+
+    They are sought from the best of the vectors (k, D) that were given, with which `seen` begins; where none were, from the problem's
+    guess, as gradient tools seek them; without one, from the candidate that misses least.
+    """
+    known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
+    violation = np.where(known, seen.violation, np.inf)
+    start = guessed_start(evaluator.nlp)
+    if given is not None and known[: len(given)].any():
+        start = given[[np.argmin(violation[: len(given)])]]
+    elif start is None and known.any():
+        start = seen.Z[[np.argmin(violation)]]
+    if start is None:
+        return seen.take(np.flatnonzero(known))
     solves = GradientSolves(evaluator.tolerance)
     solves.before, solves.counts = evaluator.before_batch, evaluator.counts
-    solver = MultistartSolver(evaluator.nlp, seen.Z[known[[np.argmin(seen.violation[known])]]], 1, rng, solves)
+    solver = MultistartSolver(evaluator.nlp, start, 1, rng, solves)
     found = solver.ends()
     if 1 < len(found) == sum(one.status == CONVERGED for one in found):
         F = np.array([one.F for one in found])

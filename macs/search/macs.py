@@ -96,7 +96,7 @@ class MACS(Settings, Solver):
         remember(state, [seen], self, evaluator)
         infeasible = not (seen.violation <= evaluator.tolerance).any()
         if self.refines and infeasible and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
-            optima = gradient_action.first_optima(seen, evaluator, rng)
+            optima = gradient_action.first_optima(seen, start, evaluator, rng)
             remember(state, [optima], self, evaluator)
             state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])

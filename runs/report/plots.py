@@ -145,7 +145,7 @@ def convergence_figure(
     larger : bool
         Whether larger values are better.
     log : bool
-        Whether the indicator's axis is logarithmic; values that are not positive are then not drawn.
+        Whether the indicator's axis is logarithmic, if a value is positive; those that are not are then not drawn.
     inside : bool
         Whether the legend of a few solvers is within the axes, in the corner that an indicator leaves free as it converges.
     """
@@ -154,8 +154,11 @@ def convergence_figure(
         ax = figure.subplots()
         bands = {solver: band(runs, larger=larger) for solver, runs in histories.items()}
         values = np.concatenate([part for b in bands.values() for part in (b.lower, b.median, b.upper)])
-        values = values[np.isfinite(values) & ((values > 0) | (not log))]
-        low, high = (values.min(), values.max()) if len(values) else (0.1, 1.0)
+        values = values[np.isfinite(values)]
+        # Where nothing is positive, there is nothing to draw on a logarithmic axis.
+        log = log and bool((values > 0).any())
+        values = values[(values > 0) | (not log)]
+        low, high = (values.min(), values.max()) if len(values) else (0.0, 1.0)
         last = max(b.x[-1] for b in bands.values())
         for k, (solver, b) in enumerate(bands.items()):
             color = COLORS[k % len(COLORS)]

@@ -140,6 +140,34 @@ def test_physical_programming_finds_its_optimum(preference: PhysicalProgramming)
     assert [step.name for step in choice.history] == ["largest excess over hard limits", stage.name]
 
 
+MET = {"effort": 10.0, "time": 0.7}
+"""Targets that are met from 1.063 on and up to 0.7: there memberships have kinks; in kappa, that of the less important goal is concave."""
+KINKS: list[tuple[FuzzySatisfactory, float]] = [
+    # (1/2 + lambda) d_1 + (1/2 - lambda) d_2 still falls where the first target is met, and rises from there on; so for either order.
+    (FuzzySatisfactory(MET, ["effort", "time"], 0.1), NOW["time"]),
+    (FuzzySatisfactory(MET, ["time", "effort"], 0.4), 0.7),
+    # Where that of the less important goal is met.
+    (FuzzySatisfactory(MET, ["time", "effort"], 0.01), NOW["time"]),
+    # Between both kinks.
+    (FuzzySatisfactory(MET, ["time", "effort"], 0.1), balanced(0.4 / 86, 0.6 / 3.3)),
+    # A target on either side, of which all but the kink is missed.
+    (FuzzySatisfactory({"effort": Around(20.0, 12.0)}, ["effort", "time"], 0.1), in_time(20.0)),
+    (FuzzySatisfactory({"effort": Around(20.0, 12.0)}, ["time", "effort"], 0.1), in_time(20.0)),
+]
+
+
+@pytest.mark.parametrize("begun", [0, 1], ids=["from slow", "from quick"])
+@pytest.mark.parametrize(("preference", "T"), KINKS, ids=[repr(one[0]) for one in KINKS])
+def test_solves_do_not_stall_at_kinks_of_memberships(preference: FuzzySatisfactory, T: float, begun: int) -> None:
+    """Optima at kinks, and behind kinks that lie on the way."""
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends()[begun])
+    # What the closed form says is right: no point of the front, in steps of 2e-4, is better.
+    ranking = preference.rank(dense(), RANGES)
+    assert ranking.best.objectives["time"] == pytest.approx(T, abs=2.1e-4)
+    assert choice.message == "" and choice.objectives["time"] == pytest.approx(T, rel=1e-5)
+    assert choice.value <= ranking.values[ranking.order[0]] + 1e-8
+
+
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(weight=st.floats(-3, 3), wide=st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
 def test_any_weights_in_any_ranges(weight: float, wide: tuple[float, float]) -> None:

@@ -21,6 +21,8 @@ from macs.decisions import (
     decide,
     satisfy,
 )
+from macs.decisions.desk import NO_OPTIMUM
+from transcription.nlp import scalarized
 
 TIME = WeightedSum({"time": 1.0})
 
@@ -90,6 +92,21 @@ def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
     choice = decide(problem, MESH, WeightedSum({"from left": 1.0}), ranges=Ranges(*both))
     assert choice.point.status != "converged" and choice.history[0].status != "converged"
     assert "the nearest violates constraint 'beyond'" in choice.message
+
+
+@pytest.mark.parametrize(("method", "words"), [(MESH, ""), (None, "no solve converged: ")], ids=["given", "found"])
+def test_where_all_solves_fail_the_message_says_why(monkeypatch: pytest.MonkeyPatch, method: Any, words: str) -> None:
+    """From the ends of the front, with boxes of a tenth of the bounds, solves do not reach what is asked for."""
+    preference, known = ReferencePoint({"effort": 10.0, "time": 0.7}), ends()
+    monkeypatch.setattr(scalarized, "_strategies", lambda *_: (scalarized.NEAR,))
+    monkeypatch.setattr(scalarized, "RESTARTS", 0)
+    choice = decide(cart(), method, preference, ranges=RANGES, start=known)
+    assert choice.message == f"achievement: {words}{scalarized.IN_BOX}; {NO_OPTIMUM}"
+    assert choice.history[0].status == "failed" and choice.history[0].message == f"{words}{scalarized.IN_BOX}"
+    # Where they ended is feasible, and better than what was known.
+    assert choice.point.status == "converged" and choice.point.verified and choice.point.optimality > 1e-6
+    best = preference.rank(known, RANGES)
+    assert choice.value < best.values[best.order[0]] - 1e-3 and NO_OPTIMUM in choice.point.note
 
 
 @pytest.mark.parametrize(

@@ -29,11 +29,13 @@ from macs.decisions import (
     decide,
     satisfy,
 )
-from macs.decisions.desk import Desk
-from macs.decisions.judging import exceeded, keeps
+from macs.decisions.desk import NO_OPTIMUM, Desk
+from macs.decisions.judging import keeps
 from macs.decisions.stages import ONLY_NEAR, Outcome, StageSolver
+from macs.fronts.points import Points
 from macs.gradient_tools import Terms
 from macs.gradients.front_polish import KEPT_INSIDE
+from macs.preferences.stage import exceeded
 from problems import Problem, load
 from transcription import DFET, from_dict
 
@@ -213,7 +215,8 @@ def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> No
     wide = Ranges({"terminal mass": 89006.6, "terminal speed": 7802.88}, {"terminal mass": 36571.0, "terminal speed": 4805.46})
     wanted = PhysicalProgramming({"terminal mass": Larger.even(89000, 64000), "terminal speed": Larger.even(7800, 5500)})
     choice = decide(load("skip"), wanted, ranges=wide, start=start)
-    assert not start.verified.any() and choice.point.verified and len(again(choice)) == 2 and ONLY_NEAR not in choice.message
+    assert not start.verified.any() and choice.point.verified and len(again(choice)) == 1 and ONLY_NEAR not in choice.message
+    assert KEPT_INSIDE in choice.point.note and len(choice.point.variables) > 2 * len(start[0].variables)
     # On the mesh where it began, states were off by a third of their bounds.
     assert choice.objectives["terminal mass"] >= 64000 and choice.objectives["terminal speed"] >= 5500 and choice.point.defect < 1e-3
 
@@ -259,6 +262,18 @@ def test_a_hard_limit_is_not_given_up_for_an_error_that_is_known() -> None:
     assert "was found, but not confirmed: simulated, " in choice.message or "no better point" in choice.message
 
 
+@pytest.mark.parametrize("until", [4.0, 3.5])
+def test_what_stands_is_what_a_ranking_has_first(until: float) -> None:
+    """A point at 5 that is confirmed, and one at 3.8 that is not: within a limit of 4, and beyond one of 3.5."""
+    known = Points.concatenate([_at(5.0), _at(3.8).replace(verified=[False])])
+    wanted = Nimbus({"end": end(3.4), "time": 3.4}, improve=["end"], until={"time": until})
+    best = wanted.rank(known, BOTH).best
+    choice = decide(swing(), COARSE, wanted, ranges=BOTH, start=known, max_iterations=1)
+    assert choice.objectives == best.objectives and best.objectives["time"] == pytest.approx(3.8 if until > 3.8 else 5.0, abs=0.02)
+    over = f"'time at most {until:g} s' is missed by {known.F[0, 1] - until:.6g} s"
+    assert over in choice.message and (over in wanted.rank(known, BOTH).message) is (until > 3.8)
+
+
 def test_limits_that_are_kept_are_not_given_up_for_a_point_nearby(monkeypatch, no_work) -> None:
     known = _at(5.0)[0]
     nlp = from_dict(known.transcription).nlp(swing().compile())
@@ -296,6 +311,24 @@ def test_what_is_within_the_limits_stands_where_the_next_solve_fails(monkeypatch
     assert choice.point.verified is (method is None) and np.isfinite(choice.value)
 
 
+@pytest.mark.parametrize("ended", ["better", "worse", "infeasible"])
+def test_of_what_was_begun_and_where_the_next_solve_failed_the_better_stands(monkeypatch, ended: str) -> None:
+    first = Desk._first
+
+    def failed(self: Desk, *arguments) -> Outcome:
+        one = first(self, *arguments)
+        z = {"better": one.z, "worse": rough()[1].decision, "infeasible": one.z * 1.01}[ended]
+        return replace(one, z=z, F=one.nlp.evaluate(z[None])[0][0], status="failed", note="it did not converge", lifted=None)
+
+    monkeypatch.setattr(Desk, "_first", failed)
+    choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=rough())
+    assert rough()[1].objectives["time"] < 3.3 and not keeps(QUICK.stages(swing().compile().goals, BOTH)[0], rough()[1], 1e-3)
+    assert choice.message.startswith("achievement: it did not converge") and (NO_OPTIMUM in choice.message) is (ended == "better")
+    assert choice.objectives["time"] <= 4.0 + 1e-5 and choice.point.status == "converged"
+    begun, last = choice.history
+    assert choice.objectives == pytest.approx((last if ended == "better" else begun).objectives) and last.status == "failed"
+
+
 # What is said
 
 
@@ -326,3 +359,13 @@ def test_conditions_of_optimality_are_in_units_or_not_known() -> None:
     text = desk.work(lambda: desk._not_optimal(0.01))
     assert f"'end' by {0.01 * wide[0]:.6g} m, 'time' by {0.01 * wide[1]:.6g} s" in text
     assert "is not known" in desk._not_optimal(np.inf) and "inf" not in desk._not_optimal(np.inf)
+
+
+def test_a_solver_on_a_mesh_that_is_given_mends_where_it_is_asked_to():
+    """Also the ends of the front, which it finds first."""
+    choices = {"even": ReferencePoint(dict(BOTH.best))}
+    fixed, mended = (Decide(choices=choices, ranges=BOTH, mesh=mesh).solve(swing(), COARSE, seed=0) for mesh in ("fixed", "mended"))
+    assert not fixed.verified.any()
+    assert mended.verified.all() and len(mended) == 1
+    assert mended.objectives[0, 1] == pytest.approx(BALANCED, abs=2e-3)
+    assert mended.simulated_F[0] == pytest.approx([-end(BALANCED), BALANCED], abs=2e-3)

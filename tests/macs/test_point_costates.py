@@ -60,7 +60,7 @@ def test_costates_jump_where_edges_have_moved_to():
     mesh has edges near these times, which moved there."""
     problem = Problem("ball")
     move = problem.phase("move", t0=0.0, tf=1.0)
-    x = move.state("x", bounds=(-0.1, 1 / 9), initial=0, final=0)
+    move.state("x", bounds=(-0.1, 1 / 9), initial=0, final=0)
     v = move.state("v", bounds=(-2, 2), initial=1, final=-1)
     u = move.control("u", bounds=(-20, 20))
     move.dynamics(x=v, v=u)

@@ -9,6 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from choices import cart, plain_front
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights, marked
 
@@ -72,12 +74,52 @@ def test_points_that_were_not_confirmed_come_after_those_that_were():
     assert some.order[-1] == 0
 
 
-def test_an_unconfirmed_point_is_not_best_even_where_only_it_meets_a_limit():
-    front = marked(cart(3), [True, False, True])
-    ranking = PhysicalProgramming({"time": Smaller.even(2.0, 3.0), "effort": Smaller.even(0.5, 1.0)}).rank(front)
+LIMITED = PhysicalProgramming({"time": Smaller.even(2.0, 3.0), "effort": Smaller.even(0.5, 1.0)})
+"""The times 1.2, 2.6 and 4 s have efforts of 6.94, 0.68 and 0.19: only the second is within the limits, and the third is nearer to them."""
+
+
+def test_an_unconfirmed_point_within_hard_limits_comes_before_confirmed_ones_beyond_them():
+    ranking = LIMITED.rank(marked(cart(3), [True, False, True]))
     assert list(np.isfinite(ranking.values)) == [False, True, False]
-    assert ranking.order[-1] == 1
-    assert ranking.message == "No point meets all hard limits together."
+    assert list(ranking.order) == [1, 2, 0]
+    assert ranking.message == (
+        "The best point is not confirmed by a simulation; confirmed ones exceed hard limits: of the nearest, 'time at most 3 s' is missed"
+        " by 1 s."
+    )
+    # A confirmed one within the limits comes before all.
+    ranking = LIMITED.rank(marked(cart(5), [True, True, False, True, True]), Ranges.of(cart(5)))
+    assert list(ranking.order) == [2, 3, 4, 1, 0] and "of the nearest, 'time at most 3 s' is missed by 0.3 s" in ranking.message
+    ranking = PhysicalProgramming({"time": Smaller.even(2.0, 3.5)}).rank(marked(cart(5), [False, False, False, True, False]))
+    assert ranking.order[0] == 3 and ranking.order[-1] == 4 and ranking.message == ""
+
+
+def test_what_was_simulated_beyond_a_hard_limit_is_beyond_it():
+    front = marked(cart(3), [True, False, True])
+    # By more, in units of the limit's class, than what points may miss: 3 s and 1.
+    over = front.replace(simulated_F=np.where(np.arange(3)[:, None] == 1, [[3.1, 0.7]], front.simulated_F))
+    ranking = LIMITED.rank(over)
+    assert list(ranking.order) == [2, 0, 1]
+    assert ranking.message == "No point meets all hard limits when simulated."
+    # Not simulated, it is not known to be.
+    blank = front.replace(
+        **{name: np.where(np.arange(3) == 1, np.nan, getattr(front, name)) for name in ("defect", "simulated_violation")},
+        simulated_F=np.where(np.arange(3)[:, None] == 1, np.nan, front.simulated_F),
+    )
+    ranking = LIMITED.rank(blank)
+    assert ranking.order[0] == 1 and ranking.message == ""
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.lists(st.tuples(st.integers(4, 16), st.booleans(), st.booleans()), min_size=1, max_size=7, unique_by=lambda one: one[0]))
+def test_hard_limits_come_before_simulations_and_these_before_values(points):
+    """The time is to be at most 3, and small."""
+    quarters, confirmed, feasible = (np.array(column) for column in zip(*sorted(points), strict=True))
+    times, feasible[0] = 0.25 * quarters, True
+    front = plain_front(times[:, None], [Objective("time", "s")], status=["converged" if one else "failed" for one in feasible])
+    front = marked(front, list(confirmed)).replace(simulated_F=front.F)
+    order = FuzzyGoal({"time": 2.0}, {"time": 1.0}).rank(front, Ranges({"time": 0.0}, {"time": 4.0})).order
+    keys = [(not feasible[i], times[i] > 3, feasible[i] and not confirmed[i], max(times[i], 2.0), times[i]) for i in order]
+    assert keys == sorted(keys)
 
 
 def test_a_front_without_feasible_points_is_not_ranked():

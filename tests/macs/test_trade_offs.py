@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import null_space
-from smooth_problems import nlp_of, shuttle, slide, two_wells, vector
+from smooth_problems import nlp_of, shuttle, slide, still, two_wells, vector
 from synthetic_fronts import black_box
 
 from macs import Front, optimize, sweep
-from macs.decisions import Ranges, WeightedSum, decide, front_rates, plot_rates, trade_offs
-from macs.decisions.trade_offs import rates
+from macs.decisions import (
+    FuzzyPhysicalProgramming,
+    Larger,
+    Ranges,
+    Smaller,
+    WeightedSum,
+    decide,
+    front_rates,
+    plot_rates,
+    trade_offs,
+)
+from macs.decisions.trade_offs import TradeOffs, rates
 from macs.fronts.builders import vectors_points
 from problems import Problem, load
 from problems.cases import goddard
+from problems.cases.skip_entry import smv
 from transcription import DFET, NLP, Transcription, parse, stated
 from transcription.inner import inner_solver
+from transcription.nlp import scalarized
 from transcription.nlp.derivatives import gradients
 from transcription.nlp.optimality import Linearised
 from transcription.nlp.projection import metric_roots
@@ -192,8 +206,58 @@ def test_what_is_active_is_held_and_what_has_no_multiplier_may_be_left():
     nlp = nlp_of(wall)
     found = trade_offs(as_front(nlp, vector(nlp, p=0.3, q=0.0))[0])
     assert found.matrix == pytest.approx(np.array([[1.0, np.nan], [-0.3 / 0.7, 1.0]]), nan_ok=True)
-    assert found.messages == ("the row of 'from left' is degenerate: within what is active it can get no better",)
+    assert found.messages == (
+        "the row of 'from left' is degenerate: within what is active it can get no better",
+        "an end, a corner or a sharp bend of the front: one more in 'from right' changes 'from left' by -0.4286 to 0",
+    )
+    assert found.bounds("from right", "from left") == pytest.approx((-np.inf, -0.7 / 0.3), rel=1e-4)
     assert trade_offs(as_front(nlp, vector(nlp, p=0.1, q=0.0))[0]).messages[0] == "not feasible: the violation is 2.0e-01"
+
+
+def faces(*normals: tuple[float, ...], signs: tuple[int, ...] | None = None) -> TradeOffs:
+    """At a corner of a front with flat faces of these normals, all through the point where each objective is 1."""
+    problem = still("faces")
+    x = [problem.parameter(f"p{k}", bounds=(-5, 5)) for k in range(len(normals[0]))]
+    for k, (one, sign) in enumerate(zip(x, signs or (1,) * len(x), strict=True)):
+        (problem.minimize if sign > 0 else problem.maximize)(f"J{k}", sign * one)
+    for number, normal in enumerate(normals):
+        problem.constraint(f"face {number}", sum(part * one for part, one in zip(normal, x, strict=True)), lower=sum(normal))
+    nlp = nlp_of(problem)
+    return trade_offs(as_front(nlp, vector(nlp, **{f"p{k}": 1.0 for k in range(len(x))}))[0])
+
+
+def test_at_a_corner_the_rates_of_both_sides_are_said():
+    found = faces((2.0, 1.0), (1.0, 2.0))
+    assert found.bounds("J1", "J0") == pytest.approx((-2.0, -0.5), rel=1e-3)
+    assert found.bounds("J0", "J1") == pytest.approx((-2.0, -0.5), rel=1e-3) and found.bounds(0, 0) == (1.0, 1.0)
+    assert -2.0 <= found.rate("J1", "J0") <= -0.5
+    assert "an end, a corner or a sharp bend of the front: one more in" in found.messages[-1] and "by -2 to -0.5" in found.messages[-1]
+    # What is maximised gets more for more of the other.
+    assert faces((2.0, 1.0), (1.0, 2.0), signs=(1, -1)).bounds("J1", "J0") == pytest.approx((0.5, 2.0), rel=1e-3)
+    # Within a face all weights are known.
+    flat = faces((2.0, 1.0))
+    assert flat.bounds("J1", "J0") == pytest.approx((-2.0, -2.0), rel=1e-3) and not flat.messages
+
+
+def test_at_an_edge_of_three_objectives_the_rates_of_both_sides_are_said():
+    found = faces((1.0, 1.0, 2.0), (2.0, 1.0, 1.0))
+    assert found.bounds("J0", "J2") == pytest.approx((-2.0, -0.5), rel=1e-3)
+    assert found.bounds("J0", "J1") == pytest.approx((-1.0, -0.5), rel=1e-3)
+    assert "an end, a corner or a sharp bend of the front" in found.messages[-1]
+
+
+def test_weights_are_not_moved_by_what_tells_multipliers_apart():
+    """An objective p + d q with p above a wall, another r - d q with r on its bound: what q has on one side the other loses. The less d,
+    the less of the residual is lost by other weights, which have smaller multipliers of the wall."""
+    for d in (1e-5, 3e-6):
+        problem = still("see-saw")
+        p, q, r = (problem.parameter(name, bounds=(lower, 1)) for name, lower in (("p", -1), ("q", -1), ("r", 0)))
+        problem.minimize("one", p + d * q)
+        problem.minimize("other", r - d * q)
+        problem.constraint("wall", p + 0 * q, lower=0)
+        nlp = nlp_of(problem)
+        found = trade_offs(as_front(nlp, vector(nlp, p=0.0, q=0.3, r=0.0))[0])
+        assert found.rate("one", "other") == pytest.approx(-1.0, rel=2e-4)
 
 
 @pytest.mark.parametrize("method", [DFET(4, 4), parse("radau:6x3")], ids=str)
@@ -270,7 +334,13 @@ def test_rates_are_the_slope_of_the_front_in_closed_form(ascents):
         if time > 249.9:
             # The time may be no longer, only shorter.
             exact[1, 0] = np.nan
-            assert found.messages == ("the row of 'horizontal speed' is degenerate: within what is active it can get no better",)
+            assert found.messages[0] == "the row of 'horizontal speed' is degenerate: within what is active it can get no better"
+            # At an end of the front: the rate there, and that of a limit.
+            assert "an end" in found.messages[1] and len(found.messages) == 2
+            assert found.bounds("flight time", "horizontal speed") == pytest.approx((1 / slope, np.inf), rel=1e-3)
+        else:
+            assert not found.messages
+            assert found.bounds("flight time", "horizontal speed") == pytest.approx((1 / slope, 1 / slope), rel=1e-3)
         assert found.matrix == pytest.approx(exact, rel=1e-3, nan_ok=True)
 
 
@@ -319,6 +389,88 @@ def test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_op
         assert found.rate("terminal mass", "terminal speed") == pytest.approx(mass / speed, rel=0.02)
         assert found.matrix[1, 0] == pytest.approx(mass / speed, rel=0.02)
         assert not found.messages
+
+
+MISSION = Ranges(
+    {"flight time": 417.67, "heat load": 45.079, "terminal speed": 7802.88, "terminal mass": 86449.3},
+    {"flight time": 2086.42, "heat load": 217.63, "terminal speed": 4016.27, "terminal mass": 51018.23},
+)
+"""Of the skip entry over a turning planet: from the best values of its reference front to the limits of its paper."""
+
+
+@pytest.fixture(scope="module")
+def compromise() -> tuple[NLP, Front, Front]:
+    """That flight by fuzzy physical programming with boundaries in equal steps, on elements of half the number; then the greatest mass
+    with the other objectives as they are there: as it was solved, and feasible to round-off."""
+    problem = load("smv")
+    edges = {"descent": np.linspace(0, 1, 25).tolist(), "ascent": np.linspace(0, 1, 13).tolist()}
+    mesh = {phase: {"edges": one, "order": 3} for phase, one in edges.items()}
+    method = DFET(24, 3, control_order=1, basis="bernstein", mesh=mesh)
+    nlp = method.nlp(problem)
+    wanted = {n: (Smaller if MISSION.best[n] < MISSION.worst[n] else Larger).even(MISSION.best[n], MISSION.worst[n]) for n in MISSION.best}
+    choice = decide(
+        problem,
+        method,
+        FuzzyPhysicalProgramming(wanted),
+        ranges=MISSION,
+        start=as_front(nlp, nlp.first_guess(nlp.guess[None])[0]),
+        starts=1,
+        verify=None,
+    )
+    assert choice.point.status == "converged"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scalarized, "INSIDE", CLOSE)
+        best = greatest_mass(nlp, choice.point.decision, choice.point.F)
+    assert best.status == "converged" and pytest.approx(choice.point.F, rel=1e-6) == best.F
+    exact = inner_solver("auto").solve(nlp, best.z[None, nlp.free], best.z[None], tolerance=1e-11)
+    assert exact.status[0] == "converged"
+    return nlp, as_front(nlp, best.z), as_front(nlp, exact.z[0])
+
+
+CLOSE = replace(
+    scalarized.INSIDE,
+    options=(("mu_init", 1e-6), *((name, 1e-7) for name in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"))),
+)
+"""A barrier so low that a solve stays with the optimum that it begins at. With the usual one it leaves for another flight with the same
+time and heat and a little more mass, whose controls switch elsewhere: differences of such solves are rates of that flight."""
+
+
+def greatest_mass(nlp: NLP, start: np.ndarray, limits: np.ndarray) -> scalarized.Solved:
+    return scalarize(nlp, start, reference=limits, weights=np.eye(4)[3], near=True)
+
+
+@pytest.mark.slow
+def test_rates_of_a_long_skip_entry_agree_with_differences_of_epsilon_constraint_optima(monkeypatch, compromise):
+    """The greatest mass where the time, the heat and the speed are held a little to both sides of what they are."""
+    monkeypatch.setattr(scalarized, "INSIDE", CLOSE)
+    nlp, front, _ = compromise
+    point, found = front[0], trade_offs(front[0])
+    spans = np.ptp(smv.reference(), axis=0)
+    assert not found.messages
+    for j, goal in enumerate(point.goals[:3]):
+        # The front bends so sharply that a hundred times these steps lead to other rates.
+        both = [greatest_mass(nlp, point.decision, point.F + s * 1e-4 * spans[j] * np.eye(4)[j]) for s in (-1, 1)]
+        assert all(one.status == "converged" and np.abs((one.z - point.decision)[nlp.free]).max() < 0.01 * nlp.span.max() for one in both)
+        mass, other = ((both[1].F - both[0].F) * nlp.problem.signs)[[3, j]]
+        assert found.rate("terminal mass", j) == pytest.approx(mass / other, rel=0.01), goal.name
+        low, high = found.bounds("terminal mass", j)
+        assert low <= mass / other <= high and high - low < 0.1 * abs(high + low) / 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["flight time", "terminal mass"])
+def test_the_matrix_of_a_long_skip_entry_agrees_with_differences_along_its_own_directions(compromise, name):
+    """Forward: limits without multipliers are left, and backward they would be exceeded."""
+    nlp, _, front = compromise
+    point, found = front[0], trade_offs(front[0])
+    i = list(point.objectives).index(name)
+    direction = found.directions[i]
+    far = 3e-3 / np.abs(direction / nlp.span).max()
+    ahead = np.clip(point.decision + far * direction, nlp.lower, nlp.upper)[None]
+    flown = inner_solver("auto").solve(nlp, ahead[:, nlp.free], ahead, tolerance=1e-11)
+    change = (flown.F[0] - point.F) * nlp.problem.signs
+    assert flown.status[0] == "converged" and change[i] == pytest.approx(-far * point.goals[i].sign, rel=0.01), "better by so much"
+    assert change / change[i] == pytest.approx(found.matrix[i], rel=0.01)
 
 
 # What is found out.

@@ -158,3 +158,10 @@ def test_flights_that_cannot_be_drawn():
         flights_figure([])
     with pytest.raises(ValueError, match="point 1 of those to draw has no trajectory"):
         flights_figure([foreign(A, GOALS)[0]])
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_indicator_that_is_zero_is_drawn_on_a_linear_axis():
+    figure = convergence_figure({"ours": [(np.array([1.0, 2.0]), np.zeros(2))]}, xlabel="evaluations", ylabel="IGD")
+    (ax,) = figure.axes
+    assert ax.get_yscale() == "linear" and ax.get_ylim()[0] < 0 < ax.get_ylim()[1]

@@ -14,6 +14,7 @@ from problems import load
 from problems.cases.goddard import reference
 from transcription import DFET, NLP, Collocation, MultipleShooting
 from transcription.inner import inner_solver
+from transcription.nlp import scalarized
 from transcription.nlp.scalarized import Solved, scalarize
 from transcription.nlp.scaling import nlp_scales
 
@@ -235,6 +236,21 @@ def test_a_solve_says_which_limit_ended_it() -> None:
     solved = solve(goddard(), [150, -0.5], RANGES.tolist(), feasible(goddard(), 1), max_iterations=6)
     assert solved.status == "failed" and solved.message == "the limit of 6 iterations was reached" and solved.iterations <= 6
     assert solve(goddard(), [150, -0.5], RANGES.tolist(), feasible(goddard(), 1)).message == ""
+
+
+def test_a_solve_that_ends_in_its_boxes_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Each of four boxes lets p move by a tenth of its span: not from 2 to 0, where the left well is.
+    monkeypatch.setattr(scalarized, "_strategies", lambda *_: (scalarized.NEAR,))
+    nlp = nlp_of(two_wells())
+    solved = solve(nlp, [0, INF], [1, 1], vector(nlp, p=2.0, q=0.0))
+    assert solved.status == "failed" and solved.message == scalarized.IN_BOX and solved.violation <= 1e-6
+    assert solved.z[0] == pytest.approx(2.0 - 4 * 0.1 * nlp.span[0], abs=0.01 * nlp.span[0])
+
+
+def test_what_is_solved_to_ipopt_but_not_feasible_says_by_how_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scalarized._Task, "excess", lambda *_: 8.9e-4)
+    solved = solve(nlp_of(two_wells()), [0, 0.36], [1, 0])
+    assert solved.status == "infeasible" and solved.message == "it ended where limits are exceeded by 8.9e-04 of their scales"
 
 
 def test_without_persistence_the_first_way_has_all_iterations(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,9 @@ BEYOND, DETERMINED = 50, 1e-9
 SMALL = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
+FINE = 0.1
+"""Part of it with which the weights of several objectives are found. Where a front bends sharply, as that of a flight with hundreds of
+active limits does, they are off by a hundredth with all of it, and by the square of this less."""
 REFINEMENTS, EXACT = 3, 1e-12
 """As many at most, until what is left of the right-hand sides is this part of them."""
 
@@ -161,20 +164,30 @@ class Conditions:
         except (RuntimeError, np.linalg.LinAlgError):
             return float("inf")
 
+    def residual_of(self, mixtures: np.ndarray) -> float:
+        """The least residual of weights that are mixtures of those in the columns (used, p), which are not negative and each of sum 1."""
+        m = len(self.linear.of_objectives)
+        try:
+            return _least(np.hstack([self.reduced[:, :m] @ mixtures, self.reduced[:, m:]]), self.linear.slack)[0]
+        except (RuntimeError, np.linalg.LinAlgError):
+            return float("inf")
+
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Multipliers (used,) of the objectives and (k,) of the inequalities, in units, that leave the least residual; None where none are
         found.
 
         Where limits depend on each other, as do those of a state along an arc on one, or of a mass and of the thrust while it is off, they
-        are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others.
+        are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others:
+        first the weights of the objectives, and then the multipliers that belong to them.
         """
+        m, slack, small = len(self.linear.of_objectives), self.linear.slack, SMALL * np.concatenate(self._others())
         try:
-            x = _least(self.reduced, self.linear.slack, SMALL * np.concatenate(self._others()))[1]
+            weights = _least(self.reduced, slack, FINE * small)[1][:m] if m > 1 else np.ones(m)
+            weighted = np.column_stack([self.reduced[:, :m] @ weights, self.reduced[:, m:]])
+            return weights, _least(weighted, slack, small)[1][1:]
         except (RuntimeError, np.linalg.LinAlgError):
             return None
-        of_objectives, of_inequalities = np.split(x, [len(self.linear.of_objectives)])
-        return of_objectives, of_inequalities
 
     def multipliers(self) -> Multipliers | None:
         """Those that leave the least residual, see `scaled`; None where none are found."""

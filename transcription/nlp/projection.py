@@ -56,6 +56,8 @@ class Projection:
         The same in coordinates in which the metric is Euclid's.
     held : int
         How many inequalities are held.
+    conditions : Conditions
+        Of optimality, with these scales.
     """
 
     nlp: NLP
@@ -64,6 +66,7 @@ class Projection:
     variations: np.ndarray
     columns: np.ndarray
     held: int
+    conditions: Conditions
 
     @cached_property
     def free(self) -> np.ndarray:
@@ -152,7 +155,7 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
         s, _ = steepest(measure, equations, every)
     except RuntimeError:
         return None
-    return Projection(nlp, linear.scales, weights, s, roots @ s, int(np.count_nonzero(held)))
+    return Projection(nlp, linear.scales, weights, s, roots @ s, int(np.count_nonzero(held)), conditions)
 
 
 def _held(columns: np.ndarray, released: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

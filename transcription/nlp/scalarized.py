@@ -40,6 +40,8 @@ somewhere in the box: in it the objective would be nothing."""
 LEAST = 100
 """Fewest iterations for which a strategy is worth beginning, if there may be as many."""
 AT_LIMIT = "maximum iterations exceeded"
+IN_BOX = "it stopped at ends of the boxes around where it began"
+"""Message of a solve that could have gone on."""
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
@@ -102,7 +104,7 @@ class Solved:
     iterations : int
         Of IPOPT, by all strategies together.
     message : str
-        Why the solve ended where it did not converge by itself: the limit that was reached, or what IPOPT says.
+        Why the solve ended where it did not converge by itself, never empty then: the limit that was reached, or what IPOPT says.
     multipliers : array (m + r,) or None
         Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum of both
         vanish. None where nothing was solved.
@@ -271,7 +273,7 @@ def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
 def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
     """The start itself, where the work is to end before IPOPT begins."""
     F, violation = nlp.evaluate(start[None])
-    return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False)
+    return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False, message="it was not begun")
 
 
 def _task(
@@ -318,7 +320,7 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
             break
         start = solved.z
     if stuck and solved.status == CONVERGED:
-        solved = replace(solved, status=FAILED)
+        solved = replace(solved, status=FAILED, message=IN_BOX)
     return replace(solved, iterations=iterations)
 
 
@@ -362,6 +364,12 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
+    if outcome in SOLVED and status != CONVERGED:
+        # To IPOPT, it is solved.
+        missed = max(violation[0], task.excess(F[0]))
+        message = (
+            f"it ended where limits are exceeded by {missed:.1e} of their scales" if status == INFEASIBLE else "it ended at no numbers"
+        )
     clocked = STATUS_OF_IPOPT.get(outcome) == TIMEOUT
     multipliers = _multipliers(np.array(answer["lam_g"]).ravel(), rows, task.scale)
     return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message, multipliers=multipliers), stuck

@@ -76,7 +76,7 @@ def test_objectives_are_judged_by_their_ranges_over_the_front(share, good):
     front = points(cart(), *constant(0.5, 1.0, 1.5))
     found = front.replace(F=front.F - [[0.0, 0.0], [share * 0.02, 0.0], [0.0, 0.0]]).verify(0.01)
     assert found.verified.tolist() == [True, good, True]
-    assert found.notes[1] == ("" if good else "simulated, its objectives differ by 1.1e-02 of the front's range")
+    assert found.notes[1] == ("" if good else "simulated, its 'distance' differs by 0.022 m")
 
 
 @pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
@@ -251,7 +251,7 @@ def test_tables_set_apart_what_is_not_verified():
     at = lines.index("Not verified: simulated, these differ by more than 0.001.")
     assert [line.split()[0] for line in lines[at - 3 : at + 2] if line] == ["0", "2", "Not", "1"]
     assert lines[at + 1].endswith("not verified") and "2 of 3 points are verified." in lines
-    assert "Point 1: simulated, its objectives differ by 5.0e-02 of the front's range." in lines
+    assert "Point 1: simulated, its 'distance' differs by 0.1 m." in lines
     assert "The point is not verified." in found[[1]].table() and "None of 2 points is verified." in found[[1, 1]].table()
 
 

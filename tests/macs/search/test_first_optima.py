@@ -6,6 +6,8 @@ import numpy as np
 
 from macs import MACS, payoff
 from macs.evaluation.bilevel import Bilevel
+from macs.gradients.multistart import MultistartSolver
+from macs.search import gradient_action
 from macs.search.state import SearchState
 from problems import load
 from transcription import Collocation
@@ -41,3 +43,24 @@ def test_without_gradients_or_time_there_are_none() -> None:
     with stopped_by(lambda: True):
         state = begun(evaluator)
     assert not len(state.optima) and evaluator.counts.gradient_solves == 0
+
+
+def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
+    starts = []
+
+    class Recorded(MultistartSolver):
+        def __init__(self, nlp, given, *rest):
+            starts.append(given)
+            super().__init__(nlp, given, *rest)
+
+    monkeypatch.setattr(gradient_action, "MultistartSolver", Recorded)
+    evaluator = evaluator_of_vectors()
+    rng = np.random.default_rng(3)
+    worse, better = evaluator.box.to_values(rng.random((2, len(evaluator.free))))
+    given = evaluator.first_guess(np.array([worse, better]))
+    given = given[np.argsort(-evaluator.evaluate(given).violation)]
+    MACS(agents=4).begin(evaluator, 200, rng, given)
+    np.testing.assert_array_equal(starts[0], given[1:])
+    monkeypatch.setattr(gradient_action, "guessed_start", lambda nlp: given[:1])
+    MACS(agents=4).begin(evaluator_of_vectors(), 200, rng)
+    np.testing.assert_array_equal(starts[1], given[:1])
