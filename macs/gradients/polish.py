@@ -18,7 +18,8 @@ PLACES = 500
 
 
 CLOSER = (1 / 3, 1 / 9)
-"""With a guide there are as many places around its first anchor, at these parts of the distances: its region may be small."""
+"""With a guide, the places are around its first anchor instead, at these parts of the distances: its region may be small, it may lie beyond
+the simplex between the ends, and far from known points it is not known where it ends."""
 
 
 FAIR, LOSS = 1e-4, 0.05
@@ -52,7 +53,8 @@ def polish(
 ) -> Archive:
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
-    1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it.
+    1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it. With a guide all
+       solves that are left go to places that it wants, and no further steps follow: an even spread would take most of them elsewhere.
     2. One guarded solve from each point that no solve has found; the best point of each objective is first solved for the least value of
        that objective.
     3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two objectives and
@@ -147,7 +149,8 @@ def _cover(
     archive: Archive, solves: CountedSolves, solved: np.ndarray, limit: int, exponent: float | None, guide: Guide | None
 ) -> tuple[Archive, np.ndarray]:
     """The points with the ends of the front, and results of solves to `limit` places between them: always the place farthest from all known
-    points, in distances multiplied by the factors of a guide. Also the objectives (k, m) of what these and earlier solves found."""
+    points. With a guide all solves go to places around the point that it puts first, and distances are multiplied by the factors that are
+    expected there. Also the objectives (k, m) of what these and earlier solves found."""
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = _ends(archive, span, solves, solved)
     pool = _front(ends.joined(archive), span)
@@ -155,17 +158,15 @@ def _cover(
     between = np.where(between > 0.0, between, span)
     known, solved = across((ends.F - ideal) / between), np.vstack([solved, ends.F])
     lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
-    for _ in range(limit):
+    for _ in range(limit if guide is None else solves.left):
         if solves.left <= 0:
             break
-        places = lattice
-        if guide is not None:
+        places, wanted = lattice, np.ones(len(lattice))
+        if guide is not None and np.ptp(guide.factors(pool.F, pool.F)) > 0.0:
             best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
-            places = np.vstack([lattice, *(best + closer * (lattice - best) for closer in CLOSER)])
-        apart = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
-        if guide is not None:
-            beneath = np.linalg.norm(places[:, None] - across((pool.F - ideal) / between), axis=2).argmin(axis=1)
-            apart *= guide.factors(pool.F, pool.F)[beneath]
+            places = np.vstack([best + closer * (lattice - lattice.mean(axis=0)) for closer in CLOSER])
+            wanted = guide.factors(pool.F, ideal + between * _raised(places, (pool.F - ideal) / between))
+        apart = wanted * np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
         place = places[np.argmax(apart)]
         reference = ideal + between * place
         start = np.argmin(((pool.F - reference) / between).max(axis=1))
@@ -177,6 +178,12 @@ def _cover(
         # What ran out of iterations is to go on.
         solved = np.vstack([solved, found.F[found.status == CONVERGED]])
     return _thinned(_front(pool, between), limit, exponent, guide), solved
+
+
+def _raised(places: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """Where the diagonals from places (k, m) are expected to meet a front (n, m): as far up as its point nearest to the diagonal."""
+    beneath = np.linalg.norm(places[:, None] - across(front), axis=2).argmin(axis=1)
+    return places + front.mean(axis=1)[beneath, None]
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.ndarray) -> Archive:

@@ -12,6 +12,8 @@ from problems.compiled import Objective
 
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Guide
+from ..pareto.dominance import extremes
+from ..pareto.ranges import CURVE, ranges
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
 from .region import PART, Region
@@ -19,7 +21,12 @@ from .region import PART, Region
 OUTSIDE = 0.005
 """Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""
 FADING = 0.1
-"""Around the region, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
+"""At its border, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
+WITHIN = 10.0
+"""On a surface, so many points are thought of inside the region: they are wanted away from its border by the distance of as many
+neighbours. A point covers what is around it, of which much lies outside where it is on the border."""
+FARTHER = 0.1
+"""The worst value of an objective is kept if it is worse than at all ends of the front by this part of the range."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +47,15 @@ class PreferenceGuide:
             region = self._region(front)
         except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
             return np.ones(len(points))
-        beyond = np.maximum(region.away(points * self._signs) / PART - 1.0, 0.0)
+        m = front.shape[1]
+        border = 1.0 if m <= CURVE else 1.0 - WITHIN ** (-1.0 / (m - 1))
+        beyond = np.maximum(region.away(points * self._signs) / PART - border, 0.0)
         return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
 
     def anchors(self, front: np.ndarray) -> np.ndarray:
-        """The row of the best value, then those of the worst values of each objective: without these the ranges would be others."""
-        worst = front.argmax(axis=0)
+        """The row of the best value, then those of worst values of objectives, without which the ranges would be clearly less."""
+        short = front.max(axis=0) - front[extremes(front)].max(axis=0)
+        worst = front.argmax(axis=0)[short > FARTHER * ranges(front)]
         try:
             away = self._region(front).away(front * self._signs)
         except ValueError:  # as above

@@ -13,9 +13,11 @@ from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.directions import simplex_lattice
-from macs.preferences import Preference, ReferencePoint, WeightedSum
+from macs.preferences import Preference, Ranges, ReferencePoint, WeightedSum
+from macs.search.region import PART, Region
 from problems import load
 from problems.cases import goddard
+from problems.compiled import Objective
 from transcription import parse
 
 from ..measures.interest import Interest
@@ -31,6 +33,10 @@ DENSE = 2001
 """Points of a dense front of two objectives."""
 SWEPT = 25
 """Points of a sweep that it goes through, where no closed form is known."""
+SURVEYED = 165
+"""Points, at most, of each sweep over a surface."""
+NARROWED = 2
+"""Sweeps of a surface in its region of interest."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +128,40 @@ def swept(name: str, word: str) -> np.ndarray:
     return through(sweep(load(name), parse(word), points=SWEPT, starts=1, verify=None).objectives)
 
 
+def surveyed(name: str, word: str, preference: ReferencePoint) -> np.ndarray:
+    """The front of a case with more objectives on a mesh, by gradients: sparse everywhere, and dense in the region of interest.
+
+    A sweep of the whole front has the ranges. Then others go over what is left of it if no objective may be worse than in the region, as
+    far as that is known: the first finds better points in it, so that it is smaller for the next.
+    """
+    whole = sweep(load(name), parse(word), points=SURVEYED, starts=1, verify=None)
+    goals, found = whole.goals, whole.objectives
+    spans = Ranges.over(goals, found).spans(goals)
+    for _ in range(NARROWED):
+        problem, worst = load(name), worst_inside(preference, goals, found)
+        for goal, value, span in zip(goals, worst, spans, strict=True):
+            limit = {"upper": value} if goal.sign > 0 else {"lower": value}
+            problem.constraint(f"limit of {goal.name}", problem.objectives[goal.name], scale=span, **limit)
+        nearest = whole[int(Region.of(preference, goals, found).away(whole.objectives).argmin())]
+        inside = sweep(problem, parse(word), points=SURVEYED, start=nearest.decision[None], starts=1, verify=None)
+        found = np.vstack([found, inside.objectives])
+    return found
+
+
+def worst_inside(preference: ReferencePoint, goals: Sequence[Objective], front: np.ndarray) -> list[float]:
+    """The worst value of each objective in the region of interest on a front (n, m)."""
+    ranges, region = Ranges.over(goals, front), Region.of(preference, goals, front)
+    best, worst = (np.array([values[goal.name] for goal in goals]) for values in (ranges.best, ranges.worst))
+    upper, lower = preference.degrees(goals, ranges, np.stack([best, worst]))  # linear
+    least = 1.0 - (region.best + PART * region.spread)
+    return (best + (worst - best) * (upper - least) / (upper - lower)).tolist()
+
+
 SKIP = "dfet:6x4:bernstein:1"
 """A coarse mesh, on which a gradient solve takes a tenth of the time."""
+ENTRY = "dfet:8x4:bernstein:1"
+"""Likewise."""
+RANGE = ReferencePoint({"cross-range": 28.0, "heat load": 80.0, "oscillation": 0.2, "peak heating rate": 85.0})
 MASS = ReferencePoint({"terminal mass": 65e3, "terminal speed": 6500.0})
 SPEED = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 CASES = (
@@ -134,6 +172,15 @@ CASES = (
     Guided("goddard", partial(flights, "goddard", None), goddard.reference, SPEED, 1000, True),
     Guided("goddard, no derivatives", partial(flights, "goddard", None), goddard.reference, SPEED, 10_000, refine=False),
     Guided("skip", partial(flights, "skip", SKIP), partial(swept, "skip", SKIP), MASS, 1500),
+    Guided(
+        "reentry_case1",
+        partial(flights, "reentry_case1", ENTRY),
+        partial(surveyed, "reentry_case1", ENTRY, RANGE),
+        RANGE,
+        1000,
+        archive=20,
+        known=False,
+    ),
 )
 
 

@@ -13,10 +13,14 @@ from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
 from macs.gradients.polish import CountedSolves, _ends, _helped_by_neighbours, polish
 from macs.pareto.archive import Archive
+from macs.preferences import ReferencePoint
 from macs.search.gradient_action import allowed
+from macs.search.guide import PreferenceGuide
+from macs.search.region import Region
 from macs.search.state import SearchState
 from problems import Problem, load
 from problems.cases import goddard, orbit_rise
+from problems.compiled import Objective
 from transcription import DFET
 from transcription.inner import Auto, Newton
 from transcription.nlp.optimality import optimality
@@ -162,6 +166,18 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
         state.archive = polish(state.archive, CountedSolves(sphere, solves), 30)
         assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
         assert uncovered(state.archive.F, sphere) < 0.3
+
+
+@pytest.mark.parametrize("hoped", [(0.3, 0.3, 0.3), (0.9, 0.1, 0.0)], ids=["inside", "at the edge"])
+def test_solves_of_a_guided_surface_go_where_points_are_wanted(hoped) -> None:
+    rng, sphere, goals = np.random.default_rng(3), AskingSphere(), tuple(Objective(name) for name in ("f1", "f2", "f3"))
+    wanted = ReferencePoint({goal.name: value for goal, value in zip(goals, hoped, strict=True)})
+    angles = np.linspace(0.0, np.pi / 2, 101)
+    region = Region.of(wanted, goals, sphere.objectives(np.array([[1.0, a, b] for a in angles for b in angles])))
+    state = state_of(sphere, np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.1, 1.4, (20, 2))]))
+    archive = polish(state.archive, CountedSolves(sphere, 40), 20, guide=PreferenceGuide(wanted, goals))
+    assert len(sphere.found) == 40 and region.contains(np.array(sphere.found[6:])).mean() > 0.5, "all but those of the ends"
+    assert region.contains(archive.F).sum() >= 10
 
 
 def after(solves: int):

@@ -75,7 +75,21 @@ def test_factors_by_the_region():
     factors, inside = guide.factors(F, F), Region.of(MIDDLE, GOALS, F).contains(F)
     assert inside.mean() == pytest.approx(PART, rel=0.05) and (factors[inside] == 1.0).all()
     assert (np.diff(factors[:1001]) >= 0).all() and factors[0] == factors[-1] == OUTSIDE
-    assert guide.anchors(F)[0] == 1000 and {*guide.anchors(F)[1:].tolist()} == {0, 2000}
+    assert guide.anchors(F).tolist() == [1000], "the worst values are those of the ends, which are kept anyway"
+
+
+def test_worst_values_that_the_ends_do_not_have_are_kept():
+    F = np.array([[0.0, 0.5, 0.6], [0.6, 0.0, 0.5], [0.5, 0.6, 0.0], [0.2, 0.2, 0.2], [0.1, 0.1, 1.0]])
+    anchors = PreferenceGuide(ReferencePoint({"f1": 0.0, "f2": 0.0, "f3": 0.0}), (*GOALS, Objective("f3"))).anchors(F)
+    assert anchors.tolist() == [3, 4], "f3 is 0.6 at the ends, f1 and f2 nowhere worse than there"
+
+
+def test_on_surfaces_points_are_wanted_away_from_the_border():
+    goals, lattice = (*GOALS, Objective("f3")), directions.simplex_lattice(3, 100)
+    middle = ReferencePoint(dict.fromkeys(("f1", "f2", "f3"), 0.0), augmentation=0.0)
+    factors, away = PreferenceGuide(middle, goals).factors(lattice, lattice), Region.of(middle, goals, lattice).away(lattice)
+    border = PART * (1.0 - 10.0 ** (-1 / 2))
+    assert (factors[away <= border] == 1.0).all() and (factors[(away > 1.2 * border) & (away <= PART)] < 0.6).all()
 
 
 def test_shares_of_directions():
