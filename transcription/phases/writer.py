@@ -179,7 +179,7 @@ class PhaseWriter(ABC):
         """The phase's trajectory from one extended vector; `trajectory` completes what the method knows."""
 
     def state_places(self, extended: np.ndarray) -> np.ndarray:
-        """Places (k,) of the states of `state_nodes` in one extended vector: by default those of the mesh, of which edges may have moved."""
+        """Places (k,) of the states of `state_nodes` in one extended vector, in which edges of the mesh may have moved."""
         return self.state_nodes()[1]
 
     def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
