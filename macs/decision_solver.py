@@ -119,7 +119,7 @@ class Decide(GradientSolver):
                 return before.take([]).replace(message="time limit before the first choice")
         asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
         ranges = None if self.ranges is None else _ranges(self.ranges)
-        desk = Desk(problem, transcription, ranges, asked, transcription is None or self.mesh == "mended")
+        desk = Desk(problem, transcription, ranges, asked, mends=self.mesh == "mended")
         found = desk.work(lambda: _choices(desk, preferences))
         stats = {"versions": versions(), **desk.stats()}
         if before is not None:

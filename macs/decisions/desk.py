@@ -57,8 +57,8 @@ class Desk:
         None: those of the points that are known.
     terms : Terms
         The other arguments of `decide`.
-    mends : bool, optional
-        Whether points that a simulation does not confirm are solved again. Default: where no transcription is given.
+    mends : bool
+        Whether points that a simulation does not confirm are solved again also where a transcription is given.
 
     Attributes
     ----------
@@ -77,10 +77,10 @@ class Desk:
         transcription: Transcription | None,
         ranges: Ranges | None,
         terms: Terms,
-        mends: bool | None = None,
+        mends: bool = False,
     ) -> None:
         self.problem = statement.compile()
-        self._mends = (transcription is None) if mends is None else mends
+        self._mends = mends or transcription is None
         self._statement, self._transcription, self._given, self._terms = statement, transcription, ranges, terms
         self._start: Points | None = terms.start.alone() if isinstance(terms.start, Point) else terms.start
         if self._start is not None:

@@ -109,9 +109,9 @@ def verified(
         worst, violation[i] = worst_violation(problem, simulation)
         defect[i], F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
         off = missed(simulation, points[int(i)].objectives, scales)
-        apart = np.abs(F[i] - points.F[i])
         agrees[i] = points.status[i] == CONVERGED and max(defect[i], violation[i], off) <= tolerance
         if not agrees[i]:
+            apart = np.abs(F[i] - points.F[i])
             k = int(np.where(np.isfinite(apart), apart / scales, np.inf).argmax())
             other = "" if off <= tolerance else f"its '{points.names[k]}' differs by {apart[k]:.2g} {points.goals[k].unit}".rstrip()
             reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), other, tolerance, remark)

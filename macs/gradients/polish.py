@@ -158,11 +158,13 @@ def _cover(
     between = np.where(between > 0.0, between, span)
     known, solved = across((ends.F - ideal) / between), np.vstack([solved, ends.F])
     lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
-    for _ in range(limit if guide is None else solves.left):
-        if solves.left <= 0:
+    for k in range(max(limit, solves.left)):
+        # As long as it says nothing, the search is even.
+        guided = guide is not None and np.ptp(guide.factors(pool.F, pool.F)) > 0.0
+        if solves.left <= 0 or (k >= limit and not guided):
             break
         places, wanted = lattice, np.ones(len(lattice))
-        if guide is not None and np.ptp(guide.factors(pool.F, pool.F)) > 0.0:
+        if guide is not None and guided:
             best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
             places = np.vstack([best + closer * (lattice - lattice.mean(axis=0)) for closer in CLOSER])
             wanted = guide.factors(pool.F, ideal + between * _raised(places, (pool.F - ideal) / between))

@@ -68,9 +68,7 @@ class Adjoint:
         k = np.abs(self.costates.edges[:, None] - known.edges[1:-1]).argmin(axis=0)
         before, after, own = end[k - 1], begin[k], known.ends()[1][:-1]
         apart = np.maximum(np.minimum(before, after) - own, own - np.maximum(before, after))
-        size = float(np.abs(self.costates.coefficients * units).max(initial=0.0))
-        largest = float((apart * units).max(initial=0.0)) / (size if size > 0 else 1.0)
-        return Adjoint(self.costates, max(self.error or 0.0, largest))
+        return Adjoint(self.costates, max(self.error or 0.0, _part(np.maximum(apart, 0.0), self.costates.coefficients, units)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +119,13 @@ def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weig
         kept[j] = p + h[j] * to_kept @ rates
         p = kept[j, 0] + jumps[j]
     units = np.array([v.scale for v in phase.states])
-    size = float(np.abs(kept * units).max(initial=0.0))
-    missed = float(np.abs((p - ending.initial) * units).max(initial=0.0)) / (size if size > 0 else 1.0)
-    return Adjoint(PiecewisePolynomial(edges, kept, "lobatto"), missed)
+    return Adjoint(PiecewisePolynomial(edges, kept, "lobatto"), _part(p - ending.initial, kept, units))
+
+
+def _part(difference: np.ndarray, costates: np.ndarray, units: np.ndarray) -> float:
+    """The largest difference, as a part of the largest costate where one is not 0; states are in these units."""
+    size = float(np.abs(costates * units).max(initial=0.0))
+    return float(np.abs(difference * units).max(initial=0.0)) / (size if size > 0 else 1.0)
 
 
 def slopes(
