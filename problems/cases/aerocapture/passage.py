@@ -118,6 +118,52 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
         Newton's method did not converge for one: it is named.
     """
     bc = np.atleast_1d(np.asarray(ballistic, float))
+    return _measured(bc, *_solved(bc, passage), passage)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A passage in time, from the entry to the exit: arrays (k,) of time, s, altitude, m, speed, m/s, path angle, rad, and angle over ground
+    flown, rad."""
+
+    time: np.ndarray
+    altitude: np.ndarray
+    speed: np.ndarray
+    path_angle: np.ndarray
+    ground: np.ndarray
+
+
+def profile(ballistic: float, passage: Passage = PASSAGE) -> Profile:
+    """The passage of one ballistic coefficient, kg/m2, in time. Raises what `passages` does."""
+    bc = np.atleast_1d(np.asarray(ballistic, float))
+    _, arc, Y = _solved(bc, passage)
+    mars = passage.mars
+    states = Y[0]
+    speed = passage.entry_speed * np.exp(-0.5 * states[..., 1])
+    altitude = mars.interface - mars.scale_height * states[..., 0]
+    length = np.sqrt(mars.entry_radius * mars.scale_height)
+    half = 0.5 * float(arc[0]) / passage.intervals
+
+    def since_entry(rate: np.ndarray) -> np.ndarray:
+        inside = half * (rate @ _integrals(passage.degree).T)
+        until = np.cumsum(inside[:, -1])
+        from_exit = inside + np.concatenate([[0.0], until[:-1]])[:, None]
+        return until[-1] - np.append(0.0, from_exit.ravel())[::-1]
+
+    def along(values: np.ndarray) -> np.ndarray:
+        return np.append(values[0, 0], values[:, 1:].ravel())[::-1]
+
+    return Profile(
+        since_entry(length / speed),
+        along(altitude),
+        along(speed),
+        along(states[..., 2]),
+        since_entry(length * np.cos(states[..., 2]) / (mars.radius + altitude)),
+    )
+
+
+def _solved(bc: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lift (n,), arc (n,) and states (n, intervals, degree + 1, 3), from the exit to the entry; raises what `passages` does."""
     outside = ~((bc >= RANGE[0]) & (bc <= RANGE[1]))
     if outside.any():
         raise ValueError(f"ballistic coefficient {bc[outside][0]:g} kg/m2: passages are solved from {RANGE[0]:g} to {RANGE[1]:g}")
@@ -129,7 +175,7 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
         Y[active], arc[active], lift[active] = step.Y, step.arc, step.lift
         active = active[step.size > TOLERANCE]
         if not len(active):
-            return _measured(bc, lift, arc, Y, passage)
+            return lift, arc, Y
     raise RuntimeError(f"no passage found for the ballistic coefficient {bc[active[0]]:g} kg/m2 in {STEPS} Newton steps")
 
 
