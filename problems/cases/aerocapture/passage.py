@@ -123,14 +123,15 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
 
 @dataclass(frozen=True)
 class Profile:
-    """A passage in time, from the entry to the exit: arrays (k,) of time, s, altitude, m, speed, m/s, path angle, rad, and angle over ground
-    flown, rad."""
+    """A passage in time, from the entry to the exit: arrays (k,) of time, s, altitude, m, speed, m/s, path angle, rad, the angle flown over
+    ground, rad, and the heat load until then of a nose of 1 m, J/cm2."""
 
     time: np.ndarray
     altitude: np.ndarray
     speed: np.ndarray
     path_angle: np.ndarray
     ground: np.ndarray
+    heat: np.ndarray
 
 
 def profile(ballistic: float, passage: Passage = PASSAGE) -> Profile:
@@ -159,6 +160,7 @@ def profile(ballistic: float, passage: Passage = PASSAGE) -> Profile:
         along(speed),
         along(states[..., 2]),
         since_entry(length * np.cos(states[..., 2]) / (mars.radius + altitude)),
+        since_entry(_heating(speed, states[..., 0], passage) * length / speed),
     )
 
 
@@ -275,12 +277,16 @@ def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -
 def _measured(bc: np.ndarray, lift: np.ndarray, arc: np.ndarray, Y: np.ndarray, passage: Passage) -> Passages:
     mars, points = passage.mars, nodes("lobatto", passage.degree)
     speed = passage.entry_speed * np.exp(-0.5 * Y[..., 1])
-    density = mars.density * np.exp(Y[..., 0])
     # dt = sqrt(r_e / beta) ds / v: eq. (6).
-    rate = heating_rate(density, speed) * np.sqrt(mars.entry_radius * mars.scale_height) / speed
+    rate = _heating(speed, Y[..., 0], passage) * np.sqrt(mars.entry_radius * mars.scale_height) / speed
     heat = 0.5 * arc / passage.intervals * (rate @ _integrals(passage.degree)[-1]).sum(axis=1)
     lowest = mars.interface - mars.scale_height * _deepest(Y, points)
     return Passages(bc, lift, Y[:, -1, -1, 2].copy(), lowest, heat, arc)
+
+
+def _heating(speed: np.ndarray, z: np.ndarray, passage: Passage) -> np.ndarray:
+    """Heating rate of a nose of 1 m, W/cm2."""
+    return heating_rate(passage.mars.density * np.exp(z), speed)
 
 
 def _deepest(Y: np.ndarray, points: np.ndarray) -> np.ndarray:
