@@ -44,8 +44,9 @@ BOUNDS = {
     "flight-path angle": (-0.5, 0.3),
     "heading": (0.5 * pi, 1.5 * pi),
 }
-BANK = (-2.0 * pi, 2.0 * pi)
-EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.22, 31)[1:], *np.linspace(0.22, 1.0, 9)[1:]]
+BANK = (-pi, pi)
+"""Without these, a whole turn late in the flight is a local optimum."""
+EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
 MESH = {"edges": EDGES, "order": 4, "control_order": 1}
 """Short elements where the air is dense: on as many equal ones, optima that look as good miss the apoapsis by 50 km when simulated."""
 

@@ -124,7 +124,7 @@ def test_another_mesh_and_a_slower_roll():
 
 
 def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, float]:
-    """How far the apoapsis is above the target, delta v and heat shield of a flight in a plane: all lift upward, downward from a time on."""
+    """How far the apoapsis is above the target, delta v and heat shield of a flight in a plane: lift upward, downward from a time on."""
     lift, drag, nose = capsule(shape)
 
     def leg(begin, sign, t0, t1):
@@ -133,12 +133,8 @@ def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, f
             r, rho = TOP + h, DENSITY * np.exp(-h / HEIGHT)
             half = 0.5 * rho * v
             weight = MU / r**2
-            return [
-                v * np.sin(g),
-                -half * v * drag - weight * np.sin(g),
-                sign * half * lift + (v / r - weight / v) * np.cos(g),
-                0.0,
-            ] + np.array([0.0, 0.0, 0.0, heating(rho, v, nose)])
+            turn = sign * half * lift + (v / r - weight / v) * np.cos(g)
+            return [v * np.sin(g), -half * v * drag - weight * np.sin(g), turn, heating(rho, v, nose)]
 
         def out(_, y):
             return y[0]
@@ -164,8 +160,8 @@ def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, f
 
 @pytest.mark.parametrize("shield", [7.98, 8.9928])
 def test_bang_bang_laws_are_as_good(shield):
-    """With one switch at once from lift up to lift down, the entry angle that gives the heat shield is found by roots. A roll at 10 deg/s may
-    cost a little beside it, and turns the plane, which is free at the entry; nothing may be gained, but for rounding."""
+    """With one switch at once from lift up to lift down, the entry angle that gives the heat shield is found by roots. A roll at 10 deg/s
+    may cost a little beside it, and turns the plane, which is free at the entry; nothing may be gained, but for rounding."""
 
     def best(entry_angle: float) -> tuple[float, float]:
         at = brentq(lambda t: switched(entry_angle, t, 2)[0], 85.0, 105.0, xtol=1e-8)
@@ -223,7 +219,7 @@ def test_most_starts_find_the_same_optimum(shape):
     found = [optimize(problem, transcription, start=draw[None], max_iterations=300) for draw in draws]
     good = [point.objectives["delta v"] for point in found if point.status == "converged" and point.verified]
     assert min(good) > best.objectives["delta v"] - 1e-3
-    assert np.isclose(good, best.objectives["delta v"], atol=1e-3).sum() >= 7
+    assert np.isclose(good, best.objectives["delta v"], atol=1e-3).sum() >= 9
 
 
 @pytest.mark.slow
