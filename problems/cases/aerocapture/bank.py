@@ -21,11 +21,14 @@ from ...problem import Problem
 from ..winged import STATES, UNITS, Winged
 from .aerodynamics import MASS, lift_and_drag
 from .designs import Designs, judged, shapes_of
+from .figures import plot, track
 from .heating import allowed_load, heating_rate, shield_fraction
 from .mars import EXIT_SPEED, MARS, circularisation
 from .orbits import apoapsis, arrival, since_arrival
 from .passage import PASSAGE, profile
 from .printed import TABLE_2
+
+__all__ = ["plot", "problem", "track"]
 
 OWN = "passage"
 DECLINATION, BANK_RATE = -20.0, 10.0
@@ -44,8 +47,9 @@ BOUNDS = {
     "flight-path angle": (-0.5, 0.3),
     "heading": (0.5 * pi, 1.5 * pi),
 }
-BANK = (-pi, pi)
-"""Without these, a whole turn late in the flight is a local optimum."""
+BANK = (0.0, pi)
+"""To one side: altitude, speed and path angle depend on the cosine alone, and the plane of the entry makes up for what turns the heading.
+Nothing is lost but local optima that roll over to the other side where there is little air."""
 EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
 MESH = {"edges": EDGES, "order": 4, "control_order": 1}
 """Short elements where the air is dense: on as many equal ones, optima that look as good miss the apoapsis by 50 km when simulated."""

@@ -115,7 +115,8 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
     ValueError
         One is outside `RANGE`.
     RuntimeError
-        Newton's method did not converge for one: it is named.
+        Newton's method did not converge for one: it is named. It does for all with the paper's data; the nearer the exit is to level, the
+        more lift heavy capsules would need to stay in the air, far more than there is.
     """
     bc = np.atleast_1d(np.asarray(ballistic, float))
     return _measured(bc, *_solved(bc, passage), passage)
@@ -173,12 +174,20 @@ def _solved(bc: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, n
     lift, arc, Y = _guess(bc, eps, passage)
     active = np.arange(len(bc))
     for _ in range(STEPS):
-        step = _newton(Y[active], arc[active], lift[active], eps[active], passage)
+        try:
+            step = _newton(Y[active], arc[active], lift[active], eps[active], passage)
+        except np.linalg.LinAlgError as error:
+            raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])}: {error}") from error
         Y[active], arc[active], lift[active] = step.Y, step.arc, step.lift
         active = active[step.size > TOLERANCE]
         if not len(active):
             return lift, arc, Y
-    raise RuntimeError(f"no passage found for the ballistic coefficient {bc[active[0]]:g} kg/m2 in {STEPS} Newton steps")
+    raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])} in {STEPS} Newton steps")
+
+
+def _named(bc: np.ndarray) -> str:
+    """The first few of ballistic coefficients, kg/m2."""
+    return ", ".join(f"{one:g}" for one in bc[:3]) + (" or others" if len(bc) > 3 else "") + " kg/m2"
 
 
 def _guess(bc: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -111,14 +111,17 @@ def test_refined_solutions_flown_again(shape):
     confirm(point, shape)
 
 
-def test_another_mesh_and_a_slower_roll():
-    """The default mesh resolves the profile; half the bank rate costs something, as it must."""
+def test_another_mesh_another_arrival_and_a_slower_roll():
+    """The default mesh resolves the profile; the planet is round and does not turn, and the plane of the entry is free, so the direction
+    of the arrival does not matter; half the bank rate costs something, as it must."""
     problem, point = optimum(2)
     settings = problem.default_transcription["settings"]["mesh"]["atmosphere"]
     edges = np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, len(settings["edges"])), settings["edges"]).tolist()
     finer = {"method": "DFET", "settings": {"elements": 60, "order": 5, "control_order": 1, "basis": "bernstein"}}
     finer["settings"]["mesh"] = {"atmosphere": {"edges": edges, "order": 5, "control_order": 1}}
     assert optimize(problem, stated(finer)).objectives["delta v"] == pytest.approx(point.objectives["delta v"], abs=2e-3)
+    _, turned = optimum(2, declination=-10.0)
+    assert turned.objectives["delta v"] == pytest.approx(point.objectives["delta v"], abs=1e-4)
     _, slow = optimum(2, bank_rate=5.0)
     assert slow.objectives["delta v"] > point.objectives["delta v"] + 1e-3
 

@@ -133,6 +133,17 @@ def test_a_passage_that_is_not_found_is_an_error(monkeypatch):
         passages(120.0)
 
 
+@pytest.mark.parametrize("arrival", [2500.0, 9000.0])
+def test_other_arrivals(arrival):
+    """All are found for exits as the paper's; nearly level ones of heavy capsules are not, and that is told."""
+    ballistic = np.geomspace(5.0, 4000.0, 12)
+    for speed in (3400.0, 3500.0):
+        assert np.isfinite(passages(ballistic, Passage(arrival_speed=arrival, exit_speed=speed)).heat).all()
+    for one in ballistic[-5:]:
+        with pytest.raises(RuntimeError, match="no passage found"):
+            passages(one, Passage(arrival_speed=arrival, exit_speed=3527.0))
+
+
 def test_entry_and_exit():
     """Section 3 of the paper: 1.73 deg and 52.6 m/s at 3500 m/s; exits from 825.9 to 3527.4 m/s, at the end 24.4 m/s. The radius of the
     planet is fitted to the first two and to the last speed; the other two then miss the printed ones by 0.8 and 0.07 m/s."""
