@@ -6,10 +6,15 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
+
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
+from problems.vector import CompiledVectorProblem
+from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
+from .evaluation.evaluator import CONVERGED
 from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
@@ -17,12 +22,14 @@ from .fronts.simulated import simulated
 from .fronts.tables import front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
+from .io.text import counted
 from .refinement.mending import mended
 from .refinement.mesh_refinement import refine_mesh
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 class Front(Points):
@@ -33,7 +40,7 @@ class Front(Points):
     `trajectories` and more, see `Points`. `stats` has the costs and the seed. If no feasible point was found, the front is empty: `message`
     says why, and `closest` is the least infeasible point.
 
-    - See: `table()`, `plot()`, `front[i].plot()`
+    - See: `table()`, `plot()`, `front[i].plot()`, `plot_variables()`
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
@@ -152,6 +159,8 @@ class Front(Points):
     def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
 
+        Points of a vector problem are evaluated again: their objectives may differ by the tolerance in ranges of the front.
+
         Every solver and gradient tool does so at its end. A point is `verified` if nothing differs by more than the tolerance: its states,
         in spans of their bounds; its bounds, final values, paths and constraints, controls between nodes included, in their scales (the
         scale of an equality or a limit on one side is at least its size); and its objectives, in ranges of the front.
@@ -203,14 +212,15 @@ class Front(Points):
 
     def simulate(
         self,
-        problem: Problem | CompiledProblem | None = None,
+        problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem | None = None,
         *,
         tolerance: float = 1e-2,
         rtol: float = 1e-6,
         atol: float = 1e-7,
         method: str = "DOP853",
     ) -> Front:
-        """The same points as simulated by an independent integrator: `Point.simulate` for all points at once.
+        """The same points as simulated by an independent integrator: `Point.simulate` for all points at once. Those of a vector problem are
+        evaluated again.
 
         Parameters
         ----------
@@ -252,6 +262,21 @@ class Front(Points):
 
         return draw_front(self, ax)
 
+    def plot_variables(self, figure: Figure | None = None) -> np.ndarray:
+        """Axes with each variable of a black box or vector problem along the front, over the first objective, within its bounds.
+
+        Raises
+        ------
+        ValueError
+            For trajectories: `front[i].plot()` draws one of them.
+        """
+        from .fronts.pictures.design_plot import draw_designs
+
+        if self.dynamic:
+            raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
+        title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
+        return draw_designs(self.decision, self.variables, self.objectives, self.goals, self.status == CONVERGED, title, figure)
+
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.
 
@@ -286,7 +311,11 @@ class Front(Points):
         files.save(self, path)
 
     @staticmethod
-    def load(path: str | PathLike[str], problem: Problem | CompiledProblem | None = None, trust: bool = False) -> Front:
+    def load(
+        path: str | PathLike[str],
+        problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem | None = None,
+        trust: bool = False,
+    ) -> Front:
         """Read a front that `save` wrote. No code is run: the problem is loaded when a point is first simulated.
 
         Parameters

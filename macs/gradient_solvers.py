@@ -11,6 +11,8 @@ import numpy as np
 from problems.checks import check_choice, check_count
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
+from problems.vector import CompiledVectorProblem, without_dynamics
+from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
 from .evaluation.evaluator import CONVERGED, Evaluator
@@ -55,13 +57,17 @@ class GradientSolver(Solver):
         check_count(f"{name}: starts", self.starts, 1)
         check_choice(f"{name}: mesh", self.mesh, MESHES)
 
+    def check_vector(self, problem: CompiledVectorProblem) -> None:
+        """Raise ValueError: there are no derivatives."""
+        raise ValueError(f"{type(self).__name__} needs derivatives, but {without_dynamics(problem.name)}: use a search, such as MACS")
+
     @abstractmethod
     def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
         """The front of the gradient tool; `terms` are arguments that all of these have."""
 
     def solve(
         self,
-        problem: Problem | CompiledProblem,
+        problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem,
         transcription: Transcription | None = None,
         *,
         evaluations: int | None = None,
@@ -76,6 +82,9 @@ class GradientSolver(Solver):
         checkpoint: Any = None,
     ) -> Front:
         """See `Solver.solve` and the class. `start` holds vectors that are known; words for random first candidates are not used."""
+        if isinstance(problem, VectorProblem | CompiledVectorProblem):
+            self.check_vector(problem.compile())
+        assert isinstance(problem, Problem | CompiledProblem)
         check_run(evaluations or 1, seed, tolerance, time_limit, callback, checkpoint)
         known = start if drawing(start) is None else None
         remeshed = transcription is not None and self.mesh in ("adaptive", "density")

@@ -1,19 +1,23 @@
-"""Floor 1: optimal control problems, stated with CasADi expressions, and a catalogue of cases."""
+"""Floor 1: optimal control problems, stated with CasADi expressions, vector problems, and a catalogue of cases."""
 
 from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .phase import Phase
 from .problem import Problem
+from .vector import CompiledVectorProblem
+from .vector_problem import VectorProblem
 
 __all__ = [
     "CompiledPhase",
     "CompiledProblem",
+    "CompiledVectorProblem",
     "Limit",
     "Link",
     "Objective",
     "Phase",
     "Problem",
     "Variable",
+    "VectorProblem",
     "describe",
     "is_catalogued",
     "load",

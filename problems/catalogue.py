@@ -1,4 +1,4 @@
-"""The catalogue of cases: from a name or an address to a Problem."""
+"""The catalogue of cases: from a name or an address to a Problem or a VectorProblem."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 
 from .cases import standard
 from .problem import Problem
+from .vector_problem import VectorProblem
 
 STANDARD = "standard/"
 """What the names of the published problems begin with."""
@@ -35,6 +36,11 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
+    "welded_beam": ("problems.cases.welded_beam:problem", "without trajectories: cost against deflection of a welded beam"),
+    "four_bar_truss": (
+        "problems.cases.four_bar_truss:problem",
+        "without trajectories: volume against displacement of a truss, front in closed form",
+    ),
     **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},
 }
 FILE = "_problem_file_"
@@ -56,11 +62,11 @@ def is_catalogued(address: str) -> bool:
     return address in CASES or any(address == own for own, _ in CASES.values())
 
 
-def load(name: str, **data: Any) -> Problem:
-    """The problem of a case or an address.
+def load(name: str, **data: Any) -> Any:
+    """The problem of a case or an address, with trajectories (`Problem`) or without (`VectorProblem`).
 
     The module or file that an address names is imported, which runs its code; see `is_catalogued`. The function is only called if it is a
-    plain one that is defined there, and is not annotated to return anything but a Problem.
+    plain one that is defined there, and is not annotated to return anything but a problem.
 
     Parameters
     ----------
@@ -71,7 +77,7 @@ def load(name: str, **data: Any) -> Problem:
 
     Returns
     -------
-    Problem
+    Problem or VectorProblem
         Its `address` and `data` are kept, so that a saved front finds it again.
 
     Raises
@@ -95,8 +101,8 @@ def load(name: str, **data: Any) -> Problem:
         if data:
             raise ValueError(f"problem '{name}' does not take {', '.join(data)}: {error}") from error
         raise
-    if not isinstance(problem, Problem):
-        raise ValueError(f"'{name}' must return a Problem, not {type(problem).__name__}")
+    if not isinstance(problem, Problem | VectorProblem):
+        raise ValueError(f"'{name}' must return a Problem or a VectorProblem, not {type(problem).__name__}")
     # A file is found again from another folder.
     problem.address, problem.data = f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name, data
     return problem
@@ -109,10 +115,12 @@ def _builder(module: ModuleType, function_name: str, name: str) -> FunctionType:
         raise ValueError(f"'{name.rpartition(':')[0]}' has no function '{function_name}' of its own")
     returned = function.__annotations__.get("return", "")
     word = returned.strip("'\"") if isinstance(returned, str) else getattr(returned, "__name__", str(returned))
-    made = word.rpartition(".")[2] in ("Problem", "CompiledProblem")
+    made = word.rpartition(".")[2] in ("Problem", "CompiledProblem", "VectorProblem")
     # A file is the user's own; of what is installed, most functions without annotation do not make problems.
     if (word and not made) or (not word and not (module.__name__.startswith(FILE) or _knows_problems(module))):
-        raise ValueError(f"problem '{name}': '{function_name}' is not known to return a Problem; annotate it with '-> Problem'")
+        raise ValueError(
+            f"problem '{name}': '{function_name}' is not known to return a Problem; annotate it with '-> Problem' or '-> VectorProblem'"
+        )
     return function
 
 

@@ -26,13 +26,13 @@ def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
 def number(value: Any, what: str) -> float:
     """A finite real number."""
     if isinstance(value, str | bytes | ca.SX):
-        raise ValueError(f"{what} must be a number, not {_shown(value)}")
+        raise ValueError(f"{what} must be a number, not {shown(value)}")
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     except (TypeError, ValueError, RuntimeError, NotImplementedError):
-        raise ValueError(f"{what} must be a number, not {_shown(value)}") from None
+        raise ValueError(f"{what} must be a number, not {shown(value)}") from None
     if not math.isfinite(result):
         raise ValueError(f"{what} must be finite, not {result}")
     return result
@@ -43,7 +43,7 @@ def interval(value: Any, what: str) -> tuple[float, float]:
     try:
         lower, upper = value
     except (TypeError, ValueError):
-        raise ValueError(f"{what} must be a pair (lower, upper), not {_shown(value)}") from None
+        raise ValueError(f"{what} must be a pair (lower, upper), not {shown(value)}") from None
     lower, upper = number(lower, f"the lower end of {what}"), number(upper, f"the upper end of {what}")
     if lower > upper:
         raise ValueError(f"{what} is an empty interval: {lower:g} > {upper:g}")
@@ -135,14 +135,14 @@ def guess(value: Any, what: str) -> Any:
         first, second = value
     except (TypeError, ValueError, RuntimeError, NotImplementedError):
         if isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim):
-            raise ValueError(f"{what} must be a number, a pair of numbers or a pair (times, values), not {_shown(value)}") from None
+            raise ValueError(f"{what} must be a number, a pair of numbers or a pair (times, values), not {shown(value)}") from None
         return number(value, what)
     if not any(isinstance(part, Sequence | np.ndarray) and np.ndim(np.asarray(part, dtype=object)) for part in (first, second)):
         return number(first, what), number(second, what)
     try:
         times, values = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what}: times and values must be two sequences of numbers, not {_shown(value)}") from None
+        raise ValueError(f"{what}: times and values must be two sequences of numbers, not {shown(value)}") from None
     if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
         raise ValueError(f"{what}: times and values must be two sequences of the same length, at least 2")
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values)) and np.all(np.diff(times) > 0)):
@@ -160,7 +160,7 @@ def guessed(value: Any, variable: Variable, what: str) -> Any:
     return value
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value on one line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 80 else f"{text[:77]}..."

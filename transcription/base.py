@@ -15,6 +15,8 @@ from problems.checks import settings_of, short_repr
 from problems.compiled import CompiledProblem, Variable
 from problems.derived import Deriving, computed, remembered
 from problems.problem import Problem
+from problems.vector import CompiledVectorProblem, without_dynamics
+from problems.vector_problem import VectorProblem
 
 from .numerics.batched import Batched
 from .phases.adjoint import Adjoint
@@ -337,7 +339,9 @@ def largest(residuals: np.ndarray) -> np.ndarray:
 
 
 def check_problem(problem: Any, transcription: Any = None) -> None:
-    """Raise ValueError if these are no problem and, unless it is None, no transcription."""
+    """Raise ValueError if these are no problem with dynamics and, unless it is None, no transcription."""
+    if isinstance(problem, VectorProblem | CompiledVectorProblem):
+        raise ValueError(f"{without_dynamics(problem.name)}: use a search, such as MACS().solve(problem)")
     if not isinstance(problem, Problem | CompiledProblem):
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
     if transcription is not None and not isinstance(transcription, Transcription):

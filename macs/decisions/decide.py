@@ -6,7 +6,9 @@ from typing import Any
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from transcription.base import Transcription
+from problems.vector import CompiledVectorProblem
+from problems.vector_problem import VectorProblem
+from transcription.base import Transcription, check_problem
 
 from ..fronts.point import Point
 from ..fronts.points import Points
@@ -81,6 +83,8 @@ def decide(
 
 def check_statement(problem: Any, transcription: Any, preference: Any, start: Any) -> None:
     """Raise ValueError for arguments of `decide` of the wrong type."""
+    if isinstance(problem, VectorProblem | CompiledVectorProblem):
+        check_problem(problem)
     if isinstance(problem, Points) or not hasattr(problem, "compile"):
         raise ValueError(
             f"decide needs derivatives, and so a Problem with dynamics, not {type(problem).__name__}; preference.rank(front) needs none"

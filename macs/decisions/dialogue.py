@@ -14,7 +14,7 @@ from problems.catalogue import is_catalogued
 from problems.checks import check_count
 from problems.compiled import CompiledProblem, Objective
 from problems.problem import Problem
-from transcription.base import Transcription
+from transcription.base import Transcription, check_problem
 from transcription.catalogue import from_dict
 
 from ..evaluation.evaluator import CONVERGED
@@ -115,6 +115,7 @@ class Dialogue:
         if problem is not None:
             if front.source is None:
                 raise ValueError("the front is of a black box: it has no problem")
+            check_problem(problem)
             self.problem = front.source.check(problem, "the front")
             front = front.replace(problem=self.problem)
         if transcription is not None and not isinstance(transcription, Transcription):
@@ -342,7 +343,7 @@ class Dialogue:
         """
         record, points = read(path)
         source = points.source
-        if problem is None and record.solves and source is not None and (trust or is_catalogued(source.address)):
+        if problem is None and record.solves and points.dynamic and source is not None and (trust or is_catalogued(source.address)):
             problem = replace(source, trusted=trust).load()
         with readable(path):
             ranges = Ranges(**record.ranges)
@@ -412,7 +413,7 @@ class Dialogue:
             choice = decide(self.problem, self.transcription, preference, ranges=self.ranges, start=known, seed=self.seed, verify=verify)
             return replace(choice, point=self._own(choice.point))
         ranking = preference.rank(known, self.ranges)
-        words = BLACK_BOX if self.front.source is None else ONLY_RANKED
+        words = ONLY_RANKED if self.front.dynamic else BLACK_BOX
         return Choice.of(self._own(ranking.best), preference, self.ranges, " ".join(filter(None, [ranking.message, f"{words}."])))
 
     def _another(self, preference: Preference, others: Sequence[Choice]) -> Choice | None:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Objective, Variable
+from problems.compiled import CompiledProblem, Objective
+from problems.vector import CompiledVectorProblem
 from transcription.base import NLP
 from transcription.nlp.costates import costates
 from transcription.nlp.optimality import Conditions
@@ -45,7 +46,12 @@ def trajectory_points(
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
 
 
-def no_points(goals: Sequence[Objective], problem: CompiledProblem | None, solver: Mapping[str, Any], stats: Mapping[str, Any]) -> Points:
+def no_points(
+    goals: Sequence[Objective],
+    problem: CompiledProblem | CompiledVectorProblem | None,
+    solver: Mapping[str, Any],
+    stats: Mapping[str, Any],
+) -> Points:
     """No points, of a search that was ended before its first population was evaluated."""
     return Points(
         F=np.empty((0, len(goals))),
@@ -116,15 +122,16 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
     }
 
 
-def black_box_points(
+def vector_points(
+    problem: CompiledVectorProblem,
     archive: Archive,
     closest: Archive,
     goals: Sequence[Objective],
-    variables: Sequence[Variable],
     solver: Mapping[str, Any],
     stats: Mapping[str, Any],
 ) -> Points:
-    """Points with the archive of a black box."""
+    """Points with the archive of a vector problem; of one without a name, as those of a black box."""
+    named = bool(problem.name)
 
     def of(points: Archive, **more: Any) -> Points:
         return Points(
@@ -133,7 +140,8 @@ def black_box_points(
             violation=points.violation,
             status=_status(points.violation, stats["tolerance"]),
             goals=goals,
-            variables=variables,
+            variables=problem.variables,
+            problem=problem if named else None,
             solver=solver,
             stats=stats,
             **more,

@@ -7,16 +7,19 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
+from problems.vector import CompiledVectorProblem
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
+from ..evaluation.evaluator import CONVERGED
+from ..evaluation.reevaluated import Reevaluation, reevaluation
 from .columns import number
 from .provenance import Source
 
 
 class Point:
-    """One point of a front: a trajectory, or one input of a black box. It refers to the data of its front."""
+    """One point of a front: a trajectory, or one row of variables of a vector problem or black box. It refers to the data of its front."""
 
     __slots__ = ("_points", "index")
 
@@ -117,8 +120,8 @@ class Point:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Static decision variables by name; for a black box, all its variables."""
-        if self._points.source is None:
+        """Static decision variables by name; for a black box or a vector problem, all its variables."""
+        if not self._points.dynamic:
             return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
@@ -169,8 +172,9 @@ class Point:
         found = self._points.excursions[self.index]
         return None if found is None else dict(found)
 
-    def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation:
-        """Simulation of this point: its dynamics under its controls, by an integrator that is independent of the transcription.
+    def simulate(self, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853") -> Simulation | Reevaluation:
+        """Simulation of this point: its dynamics under its controls, by an integrator that is independent of the transcription. A point of
+        a vector problem is evaluated again.
 
         Parameters
         ----------
@@ -180,25 +184,33 @@ class Point:
         Returns
         -------
         Simulation
-            `defect[phase][state]`, `max_defect`, `violation`, `violations`, `objectives`, `trajectory`.
+            `defect[phase][state]`, `max_defect`, `violation`, `violations`, `objectives`, `trajectory`. Of a vector problem, a
+            `Reevaluation`, with the same names.
 
         Raises
         ------
         ValueError
             For a black box, a point without a trajectory, and a saved front whose problem cannot be found.
         """
-        problem = self.compiled()
+        problem = self._points.stated()
+        if isinstance(problem, CompiledVectorProblem):
+            return reevaluation(problem, self.decision)
         if self.trajectory is None:
             raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
-        there are any."""
+        there are any. Without dynamics, axes with each variable along its front, and this point in it."""
+        from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
 
+        if not self._points.dynamic:
+            front = self._points
+            feasible = front.status == CONVERGED
+            return draw_designs(front.decision, front.variables, front.objectives, front.goals, feasible, self.title, figure, [self.index])
         if self.trajectory is None:
-            raise ValueError("there is no trajectory to draw: the point is of a black box, or its evaluation failed")
+            raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
         return draw_flight(self.trajectory, self.title, figure, self.costates)
 
     @property

@@ -8,13 +8,14 @@ from typing import Any, Self, overload
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective, Variable
+from problems.vector import without_dynamics
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.text import counted
 from .columns import Decisions, by_first, column, frozen, number, shared
 from .point import Point
-from .provenance import STATS, Source, versions
+from .provenance import STATS, AnyCompiled, Source, versions
 
 
 class Points:
@@ -47,7 +48,7 @@ class Points:
         constraint; objectives, all minimised; whether these agree with the point within `stats["verify"]`. NaN and False without it.
     transcriptions : dict, or n of them, optional
         `{"method": ..., "settings": {...}}`: the transcription of all points, or one for each; None for black boxes.
-    problem : CompiledProblem or Source, optional
+    problem : CompiledProblem, CompiledVectorProblem or Source, optional
         None for black boxes.
     solver : dict, optional
         `{"name": ..., "settings": {...}}`.
@@ -97,7 +98,7 @@ class Points:
         simulated_violation: Any = None,
         simulated_F: Any = None,
         verified: Any = None,
-        problem: CompiledProblem | Source | None = None,
+        problem: AnyCompiled | Source | None = None,
         solver: Mapping[str, Any] | None = None,
         stats: Mapping[str, Any] | None = None,
         message: str = "",
@@ -110,8 +111,8 @@ class Points:
         self.stats["failures"] = dict(self.stats["failures"])
         self.message = message
         self._closest = closest
-        self.source = Source.of(problem) if isinstance(problem, CompiledProblem) else problem
-        self._problem = problem if isinstance(problem, CompiledProblem) else None
+        self.source = Source.of(problem) if isinstance(problem, AnyCompiled) else problem
+        self._problem = problem if isinstance(problem, AnyCompiled) else None
 
         rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
         n = len(rows)
@@ -195,12 +196,17 @@ class Points:
         return self[int(np.argmin(np.where(np.isnan(self.violation), np.inf, self.violation)))]
 
     @property
-    def problem(self) -> CompiledProblem | None:
-        """The problem, if it is known; for points from a file, after `compiled` has loaded it."""
+    def problem(self) -> AnyCompiled | None:
+        """The problem, if it is known; for points from a file, after `stated` has loaded it."""
         return self._problem
 
-    def compiled(self) -> CompiledProblem:
-        """The problem of the points; for points from a file it is loaded from its address, which runs the code there.
+    @property
+    def dynamic(self) -> bool:
+        """Whether the points are trajectories: neither of a black box nor of a vector problem."""
+        return self.source is not None and not self.source.vector
+
+    def stated(self) -> AnyCompiled:
+        """The problem of the points, with dynamics or without; from a file it is loaded from its address, which runs the code there.
 
         Raises
         ------
@@ -208,10 +214,19 @@ class Points:
             For a black box, and if the problem is not found or is another one.
         """
         if self.source is None:
-            raise ValueError("this front is of a black box: there are no dynamics to simulate")
+            raise ValueError("this front is of a black box: its function has no name, so there is nothing to simulate or evaluate again")
         if self._problem is None:
             self._problem = self.source.load().compile()
+        assert self._problem is not None
         return self._problem
+
+    def compiled(self) -> CompiledProblem:
+        """The problem of the points if it has dynamics; see `stated`. Raises ValueError if it has none."""
+        if self.source is not None and self.source.vector:
+            raise ValueError(without_dynamics(self.source.name))
+        found = self.stated()
+        assert isinstance(found, CompiledProblem)
+        return found
 
     def __len__(self) -> int:
         return len(self.F)

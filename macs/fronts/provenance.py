@@ -16,9 +16,13 @@ import problems
 from problems.catalogue import is_catalogued
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
+from problems.vector import CompiledVectorProblem
+from problems.vector_problem import VectorProblem
 
 from ..evaluation.evaluator import Counts
 from ..io.labelled import document, read_attribute, read_document
+
+AnyCompiled = CompiledProblem | CompiledVectorProblem
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,15 @@ class Source:
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
     trusted: bool = field(default=False, compare=False)
+    vector: bool = False
+    """Whether it is a vector problem, which has no dynamics."""
 
     @classmethod
-    def of(cls, problem: CompiledProblem) -> Source:
-        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True)
+    def of(cls, problem: AnyCompiled) -> Source:
+        vector = isinstance(problem, CompiledVectorProblem)
+        return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True, vector=vector)
 
-    def check(self, problem: Problem | CompiledProblem | str, whose: str) -> CompiledProblem:
+    def check(self, problem: Problem | VectorProblem | AnyCompiled | str, whose: str) -> Any:
         """`problem`, or the one that `problems.load` makes of its name, compiled.
 
         Raises
@@ -52,11 +59,13 @@ class Source:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
             raise ValueError(
                 f"{whose} belongs to problem {one}, not to {other}: bounds, equations, objectives or data differ, or another CasADi"
+                if not self.vector
+                else f"{whose} belongs to problem {one}, not to {other}: bounds, limits, objectives, data or values of the function differ"
             )
         return compiled
 
-    def load(self) -> Problem:
-        """The problem from its address. This runs the code that the address names.
+    def load(self) -> Any:
+        """The Problem or VectorProblem from its address. This runs the code that the address names.
 
         Raises
         ------
@@ -188,6 +197,10 @@ def _number(value: Any) -> float | int | list[int] | None:
     return whole if several is value else whole[0]
 
 
+VECTOR = "vector"
+"""What the attribute `problem_kind` says of a vector problem; other problems do not have it."""
+
+
 def source_attributes(source: Source | None) -> dict[str, str]:
     """A source, without its address if the data that it takes cannot be written down: then the problem has to be passed again."""
     if source is None:
@@ -196,7 +209,8 @@ def source_attributes(source: Source | None) -> dict[str, str]:
         address, data = source.address, document(dict(source.data), strict=True)
     except TypeError:
         address, data = "", "{}"
-    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data}
+    kind = {"problem_kind": VECTOR} if source.vector else {}
+    return {"problem": source.name, "fingerprint": source.fingerprint, "address": address, "data": data, **kind}
 
 
 def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -225,4 +239,5 @@ def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
 def read_source(attrs: Mapping[str, Any]) -> Source | None:
     """A source from its attributes; None for a black box, which has no fingerprint. Raises ValueError for what it cannot be."""
     name, fingerprint, address = (read_attribute(attrs, key, str) for key in ("problem", "fingerprint", "address"))
-    return Source(name, fingerprint, address, read_document(attrs, "data")) if fingerprint else None
+    vector = attrs.get("problem_kind", "") == VECTOR
+    return Source(name, fingerprint, address, read_document(attrs, "data"), vector=vector) if fingerprint else None

@@ -8,28 +8,44 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from problems.compiled import CompiledProblem, Limit, Variable
+from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import simulate_all
 
-from ..evaluation.evaluator import CONVERGED, INFEASIBLE
+from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
+from ..evaluation.reevaluated import check_same_vectors, evaluated_again
 from .points import Points
+from .provenance import AnyCompiled
 from .verified import unmarked
 
 if TYPE_CHECKING:
-    from problems import Problem
+    from problems import Problem, VectorProblem
     from transcription.trajectories.trajectory import Trajectory
 
 
-def simulated(front: Points, problem: Problem | CompiledProblem | None, tolerance: float, rtol: float, atol: float, method: str) -> Points:
+def simulated(
+    front: Points,
+    problem: Problem | VectorProblem | AnyCompiled | None,
+    tolerance: float,
+    rtol: float,
+    atol: float,
+    method: str,
+) -> Points:
     """The points in the same order with simulated objectives and violations; see `Front.simulate`."""
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
+    stated = front.stated()
+    if isinstance(stated, CompiledVectorProblem):
+        other = stated if problem is None else check_same_vectors(stated, problem.compile())
+        return _evaluated(front, other, tolerance)
     known = front.compiled()
     if problem is None:
         compiled = known
     else:
-        compiled = problem if isinstance(problem, CompiledProblem) else problem.compile()
-        check_alike(known, compiled)
+        given = problem.compile()
+        check_alike(known, given)
+        assert isinstance(given, CompiledProblem)
+        compiled = given
     missing = [point for point in front if point.trajectory is None]
     if missing:
         raise ValueError(f"point {missing[0].index} has no trajectory to simulate: its status is '{missing[0].status}'")
@@ -48,6 +64,21 @@ def simulated(front: Points, problem: Problem | CompiledProblem | None, toleranc
         optimality=[None] * len(front),
         costates=[None] * len(front),
         problem=compiled,
+        stats={**plain.stats, "tolerance": float(tolerance)},
+    )
+
+
+def _evaluated(front: Points, problem: CompiledVectorProblem, tolerance: float) -> Points:
+    """The points of a vector problem, evaluated again with this one."""
+    F, violation, violations = evaluated_again(problem, front.decision)
+    plain = unmarked(front)
+    failed = ~np.isfinite(violation)
+    return plain.replace(
+        F=F,
+        violation=violation,
+        violations=violations,
+        status=np.where(failed, FAILED, np.where(violation <= tolerance, CONVERGED, INFEASIBLE)),
+        problem=problem,
         stats={**plain.stats, "tolerance": float(tolerance)},
     )
 
@@ -77,8 +108,13 @@ def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
     return found
 
 
-def check_alike(known: CompiledProblem, other: CompiledProblem) -> None:
-    """Raise ValueError unless trajectories of the known problem can be simulated with the other."""
+def check_alike(known: AnyCompiled, other: AnyCompiled) -> None:
+    """Raise ValueError unless points of the known problem can be simulated, or evaluated again, with the other."""
+    if isinstance(known, CompiledVectorProblem):
+        check_same_vectors(known, other)
+        return
+    if isinstance(other, CompiledVectorProblem):
+        raise ValueError(f"points of '{known.name}' cannot be simulated: {without_dynamics(other.name)}")
 
     def parts(problem: CompiledProblem) -> dict[str, list[str]]:
         named = {

@@ -9,11 +9,15 @@ import numpy as np
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, numbers, text_table
-from .verified import MISSES, objective_scales
+from .verified import AGAIN, MISSES, objective_scales
 
 if TYPE_CHECKING:
     from .point import Point
     from .points import Points
+
+
+FEW_VARIABLES = 6
+"""Number of variables of a vector problem that stand in tables."""
 
 
 def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
@@ -38,10 +42,14 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     for goal, values in zip(front.goals, front.objectives.T, strict=True):
         add(goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", numbers(values))
     add("violation", "", _small(front.violation))
+    if _is_vector(front) and len(front.variables) <= FEW_VARIABLES:
+        for variable, values in zip(front.variables, front.decision.T, strict=True):
+            add(variable.name, f"[{variable.unit or '-'}]", numbers(values))
     if simulated.any():
-        off = np.abs(front.simulated_F - front.F) / objective_scales(front)
-        add("defect", "simulated", _small(front.defect))
-        add("violation", "simulated", _small(front.simulated_violation))
+        off, how = np.abs(front.simulated_F - front.F) / objective_scales(front), "again" if _is_vector(front) else "simulated"
+        if not _is_vector(front):
+            add("defect", how, _small(front.defect))
+        add("violation", how, _small(front.simulated_violation))
         add("objectives", "off by", _small(off.max(axis=1)))
     for header, values in (columns or {}).items():
         add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
@@ -51,15 +59,21 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     add("status", "", [_status(point) for point in front], True)
     if len({id(one) for one in front.transcriptions}) > 1:
         add("elements", "", [_elements(point) for point in front])
-    if front.source is not None and not simulated.all():
+    if front.dynamic and not simulated.all():
         add("between nodes", "leaves bounds", [_excursion(point.excursions) for point in front], True)
     apart = np.flatnonzero(simulated & ~front.verified)
     order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
     rows = list(zip(*cells, strict=True))
     lines = text_table([titles, units], [rows[i] for i in order], left).split("\n")
     if len(apart) > 0:
-        lines.insert(len(lines) - len(apart), f"\nNot verified: simulated, these differ by more than {front.stats['verify']:g}.")
+        again = AGAIN if _is_vector(front) else MISSES
+        lines.insert(len(lines) - len(apart), f"\nNot verified: {again}these differ by more than {front.stats['verify']:g}.")
     return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
+
+
+def _is_vector(front: Points) -> bool:
+    """Whether the points are of a vector problem."""
+    return front.source is not None and front.source.vector
 
 
 def _small(values: Iterable[float | None]) -> list[str]:
@@ -122,7 +136,7 @@ FEW = 5
 
 
 def _footer(front: Points) -> list[str]:
-    lines = [] if front.source is None else _simulated(front) if front.was_simulated.all() else _between_nodes(front)
+    lines = _simulated(front) if front.was_simulated.all() else _between_nodes(front) if front.dynamic else []
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
@@ -132,7 +146,7 @@ def _footer(front: Points) -> list[str]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"
         lines.append(f"{ended}: the same seed may give another front.")
-    missing = [point.index for point in front if MISSES in point.note]
+    missing = [point.index for point in front if MISSES in point.note or AGAIN in point.note]
     lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[FEW:]]
     if len(missing) > FEW:
         lines.append(f"The notes of {len(missing) - FEW} more points say what they miss.")
@@ -146,7 +160,8 @@ def _simulated(front: Points) -> list[str]:
     count, verify = int(front.verified.sum()), front.stats["verify"]
     points = "The point is" if len(front) == 1 else f"All {len(front)} points are"
     if count == len(front):
-        return [f"{points} verified: simulated by an independent integrator, nothing differs by more than {verify:g}."]
+        how = "evaluated again" if _is_vector(front) else "simulated by an independent integrator"
+        return [f"{points} verified: {how}, nothing differs by more than {verify:g}."]
     if not count:
         return ["The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified."]
     return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified."]

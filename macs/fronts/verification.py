@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem
+from problems.vector import CompiledVectorProblem
 from transcription import from_dict
 from transcription.base import NLP, Transcription
 from transcription.trajectories.simulate import simulate, worst_violation
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
+from ..evaluation.reevaluated import evaluated_again
 from .point import Point
 from .points import Points
 from .verified import missed, objective_scales
@@ -76,7 +78,7 @@ def verify(
     method: str = "DOP853",
     transcription: Transcription | None = None,
 ) -> list[Check]:
-    """Check every point of a front.
+    """Check every point of a front. Those of a vector problem are evaluated again.
 
     Parameters
     ----------
@@ -100,6 +102,9 @@ def verify(
     ValueError
         If the front is of a black box, or its problem or transcription cannot be made again.
     """
+    stated = front.stated()
+    if isinstance(stated, CompiledVectorProblem):
+        return _verify_rows(front, stated, tolerance)
     problem = front.compiled()
     nlps: dict[Transcription, NLP] = {}
 
@@ -138,6 +143,33 @@ def verify(
     # All of them first: what is wrong with the front as such is reported before any simulation.
     programs = [nlp_of(point) for point in front]
     return [check(index, point, nlp) for index, (point, nlp) in enumerate(zip(front, programs, strict=True))]
+
+
+def _verify_rows(front: Points, problem: CompiledVectorProblem, tolerance: float) -> list[Check]:
+    """Checks of the points of a vector problem: each is evaluated again, and compared. There are no trajectories to be wrong."""
+    names = [v.name for v in problem.variables]
+    if len(front) and [v.name for v in front.variables] != names:
+        raise ValueError(f"the variables of the front are not {', '.join(names)}")
+    F, violation, violations = evaluated_again(problem, front.decision)
+    off = np.abs(F - front.F) / np.maximum(1.0, np.abs(F))
+    apart = np.abs(F - front.F) / objective_scales(front)
+    off, apart = (np.where(np.isfinite(one), one, np.inf).max(axis=1, initial=0.0) for one in (off, apart))
+    allowed = max(tolerance, front.stats["tolerance"])
+
+    def check(i: int, point: Point) -> Check:
+        worst = max(violations[i], key=lambda name: violations[i][name], default="")
+        changed = not abs(violation[i] - point.violation) <= allowed
+        failures = (
+            (not np.isfinite(violation[i]), "evaluated again, it fails"),
+            (not apart[i] <= tolerance, f"evaluated again, its objectives differ by {apart[i]:.1e} (tolerance {tolerance:.1e})"),
+            (changed, f"stored violation {point.violation:.1e}, evaluated again {violation[i]:.1e}"),
+            (point.status != CONVERGED, f"its status is '{point.status}'"),
+            (not violation[i] <= allowed, f"violates '{worst}' by {violation[i]:.1e} (tolerance {allowed:.0e})"),
+        )
+        reasons = tuple(reason for wrong, reason in failures if wrong)
+        return Check(i, 0.0, float(violation[i]), float(off[i]), 0.0, float(violation[i]), float(apart[i]), reasons)
+
+    return [check(i, point) for i, point in enumerate(front)]
 
 
 def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:

@@ -10,11 +10,13 @@ import numpy as np
 from problems.checks import check_positive
 from problems.compiled import CompiledProblem
 from problems.sanity import objective_spreads
+from problems.vector import CompiledVectorProblem
 from transcription.stopping import Stopped
 from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
+from ..evaluation.reevaluated import evaluated_again
 from .points import Points
 
 Kind = TypeVar("Kind", bound=Points)
@@ -29,8 +31,8 @@ CONSTANT = 1e-6
 """An objective that varies less over a front, as a fraction of its size, is judged by its size."""
 NOTHING = 1e-6
 """Smallest scale of an objective, as a fraction of how much it varies within the bounds of the problem."""
-MISSES = "simulated, "
-"""Beginning of a note on what a point misses."""
+MISSES, AGAIN = "simulated, ", "evaluated again, "
+"""Beginnings of a note on what a point misses, of a trajectory and of a vector problem."""
 
 
 class Simulations:
@@ -78,7 +80,8 @@ def verified(
     ----------
     points : Points
     tolerance : float or None
-        None: the points are returned as they are. So are those of a black box, and those whose simulation is not over soon after the work
+        None: the points are returned as they are. So are those of a black box, whose function is not known any more, and those whose
+        simulation is not over soon after the work
         was asked to end early (`transcription.stopping`).
     scales : array (m,), optional
         What counts as one in each objective; by default `objective_scales`.
@@ -95,6 +98,8 @@ def verified(
     check_verify(tolerance)
     if tolerance is None or points.source is None:
         return points
+    if points.source.vector:
+        return _evaluated(points, tolerance)
     rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
     problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
     try:
@@ -124,6 +129,64 @@ def verified(
         notes=notes,
         stats={**points.stats, "verify": float(tolerance)},
     )
+
+
+def _evaluated(points: Kind, tolerance: float) -> Kind:
+    """Points of a vector problem, marked by an evaluation of all of them again, in one batch.
+
+    A point is verified if none of its objectives differs by more than `tolerance`, in `objective_scales`, and it violates nothing by more
+    than that or what the search allowed. The rows are counted in `stats["evaluated_again"]`.
+    """
+    problem = points.stated()
+    assert isinstance(problem, CompiledVectorProblem)
+    F, violation, violations = evaluated_again(problem, points.decision)
+    scales = objective_scales(points)
+    apart = np.abs(F - points.F) / scales
+    off = np.where(np.isfinite(apart), apart, np.inf)
+    allowed = max(tolerance, points.stats["tolerance"])
+    agrees = (points.status == CONVERGED) & (off <= tolerance).all(axis=1) & (violation <= allowed)
+    notes = [_without_misses(note) for note in points.notes]
+    for i in np.flatnonzero(~agrees):
+        found = []
+        if not np.isfinite(F[i]).all():
+            found.append("it fails")
+        elif not (off[i] <= tolerance).all():
+            k = int(off[i].argmax())
+            found.append(f"its '{points.names[k]}' differs by {off[i, k] * scales[k]:.2g} {points.goals[k].unit}".rstrip())
+        if allowed < violation[i] < np.inf:
+            worst = max(violations[i], key=lambda name: violations[i][name])
+            found.append(f"it violates '{worst}' by {violation[i]:.1e}")
+        notes[i] = "; ".join(filter(None, [notes[i], AGAIN + ", ".join(found) if found else ""]))
+    return points.replace(
+        violations=violations,
+        defect=np.zeros(len(points)),
+        simulated_violation=violation,
+        simulated_F=F,
+        verified=agrees,
+        notes=notes,
+        stats={**points.stats, "verify": float(tolerance), **_more_rows(points, len(points))},
+    )
+
+
+def with_nearest(points: Kind) -> Kind:
+    """Points of a vector problem; if there are none, with the constraint in the message that the least infeasible one violates most."""
+    nearest = points.closest
+    if len(points) or nearest is None or not np.isfinite(nearest.violation):
+        return points
+    problem = points.stated()
+    assert isinstance(problem, CompiledVectorProblem)
+    violations = evaluated_again(problem, nearest.decision[None])[2]
+    closest = nearest.alone().replace(violations=violations)[0]
+    name = max(violations[0], key=lambda name: violations[0][name])
+    limit, unit = next(both for both in zip(problem.limits or (), problem.limit_units, strict=True) if both[0].name == name)
+    before = points.message.rpartition("; ")[0]
+    message = f"{before}; the nearest violates {name} by {closest.violation:.2g} of its scale, {limit.scale:g} {unit}".rstrip()
+    return points.replace(closest=closest, message=message, stats={**points.stats, **_more_rows(points, 1)})
+
+
+def _more_rows(points: Points, count: int) -> dict[str, int]:
+    """The number of rows of a vector problem that were evaluated again, so many more included."""
+    return {"evaluated_again": points.stats.get("evaluated_again", 0) + count}
 
 
 def unmarked(points: Kind) -> Kind:
@@ -158,7 +221,8 @@ def objective_scales(points: Points) -> np.ndarray:
     F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
     sizes, ranges = np.abs(F).max(axis=0), np.ptp(F, axis=0)
     found = np.where(ranges > CONSTANT * sizes, ranges, sizes)
-    found = np.maximum(found, 0.0 if points.problem is None else NOTHING * objective_spreads(points.problem))
+    if isinstance(points.problem, CompiledProblem):
+        found = np.maximum(found, NOTHING * objective_spreads(points.problem))
     given = np.array([goal.scale or 0.0 for goal in points.goals])
     return np.where(given > 0.0, given, np.where(found > 0.0, found, 1.0))
 
@@ -201,4 +265,4 @@ def _growing(problem: CompiledProblem, trajectory: Trajectory, tolerance: float)
 
 def _without_misses(note: str) -> str:
     """A note without what an earlier simulation said."""
-    return "; ".join(part for part in note.split("; ") if part and not part.startswith(MISSES))
+    return "; ".join(part for part in note.split("; ") if part and not part.startswith((MISSES, AGAIN)))

@@ -11,6 +11,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem, Objective
 from problems.peaks import refuse_peaks
+from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.base import Transcription
 from transcription.catalogue import parse
 from transcription.meshed import Meshed
@@ -211,6 +212,12 @@ class MACS(Settings, Solver):
             raise ValueError(f"MACS: mesh='adaptive' needs DFET or another method on elements, not {type(transcription).__name__}")
         if self.polish_on is not None:
             refuse_peaks(problem)
+
+    def check_vector(self, problem: CompiledVectorProblem) -> None:
+        """Raise ValueError for `mesh="adaptive"` and `polish_on`: there is no mesh and nothing to polish."""
+        for setting, asked in {"mesh='adaptive'": self.mesh == "adaptive", "polish_on": self.polish_on is not None}.items():
+            if asked:
+                raise ValueError(f"MACS: {setting} does not apply, since {without_dynamics(problem.name)}")
 
     @property
     def certifies(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 
 from problems.checks import short_repr
 from problems.compiled import CompiledProblem, Objective
+from problems.vector import CompiledVectorProblem
 from transcription.base import Transcription
 
 from ..evaluation.evaluator import Evaluator
@@ -84,6 +85,9 @@ class SearchMethod(ABC):
 
     def check_transcription(self, transcription: Transcription, problem: CompiledProblem) -> None:  # noqa: B027
         """Raise ValueError if the settings do not suit the transcription of a problem. Called before any work."""
+
+    def check_vector(self, problem: CompiledVectorProblem) -> None:  # noqa: B027
+        """Raise ValueError if the solver or its settings need dynamics or derivatives. Called before any work."""
 
     @property
     def mends(self) -> bool:

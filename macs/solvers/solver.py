@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Variable
+from problems.compiled import CompiledProblem
 from problems.problem import DEFAULT_EVALUATIONS, Problem
+from problems.vector import CompiledVectorProblem, without_dynamics
+from problems.vector_problem import VectorProblem
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth
@@ -20,10 +22,11 @@ from transcription.stopping import Stopped
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.blackbox import BlackBox
 from ..evaluation.evaluator import Counts
+from ..evaluation.plain import plain_problem
 from ..front import Front
-from ..fronts.builders import black_box_points, no_points, trajectory_points
+from ..fronts.builders import no_points, trajectory_points, vector_points
 from ..fronts.provenance import costs, more_costs
-from ..fronts.verified import VERIFY, check_verify
+from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
 from ..io.interrupts import Interrupts
 from ..refinement.search_mesh import search_transcription
@@ -38,11 +41,11 @@ Callback = Callable[[Progress], Any]
 
 
 class Solver(SearchMethod):
-    """Search method with two calls for its user: `solve` for optimal control problems, `minimize` for plain functions."""
+    """Search method with two calls for its user: `solve` for problems, with or without trajectories, `minimize` for plain functions."""
 
     def solve(
         self,
-        problem: Problem | CompiledProblem,
+        problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem,
         transcription: Transcription | None = None,
         *,
         evaluations: int | None = None,
@@ -56,15 +59,17 @@ class Solver(SearchMethod):
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """The Pareto front of an optimal control problem.
+        """The Pareto front of an optimal control problem or a vector problem.
 
         Parameters
         ----------
-        problem : Problem
+        problem : Problem or VectorProblem
+            A vector problem takes neither transcription nor inner level; in the end, its points are evaluated again instead of simulated.
         transcription : Transcription, optional
             Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.search_mesh`.
         evaluations : int, optional
-            Largest number of candidates that are sent to the inner level. Default: the problem's own number.
+            Largest number of candidates that are sent to the inner level, or of rows that a vector problem evaluates. Default: the
+            problem's own number.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver, optional
@@ -118,6 +123,11 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
+        if isinstance(problem, VectorProblem | CompiledVectorProblem):
+            for name, given in {"transcription": transcription, "inner level": inner}.items():
+                if given is not None:
+                    raise ValueError(f"{without_dynamics(problem.name)}: it takes no {name}")
+            return self._solve_vector(problem, evaluations, seed, tolerance, start, verify, time_limit, progress, callback, checkpoint)
         check_problem(problem, transcription)
         if isinstance(problem, Problem):
             evaluations = problem.default_evaluations if evaluations is None else evaluations
@@ -153,10 +163,7 @@ class Solver(SearchMethod):
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:
-                # A search may have taken hours: its front is not lost by what follows it, and says what failed.
-                log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
-                failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
-                return front.replace(message="; ".join(filter(None, [front.message, failed])))
+                return _not_simulated(front, error)
 
     def _search_run(
         self,
@@ -247,33 +254,78 @@ class Solver(SearchMethod):
             If the checkpoint cannot be written; before any work.
         """
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
-        box = BlackBox(function, bounds, constraints=constraints, names=names, units=units, senses=senses, tolerance=float(tolerance))
-        if box.m_known is not None:
-            self.check_objectives(box.m_known)
-            self.check_goals(box.goals)
-        sides = zip(box.variables, box.lower.tolist(), box.upper.tolist(), strict=True)
-        variables = tuple(Variable(name, low, high, "", high - low) for name, low, high in sides)
+        problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses)
+        what = {
+            "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},
+            "objectives": {
+                "number": len(problem.goals) or None,
+                "names": names,
+                "units": units,
+                "senses": senses,
+            },
+            "constraints": constraints is not None,
+        }
+        return self._vector_run(problem, evaluations, seed, float(tolerance), start, what).go(time_limit, progress, callback, checkpoint)
 
-        about = self.about()
+    def _solve_vector(
+        self,
+        problem: VectorProblem | CompiledVectorProblem,
+        evaluations: int | None,
+        seed: int | None,
+        tolerance: float,
+        start: Any,
+        verify: float | None,
+        time_limit: float | None,
+        progress: bool | None,
+        callback: Callback | None,
+        checkpoint: str | PathLike[str] | None,
+    ) -> Front:
+        """`solve` of a vector problem, each point of whose front is evaluated again in the end."""
+        if evaluations is None:
+            evaluations = problem.default_evaluations if isinstance(problem, VectorProblem) else DEFAULT_EVALUATIONS
+        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        check_verify(verify)
+        drawn, compiled = drawing(start), problem.compile()
+        if isinstance(drawn, Smooth):
+            raise ValueError(f"start: {without_dynamics(compiled.name)}, so there are no smooth profiles")
+        self.check_vector(compiled)
+        what = {"problem": {"name": compiled.name, "fingerprint": compiled.fingerprint}}
+        run = self._vector_run(compiled, evaluations, seed, float(tolerance), None if drawn else start, what)
+        front = run.go(time_limit, progress, callback, checkpoint)
+        try:
+            return Front.of(with_nearest(front)).verify(verify)
+        except Exception as error:
+            return _not_simulated(front, error)
+
+    def _vector_run(
+        self, problem: CompiledVectorProblem, evaluations: int, seed: int | None, tolerance: float, start: Any, what: dict[str, Any]
+    ) -> SearchRun:
+        """The run of a search on a vector problem, ready to go; `what` says for its checkpoint which problem that is."""
+        box, about = BlackBox(problem, tolerance), self.about()
+        if problem.goals:
+            self.check_objectives(len(problem.goals))
+            self.check_goals(problem.goals)
 
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
+            named = problem if problem.name else None
             if state is None:  # the function itself asked whether to end
-                return Front.of(no_points(() if box.m_known is None else box.goals, None, about, stats))
-            return Front.of(black_box_points(state.archive, state.closest, box.goals, variables, about, stats))
+                return Front.of(no_points(() if box.m_known is None else box.goals, named, about, stats))
+            return Front.of(vector_points(problem, state.archive, state.closest, box.goals, about, stats))
 
-        run = SearchRun(
+        return SearchRun(
             self,
             box,
             goals=lambda: box.goals,
             make_front=make_front,
             budget=evaluations,
             seed=seed,
-            start=None if start is None else decisions(start, variables),
-            what={
-                "solver": about,
-                "bounds": {v.name: (v.lower, v.upper) for v in variables},
-                "objectives": {"number": box.m_known, "names": names, "units": units, "senses": senses},
-                "constraints": constraints is not None,
-            },
+            start=None if start is None else decisions(start, problem.variables),
+            what={"solver": about, **what},
         )
-        return run.go(time_limit, progress, callback, checkpoint)
+
+
+def _not_simulated(front: Front, error: Exception) -> Front:
+    """The front as the search left it. A search may have taken hours: its front is not lost by what follows it, and says what failed."""
+    log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
+    failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
+    return front.replace(message="; ".join(filter(None, [front.message, failed])))

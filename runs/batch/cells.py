@@ -6,7 +6,7 @@ import hashlib
 import json
 import pickle
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,14 +16,18 @@ from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver
-from problems import Problem, load
+from problems import Problem, VectorProblem, load
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
-from transcription import Transcription, stated, word
+from problems.vector import CompiledVectorProblem, without_dynamics
+from transcription import Smooth, Transcription, stated, word
 
 from ..data.schema import errors_begin_with, plain
-from ..execution.task import Payload
-from .terms import check_terms, terms_of_problem
+from ..execution.task import Addressed, Payload
+from .terms import check_terms, sampling, terms_of_problem
+
+STATEMENTS = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
+Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
 
 
 def combine(
@@ -34,7 +38,7 @@ def combine(
     terms: Mapping[str, Mapping[str, Any]],
     inner: str | None,
     start: Any,
-) -> tuple[list[tuple[Cell, Payload]], dict[str, CompiledProblem], dict[str, Solver]]:
+) -> tuple[list[tuple[Cell, Payload]], dict[str, CompiledProblem | CompiledVectorProblem], dict[str, Solver]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them; and the problems
     and solvers by label.
 
@@ -42,34 +46,39 @@ def combine(
     """
     stated = {label: _problem(label, given) for label, given in _labelled("problems", problems).items()}
     methods = {label: _solver(label, given) for label, given in _labelled("solvers", solvers).items()}
-    schemes = _schemes(transcriptions, stated)
+    vectors = [label for label, one in stated.items() if isinstance(one, VectorProblem | CompiledVectorProblem)]
+    flying = {label: one for label, one in stated.items() if label not in vectors}
+    _refuse_transcriptions("transcriptions", transcriptions, vectors)
+    schemes = {label: {WITHOUT: None} for label in vectors} | (_schemes(transcriptions, flying) if flying else {})
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
     own_budgets, own_schemes = {}, {}
     for label, given in terms.items():
         if "transcription" in given:
             with errors_begin_with(f"terms of '{label}'"):
-                own = _by_problem("transcription", given["transcription"], stated, lambda problem: problem.default_transcription)
+                _refuse_transcriptions("transcription", given["transcription"], vectors)
+                own = _by_problem("transcription", given["transcription"], flying, lambda problem: problem.default_transcription)
                 own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in own.items()}
         if "evaluations" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
     combined = []
-    compiled: dict[str, CompiledProblem] = {}
+    compiled: dict[str, CompiledProblem | CompiledVectorProblem] = {}
     common = [one for one in methods if "transcription" not in terms.get(one, {})]
     for label, statement in stated.items():
         with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
-            problem = compiled[label] = statement.compile() if isinstance(statement, Problem) else statement
+            problem = compiled[label] = statement.compile()
+            # The place of its file is not part of what identifies a problem: a study may move.
+            identity = {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
         with errors_begin_with(f"problems: '{label}'"):
             theirs = terms_of_problem(statement, inner, start)
-        # The place of its file is not part of what identifies a problem: a study may move.
-        identity = {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
         offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
         for one in methods:
             if one not in common:
-                offered += [(name, scheme, [one]) for name, scheme in own_schemes[one][label].items()]
+                own_ones = schemes[label] if label in vectors else own_schemes[one][label]
+                offered += [(name, scheme, [one]) for name, scheme in own_ones.items()]
         for scheme_label, scheme, method_labels in offered:
-            stated_so = _pickled(f"{label}, {scheme_label}", problem, scheme)
+            stated_so = _pickled(f"{label}, {scheme_label}", _sendable(problem), scheme)
             for method_label in method_labels:
                 method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
                 budget = own_budgets.get(method_label, budgets)[label]
@@ -77,12 +86,37 @@ def combine(
                 place = f"{label}, {scheme_label}, {method_label}"
                 with errors_begin_with(place):
                     method.check_objectives(len(problem.goals))
-                    method.check_transcription(scheme, problem)
-                details = {"problem": identity, "transcription": scheme.to_dict(), "solver": method.about()}
+                    _check_method(method, scheme, problem, own.get("start", start))
+                details = {"problem": identity, "transcription": scheme and scheme.to_dict(), "solver": method.about()}
                 details |= {"terms": own} if own else {}
                 cell = Cell(label, scheme_label, method_label, budget, plain(details))
                 combined.append((cell, (stated_so, _pickled(place, method))))
     return combined, compiled, methods
+
+
+def _refuse_transcriptions(key: str, given: Any, vectors: Sequence[str]) -> None:
+    """Raise ValueError for a transcription of a vector problem, of those with these labels."""
+    for label in vectors:
+        if given is not None and not (isinstance(given, Mapping) and label not in given):
+            raise ValueError(f"{key}: {without_dynamics(label)}: state none for it, but {{label: ...}} for the other problems")
+
+
+def _check_method(method: Solver, scheme: Transcription | None, problem: CompiledProblem | CompiledVectorProblem, start: Any) -> None:
+    """Raise ValueError unless a solver suits a problem and its transcription."""
+    if isinstance(problem, CompiledProblem):
+        assert scheme is not None
+        method.check_transcription(scheme, problem)
+        return
+    method.check_vector(problem)
+    if isinstance(sampling(start), Smooth):
+        raise ValueError(f"start: {without_dynamics(problem.name)}, so there are no smooth profiles")
+
+
+def _sendable(problem: CompiledProblem | CompiledVectorProblem) -> Any:
+    """What other processes make the same problem of: of a vector problem that has an address, that, since its function may not pickle."""
+    if isinstance(problem, CompiledProblem) or not problem.address:
+        return problem
+    return Addressed(problem.address, dict(problem.data))
 
 
 def _labelled(key: str, given: Any) -> dict[str, Any]:
@@ -109,13 +143,13 @@ def _label(one: Any) -> str:
     if isinstance(one, Transcription):
         about = one.to_dict()
         return word(one) or call(about["method"], about["settings"])
-    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, Problem | CompiledProblem) else str(one)
+    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, STATEMENTS) else str(one)
 
 
-def _problem(label: str, given: Any) -> Problem | CompiledProblem:
+def _problem(label: str, given: Any) -> Statement:
     data = dict(given) if isinstance(given, Mapping) else {"problem": given}
     name = data.pop("problem", None)
-    if isinstance(name, Problem | CompiledProblem) and not data:
+    if isinstance(name, STATEMENTS) and not data:
         return name
     if not isinstance(name, str):
         raise ValueError(f"problems: '{label}' must be a name, a Problem, or a table with its name as problem = ..., not {given!r}")
@@ -123,7 +157,7 @@ def _problem(label: str, given: Any) -> Problem | CompiledProblem:
         return load(name, **data)
 
 
-def _schemes(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, dict[str, Transcription]]:
+def _schemes(given: Any, problems: Mapping[str, Statement]) -> dict[str, dict[str, Transcription | None]]:
     """Transcriptions by label, for each problem."""
     if isinstance(given, Mapping) and not set(given) & set(problems):
         return dict.fromkeys(problems, _named_schemes(given))
@@ -136,7 +170,7 @@ def _own_scheme(problem: Problem) -> Any:
     return method if word(method) else {OWN: method}
 
 
-def _named_schemes(given: Any) -> dict[str, Transcription]:
+def _named_schemes(given: Any) -> dict[str, Transcription | None]:
     return {label: _scheme(label, one) for label, one in _labelled("transcriptions", given).items()}
 
 
@@ -163,19 +197,19 @@ def _solver(label: str, given: Any) -> Solver:
         return catalogue.solver(name, **settings)
 
 
-def _budgets(given: Any, problems: Mapping[str, Problem | CompiledProblem]) -> dict[str, int]:
+def _budgets(given: Any, problems: Mapping[str, Statement]) -> dict[str, int]:
     found = _by_problem("evaluations", given, problems, lambda problem: problem.default_evaluations)
     for label, budget in found.items():
         check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
     return {label: int(budget) for label, budget in found.items()}
 
 
-def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledProblem], own: Callable[[Problem], Any]) -> dict[str, Any]:
+def _by_problem(key: str, given: Any, problems: Mapping[str, Statement], own: Callable[[Any], Any]) -> dict[str, Any]:
     """A value for each problem: one for all, by labels, or if none is given the problem's `own`."""
     if given is None:
         found = {}
         for label, problem in problems.items():
-            if isinstance(problem, CompiledProblem):
+            if isinstance(problem, CompiledProblem | CompiledVectorProblem):
                 raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
             found[label] = own(problem)
         return found
@@ -193,14 +227,18 @@ def _by_problem(key: str, given: Any, problems: Mapping[str, Problem | CompiledP
 def _pickled(place: str, *parts: Any) -> bytes:
     """Bytes that another process can make the same of: one thing, or a tuple of several."""
     for one in parts:
-        if type(one).__module__ == "__main__":
-            raise ValueError(f"{place}: other processes cannot import {type(one).__name__} from a script; put it into a module of its own")
+        function = getattr(getattr(one, "rows", None), "function", None)
+        name = type(one).__name__ if type(one).__module__ == "__main__" else getattr(function, "__name__", "the function")
+        if "__main__" in (type(one).__module__, getattr(function, "__module__", "")):
+            raise ValueError(f"{place}: other processes cannot import {name} from a script; put it into a module of its own")
     try:
         return pickle.dumps(parts if len(parts) > 1 else parts[0])
     except Exception as error:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error
 
 
+WITHOUT = "no transcription"
+"""Label of the transcription of a vector problem, which has none."""
 OWN = "the problem's own mesh"
 """Label of a default transcription that cannot be written in a word."""
 LONGEST = 80

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from macs.solvers.start import drawing
-from problems import Problem
+from problems import CompiledVectorProblem, Problem, VectorProblem
 from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED
@@ -46,13 +46,15 @@ def check_terms(terms: Any, solvers: Collection[str]) -> None:
             sampling(own.get("start"))
 
 
-def terms_of_problem(problem: Problem | CompiledProblem, inner: str | None, start: Any) -> dict[str, Any]:
-    """The inner level and start that a problem states, where the study states none: plain data. A compiled problem has none.
+def terms_of_problem(
+    problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem, inner: str | None, start: Any
+) -> dict[str, Any]:
+    """The inner level and start that a problem states, where the study states none: plain data. A compiled or vector problem has none.
 
     Raises ValueError if they are wrong.
     """
     found: dict[str, Any] = {}
-    if isinstance(problem, CompiledProblem):
+    if not isinstance(problem, Problem):
         return found
     if inner is None:
         check_inner(problem.default_inner)

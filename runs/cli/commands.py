@@ -109,7 +109,7 @@ def show(arguments: Namespace) -> int:
     with wrong_call_on_value_error():
         front = Front.load(arguments.front)
     point = None if arguments.point is None else find_point(front, arguments.point)
-    if arguments.plot and point is not None and point.trajectory is None:
+    if arguments.plot and point is not None and front.dynamic and point.trajectory is None:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")
     print(front.table() if point is None else describe(front, point))
     if arguments.plot:
@@ -125,7 +125,7 @@ def verify(arguments: Namespace) -> int:
     with wrong_call_on_value_error():
         front = Front.load(arguments.front, trust=arguments.trust)
     if front.source is None:
-        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to simulate")
+        raise WrongCall(f"{arguments.front} is a front of a black box: there is nothing to simulate or to evaluate again")
     if not arguments.problem and not front.source.address:
         raise WrongCall(f"problem '{front.source.name}' was stated in a script; give it: --problem file.py:function")
     with wrong_call_on_value_error():
@@ -140,7 +140,8 @@ def verify(arguments: Namespace) -> int:
     elif failed:
         print(f"\n{len(failed)} of {len(checks)} points fail.")
     else:
-        print(f"\nAll {len(checks)} points verify: simulated, they stay within {tolerance:g}.")
+        how = "simulated, they" if front.dynamic else "evaluated again, they"
+        print(f"\nAll {len(checks)} points verify: {how} stay within {tolerance:g}.")
     return DONE if checks and not failed else FAILED
 
 
@@ -224,10 +225,13 @@ def describe(front: Front, point: Point) -> str:
     """One point, in full."""
     objectives = {label(goal.name, goal.unit): f"{point.objectives[goal.name]:.10g}" for goal in front.goals}
     excursions = {name: f"{value:.2g}" for name, value in (point.excursions or {}).items()}
+    units = {variable.name: variable.unit for variable in point.variables}
     groups = {
         f"point {point.index} of {len(front)}, {point.status}": objectives,
         _verdict(front, point): _simulated(front, point),
-        "parameters": {name: f"{value:.10g}" for name, value in point.parameters.items()},
+        "parameters" if front.dynamic else "variables": {
+            label(name, units.get(name, "")): f"{value:.10g}" for name, value in point.parameters.items()
+        },
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,
         "costates are those of the sum of objectives, minimised, times": {
@@ -245,7 +249,8 @@ def describe(front: Front, point: Point) -> str:
 
 def _verdict(front: Front, point: Point) -> str:
     """Whether a point is verified, and within what."""
-    return f"simulated: {'verified' if point.verified else 'not verified'} within {front.stats.get('verify', 0.0):g}"
+    how = "simulated" if front.dynamic else "evaluated again"
+    return f"{how}: {'verified' if point.verified else 'not verified'} within {front.stats.get('verify', 0.0):g}"
 
 
 def _simulated(front: Front, point: Point) -> dict[str, str]:
@@ -253,7 +258,8 @@ def _simulated(front: Front, point: Point) -> dict[str, str]:
     if point.simulated is None:
         return {}
     values = {label(goal.name, goal.unit): f"{point.simulated[goal.name]:.10g}" for goal in front.goals}
-    errors = {"defect": f"{point.defect:.1e}", "violation": f"{point.simulated_violation:.1e}"}
+    errors = {"defect": f"{point.defect:.1e}"} if front.dynamic else {}
+    errors["violation"] = f"{point.simulated_violation:.1e}"
     return {**values, **errors, **({"note": point.note} if point.note else {})}
 
 
@@ -273,13 +279,25 @@ def _ends(phase: Any) -> str:
 
 def verification_table(front: Front, checks: Sequence[Check]) -> str:
     """A row for each point, and the reasons of those that fail."""
+    if not front.dynamic:
+        return _evaluation_table(front, checks)
     values = [(c.mismatch, c.objectives, c.violation, c.defect, c.simulated, c.missed) for c in checks]
     rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
     headers = [
         ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],
         ["", "stored - decision", "stored - anew", "anew", "simulated", "simulated", "stored - simulated", ""],
     ]
-    table = text_table(headers, rows, [False] * 7 + [True])
+    return _with_reasons(front, text_table(headers, rows, [False] * 7 + [True]), checks)
+
+
+def _evaluation_table(front: Front, checks: Sequence[Check]) -> str:
+    """As `verification_table`, of a vector problem, whose points were evaluated again."""
+    rows = [[str(c.point), *(f"{v:.1e}" for v in (c.objectives, c.missed, c.violation)), "ok" if c.ok else "FAILS"] for c in checks]
+    headers = [["#", "objectives", "objectives", "violation", ""], ["", "stored - again", "in ranges of the front", "again", ""]]
+    return _with_reasons(front, text_table(headers, rows, [False] * 4 + [True]), checks)
+
+
+def _with_reasons(front: Front, table: str, checks: Sequence[Check]) -> str:
     reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 

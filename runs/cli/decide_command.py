@@ -119,9 +119,9 @@ def _begun(arguments: Namespace) -> Dialogue:
 
 
 def _own_problem(front: Front, trust: bool) -> Problem | None:
-    """The problem that a front names, if it may be loaded."""
+    """The problem that a front names, if it has dynamics and may be loaded."""
     source = front.source
-    if source is None or not source.address or not (trust or is_catalogued(source.address)):
+    if source is None or source.vector or not source.address or not (trust or is_catalogued(source.address)):
         return None
     return source.load()
 

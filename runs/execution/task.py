@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.solvers.checkpoint import Unreadable, keeps
+from problems import load
 
 from ..measures.simulation_record import SimulationRecord, record
 from .samples import Report, Samples
@@ -31,8 +32,16 @@ Payload = tuple[bytes, bytes]
 
 
 @dataclass(frozen=True)
+class Addressed:
+    """A problem that a process loads from its address, see `problems.load`. Whoever stated it has loaded it from there before."""
+
+    address: str
+    data: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
 class Task:
-    """A run to be made: `payload` is its problem and transcription, pickled, and its solver, pickled.
+    """A run to be made: `payload` is its problem and transcription (None for a vector problem), pickled, and its solver, pickled.
 
     `checkpoint` is the file of its state while it lasts, used if its process can write to that folder, as on this machine or on a cluster
     with one file system.
@@ -119,7 +128,7 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
                 scheme,
                 evaluations=task.evaluations,
                 seed=task.seed,
-                inner=task.inner,
+                inner=None if scheme is None else task.inner,
                 tolerance=task.tolerance,
                 start=task.start,
                 verify=task.verify,
@@ -137,7 +146,7 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
 def _simulated(task: Task, front: Front) -> SimulationRecord:
     """The final states of the points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not
     lost by it."""
-    if task.verify is None or not front.was_simulated.all():
+    if task.verify is None or not front.dynamic or not front.was_simulated.all():
         return {}
     try:
         return record(front, task.verify)
@@ -146,5 +155,8 @@ def _simulated(task: Task, front: Front) -> SimulationRecord:
         return {}
 
 
-_unpacked = lru_cache(maxsize=8)(pickle.loads)
-"""Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
+@lru_cache(maxsize=8)
+def _unpacked(payload: bytes) -> tuple[Any, Any]:
+    """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
+    problem, scheme = pickle.loads(payload)
+    return (load(problem.address, **problem.data).compile() if isinstance(problem, Addressed) else problem), scheme

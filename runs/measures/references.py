@@ -26,6 +26,7 @@ from .indicators import Points, goals_of, minimised
 
 if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
+    from problems.vector import CompiledVectorProblem
 
 
 ReferenceKey = Annotated[
@@ -259,7 +260,7 @@ def reference_addresses(given: Any) -> list[str]:
     return [one for one in stated if isinstance(one, str) and one not in ("union", "truth") and Path(one).suffix not in (".nc", ".csv")]
 
 
-def check_reference(given: Any, stated: Mapping[str, CompiledProblem]) -> None:
+def check_reference(given: Any, stated: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> None:
     """Raise ValueError if a study of problems, by label, has no such reference, or it cannot be read."""
     with errors_begin_with("reference"):
         check_known("problem", given if isinstance(given, Mapping) else (), stated)

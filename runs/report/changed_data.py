@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from problems.compiled import CompiledProblem
+    from problems.vector import CompiledVectorProblem
 
 TOLERANCE = 1e-2
 """Allowed violation of a simulated point, in scales, in a study without `verify`."""
@@ -39,7 +40,7 @@ INFEASIBLE: Mapping[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.6, "color": 
 FOUND: Mapping[str, Any] = {"marker": "o", "ms": 3.0, "mew": 0, "color": COLORS[1], "zorder": 2}
 
 
-def check(nominal: Any, problems: Mapping[str, CompiledProblem]) -> None:
+def check(nominal: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> None:
     """Raise ValueError unless `nominal` is the label of one of several problems whose points can be simulated under all the others."""
     if not isinstance(nominal, str) or nominal not in problems:
         raise ValueError(f"nominal: {unknown('problem', nominal, problems)}")
@@ -189,7 +190,7 @@ def _change(comparisons: Sequence[Comparison], transcription: str, solver: str, 
     some = own[representatives(own, MANY)]
     try:
         # A problem that a script stated cannot be loaded.
-        problems = {label: next(one for one in comparisons if one.problem == label).known.compiled() for label in labels}
+        problems = {label: next(one for one in comparisons if one.problem == label).known.stated() for label in labels}
     except ValueError as error:
         return Change(transcription, solver, union, note=f"nothing was simulated: {error}")
     return Change(transcription, solver, union, {label: some.simulate(problem, tolerance=tolerance) for label, problem in problems.items()})

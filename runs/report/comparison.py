@@ -60,7 +60,7 @@ class Verified:
         lengths = {len(values) for states in final.values() for values in states.values()}
         with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
             front = front if front.stats.get("verify") == tolerance else front.verify(tolerance)
-            final = final if lengths == {len(front)} else record(front, tolerance)["ends"]
+            final = final if not front.dynamic or lengths == {len(front)} else record(front, tolerance)["ends"]
         rows = np.flatnonzero(front.verified)
         rows = rows[nondominated(front.simulated_F[rows])]
         rows = rows[by_first(front.simulated_F[rows] * front.signs)]

@@ -1,4 +1,4 @@
-"""Representative trajectories of a front, beside known optimal laws and each objective optimised alone."""
+"""Points that stand for a front: trajectories, beside known optimal laws and each objective optimised alone, or variables."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.fronts.pictures.design_plot import draw_designs
 from macs.fronts.pictures.flight_plot import along
-from macs.fronts.pictures.style import label
+from macs.fronts.pictures.style import blank_figure, label
 from macs.fronts.point import Point
 from macs.gradient_tools import payoff
 from macs.refinement.search_mesh import default_transcription
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 GRADIENT_TOOLS = ("optimize", "payoff", "sweep")
 """Names of solvers whose points are optima."""
 MANY = 100
+DESIGNS = 6
+"""Points of a vector problem in the table."""
 LAW, ALONE = "known law", "single objective"
 """Names of the dashed and dotted lines; a case may have a `LAW` of its own."""
 OBLONG = 4.0
@@ -218,3 +221,50 @@ def _alone(points: Sequence[Point], ends: Front) -> list[Law | None]:
         if end.status == CONVERGED:
             found[int(np.argmin([point.F[k] for point in points]))] = time_histories(end)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """The variables along the front of one solver on a vector problem.
+
+    Attributes
+    ----------
+    solver : str
+        The first solver that found points.
+    front : Front
+        That of all its runs together.
+    numbers : list of int
+        Of the points in the table.
+    """
+
+    solver: str
+    front: Front
+    numbers: Sequence[int]
+
+    @classmethod
+    def of(cls, comparison: Comparison) -> Designs | None:
+        """The front of a comparison; None if no solver found a point of a vector problem."""
+        for solver in comparison.runs:
+            fronts = [front for front in comparison.fronts[solver] if len(front)]
+            if fronts and fronts[0].source is not None and fronts[0].source.vector:
+                front = Front.merge(fronts) if len(fronts) > 1 else fronts[0]
+                return cls(solver, front, representatives(front, DESIGNS))
+        return None
+
+    def table(self) -> Table:
+        """Objectives and variables of a few points."""
+        names = [label(goal.name, goal.unit) for goal in self.front.goals]
+        names += [label(variable.name, variable.unit) for variable in self.front.variables]
+        heads: list[Column | str] = ["solution", *(Column(name, digits=5) for name in names)]
+        rows: list[list[Cell]] = [
+            [f"point {i}", *self.front.objectives[i].tolist(), *self.front.decision[i].tolist()] for i in self.numbers
+        ]
+        return table(heads, rows, f"Points that stand for the front of {self.solver}.", [])
+
+    def figures(self) -> dict[str, Figure]:
+        """{name of a file: figure}: each variable along the front."""
+        figure = blank_figure()
+        front = self.front
+        title = f"{self.solver}: variables along the front of all runs"
+        draw_designs(front.decision, front.variables, front.objectives, front.goals, front.status == CONVERGED, title, figure)
+        return {"variables": figure}

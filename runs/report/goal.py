@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from problems.compiled import CompiledProblem, Objective
+    from problems.vector import CompiledVectorProblem
 
 NEVER = (np.array([0.0]), np.array([np.nan]))
 """The history of a failed run."""
@@ -61,7 +62,7 @@ class Goal(Section):
             raise ValueError(f"best and worst of '{self.objective}' are both {self.best:g}: they must differ")
 
     @classmethod
-    def of(cls, given: Any, problems: Mapping[str, CompiledProblem]) -> Goal:
+    def of(cls, given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> Goal:
         """The goal that a study states for problems by label. Raises ValueError that names the key that is wrong."""
         with errors_begin_with("goal"):
             goal: Goal = checked(given, cls)

@@ -15,6 +15,7 @@ from .tables import Cell, Column, Table, table
 if TYPE_CHECKING:
     from macs.solvers.solver import Solver
     from problems.compiled import CompiledProblem
+    from problems.vector import CompiledVectorProblem
 
 
 def papers(given: Any) -> list[Published]:
@@ -28,7 +29,7 @@ def papers(given: Any) -> list[Published]:
     return found
 
 
-def check_against(given: Any, problems: Mapping[str, CompiledProblem], solvers: Mapping[str, Solver]) -> None:
+def check_against(given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem], solvers: Mapping[str, Solver]) -> None:
     """Raise ValueError unless published tables are of problems, objectives and solvers that a study has.
 
     Parameters

@@ -25,6 +25,7 @@ from .tables import Cell, Column
 
 if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
+    from problems.vector import CompiledVectorProblem
 
 Figures = Mapping[str, Cell]
 """The figures of a row by key."""
@@ -93,7 +94,7 @@ class Published(Section, tag_field="of", kw_only=True):
         """A sentence on how our figures were obtained."""
         raise NotImplementedError
 
-    def check_problem(self, problem: CompiledProblem) -> None:
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         """Raise ValueError if the table cannot be of this problem."""
 
     def __post_init__(self) -> None:
@@ -178,7 +179,7 @@ class Hypervolume(Published, tag="hypervolume", kw_only=True):
         best = comparison.reference(None)
         return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
 
-    def check_problem(self, problem: CompiledProblem) -> None:
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         if len(self.point) != len(problem.goals):
             names = ", ".join(goal.name for goal in problem.goals)
             raise ValueError(f"point: {len(self.point)} numbers, but {len(problem.goals)} objectives: {names}")
@@ -228,8 +229,8 @@ class Ends(Objectives, tag="ends", kw_only=True):
                 rows[solver] = _statistics({end.name: end.factor * np.abs(values[end.name]) for end in self.ends})
         return rows
 
-    def check_problem(self, problem: CompiledProblem) -> None:
-        known = [v.name for phase in problem.phases for v in phase.states]
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        known = [v.name for phase in getattr(problem, "phases", ()) for v in phase.states]  # a vector problem has none
         for end in self.ends:
             if end.state not in known:
                 raise ValueError(_no_state(end, known))
@@ -310,7 +311,7 @@ class PayoffTable(Published, tag="payoff"):
     def remark(self, comparison: Comparison) -> str:
         return "for each objective, the point of all runs that is best in it, and then in the others in their order."
 
-    def check_problem(self, problem: CompiledProblem) -> None:
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         names = {BEST + goal.name: goal.name for goal in problem.goals}
         check_known(STATISTIC, [row[STATISTIC] for row in self.rows], names)
 
@@ -363,7 +364,7 @@ class Degrees(Published, tag="degrees", kw_only=True):
         by = "the preference that chose" if self.preference is None else repr(self.preference)
         return f"degrees of ours by {by}.{''.join(f' {one}' for one in self._optima())}"
 
-    def check_problem(self, problem: CompiledProblem) -> None:
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         names = [goal.name for goal in problem.goals]
         check_known("objective", self._names, names)
         if self.preference is not None:

@@ -27,7 +27,7 @@ from .changed_data import ChangedData, changed_data
 from .choices import choices_figures, choices_tables, only_choices
 from .comparison import Comparison, comparisons
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
-from .flights import Flights
+from .flights import Designs, Flights
 from .goal import Goal, GoalAttainment, goal_attainments
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import papers, published_tables
@@ -152,10 +152,12 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
     kinds = [tables_of for tables_of in TABLES if tables_of not in OF_FRONTS or not only_choices(comparison)]
     tables = {name: one for tables_of in kinds for name, one in tables_of(comparison, study).items()}
     figures = _figures(comparison) if drawn else {}
-    flights = Flights.of(comparison) if study.get("flights", True) else None
-    if flights is not None:
-        tables["representatives"] = flights.table()
-        figures |= flights.figures() if drawn else {}
+    shown: Flights | Designs | None = None
+    if study.get("flights", True):
+        shown = Flights.of(comparison) or Designs.of(comparison)
+    if shown is not None:
+        tables["representatives"] = shown.table()
+        figures |= shown.figures() if drawn else {}
     stem = f"{comparison.problem}-{comparison.transcription}"
     texts = [writer.table(f"{stem}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boxes import boxed
 
 from macs import MACS, MOPSO, NSGA2
-from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.evaluator import Counts
 from macs.fronts.points import Points
 
@@ -22,7 +22,7 @@ def test_settings_are_shown_as_far_as_they_are_no_defaults() -> None:
 
 
 def test_a_search_shows_its_counts() -> None:
-    box = BlackBox(schaffer, [(-4, 4)])
+    box = boxed(schaffer, [(-4, 4)])
     state = MACS(agents=4).begin(box, 50, np.random.default_rng(0))
     counts = "0 iterations, 4 evaluations, 0 gradient solves"
     assert repr(state) == f"<SearchState: {counts}; {state.agents}, {state.archive}>"
@@ -34,7 +34,7 @@ def test_a_search_shows_its_counts() -> None:
 
 @pytest.mark.parametrize("solver", [NSGA2(population=10), MOPSO(particles=10)])
 def test_a_population_shows_its_generation(solver) -> None:
-    state = solver.begin(BlackBox(schaffer, [(-4, 4)]), 50, np.random.default_rng(0))
+    state = solver.begin(boxed(schaffer, [(-4, 4)]), 50, np.random.default_rng(0))
     assert repr(state).endswith(f"State: generation 1; <Members: 10 points, 2 objectives>, {state.archive}>")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boxes import boxed
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -11,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 from macs import MOPSO, NSGA2, NSGA3
 from macs.baselines.constraints import DEGREES, degree, excess, presented, problem_type
 from macs.evaluation.bilevel import Bilevel
-from macs.evaluation.blackbox import BlackBox
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
 from transcription.inner import inner_solver
@@ -73,10 +73,10 @@ def test_those_of_a_function_are_its_columns() -> None:
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return X, np.stack([X[:, 0] - 1, 1 - X[:, 0]], axis=1)
 
-    seen = BlackBox(function, [(0, 4)] * 2, constraints=lambda X: X[:, 1] - 2).evaluate(np.array([[3.0, 1.0], [0.5, 4.0]]))
+    seen = boxed(function, [(0, 4)] * 2, constraints=lambda X: X[:, 1] - 2).evaluate(np.array([[3.0, 1.0], [0.5, 4.0]]))
     assert seen.violations.tolist() == [[2, 0, 0], [0, 0.5, 2]]
     assert seen.violation.tolist() == [2, 2]
-    assert BlackBox(lambda X: X, [(0, 1)] * 2).evaluate(np.zeros((3, 2))).violations.shape == (3, 0)
+    assert boxed(lambda X: X, [(0, 1)] * 2).evaluate(np.zeros((3, 2))).violations.shape == (3, 0)
 
 
 class Foreign(InnerSolver):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boxes import boxed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -12,7 +13,6 @@ from plain import zdt
 
 from macs import MOPSO, MOPSOCD
 from macs.baselines.mopso import hypercubes, improved, inertia, moved, roulette, thin_out, velocities
-from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.box import Box
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.dominance import nondominated
@@ -133,7 +133,7 @@ def schaffer(X: np.ndarray) -> np.ndarray:
 @settings(max_examples=15, deadline=None)
 @given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 6), st.integers(0, 10**6))
 def test_what_always_holds_of_its_archive(particles, archive, cells, seed) -> None:
-    box = BlackBox(lambda X: (schaffer(X), X[:, :1] - 0.8), [(-2, 2)] * 2)
+    box = boxed(lambda X: (schaffer(X), X[:, :1] - 0.8), [(-2, 2)] * 2)
     method = MOPSO(particles=particles, archive=archive, cells=cells)
     state, ever = method.begin(box, 90, np.random.default_rng(seed)), []
     while box.counts.evaluations < 90:
@@ -160,7 +160,7 @@ def ring(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_swarm_begins_with_feasible_particles_only_and_their_search_is_counted() -> None:
-    box, method = BlackBox(ring, [(-2, 2)] * 2), MOPSO(particles=10, search=0.5)
+    box, method = boxed(ring, [(-2, 2)] * 2), MOPSO(particles=10, search=0.5)
     state = method.begin(box, 1000, np.random.default_rng(1))
     drawn = [state.members]
     while state.launched < 0:
@@ -180,7 +180,7 @@ def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_the
     def corner(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return schaffer(X), (np.abs(X - 1.2).sum(axis=1) - 0.15)[:, None]
 
-    box, method = BlackBox(corner, [(-2, 2)] * 3), MOPSO(particles=20, search=0.1)
+    box, method = boxed(corner, [(-2, 2)] * 3), MOPSO(particles=20, search=0.1)
     state = method.begin(box, 2000, np.random.default_rng(1))
     while state.launched < 0:
         method.advance(state, box, 2000)
@@ -193,7 +193,7 @@ def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_the
 
 @pytest.mark.parametrize("more", [{"search": 0.0}, {"handling": "penalty"}, {"handling": "objective"}])
 def test_without_a_search_for_feasible_particles_none_are_drawn(more) -> None:
-    box, method = BlackBox(ring, [(-2, 2)] * 2), MOPSO(particles=10, **more)
+    box, method = boxed(ring, [(-2, 2)] * 2), MOPSO(particles=10, **more)
     assert method.begin(box, 1000, np.random.default_rng(1)).launched == 10
 
 

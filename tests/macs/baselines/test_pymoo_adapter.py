@@ -12,11 +12,11 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 from ascent import Ascent
+from boxes import boxed
 from fronts import distance_to_curve
 from plain import dtlz
 
 from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
-from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.directions import reference_directions
 from macs.pareto.dominance import nondominated
@@ -88,7 +88,7 @@ def test_they_are_pymoo_s_own_to_the_last_bit(settings: Any, name: str) -> None:
     problem, generations = get_problem(name), 5
     with warnings.catch_warnings():
         truth = minimize(problem, theirs(settings, problem.n_obj), ("n_gen", generations), seed=5)
-    state = run(settings, BlackBox(problem), generations * len(truth.pop), seed=5)
+    state = run(settings, boxed(problem), generations * len(truth.pop), seed=5)
     assert np.array_equal(state.members.F, truth.pop.get("F"))
     assert np.array_equal(state.members.Z, truth.pop.get("X"))
     kept = np.unique(truth.F, axis=0)
@@ -120,7 +120,7 @@ def test_with_one_constraint_nsga2_is_still_pymoo_s_own() -> None:
             out["F"], out["G"] = schaffer(X), (0.81 - ((X - 0.5) ** 2).sum(axis=1))[:, None] * (X[:, :1] < 1.5)
 
     truth = minimize(Ring(), theirs(NSGA2(population=40), 2), ("n_gen", 15), seed=2)
-    state = run(NSGA2(population=40), BlackBox(Ring(), tolerance=0.0), 600, seed=2)
+    state = run(NSGA2(population=40), boxed(Ring(), tolerance=0.0), 600, seed=2)
     assert np.array_equal(state.members.F, truth.pop.get("F"))
 
 
@@ -194,7 +194,7 @@ def constrained(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ids=lambda value: named(value) if is_dataclass(value) else value.__name__,
 )
 def test_a_state_that_was_data_for_a_while_goes_on_with_the_same_bits(settings: Any, function: Any) -> None:
-    box = partial(BlackBox, function, [(-2, 2)] * 3)
+    box = partial(boxed, function, [(-2, 2)] * 3)
     straight = run(settings, box(), 80)
     broken = run(settings, box(), 80, between=lambda state: rebuilt(type(state), plain(state)))
     for name, value in plain(straight).items():
@@ -207,7 +207,7 @@ def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
     from pymoo.problems import get_problem
 
     truth = minimize(get_problem("dtlz2"), theirs(settings, 3), ("n_gen", 9), seed=4)
-    state = run(settings, BlackBox(get_problem("dtlz2")), 9 * len(truth.pop), seed=4, between=lambda s: rebuilt(type(s), plain(s)))
+    state = run(settings, boxed(get_problem("dtlz2")), 9 * len(truth.pop), seed=4, between=lambda s: rebuilt(type(s), plain(s)))
     assert np.array_equal(state.members.F, truth.pop.get("F"))
 
 

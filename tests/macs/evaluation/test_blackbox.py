@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from boxes import boxed
 from pymoo.core.problem import ElementwiseProblem
 from pymoo.problems import get_problem
 
-from macs.evaluation.blackbox import BlackBox, read_bounds
+from macs.evaluation.plain import read_bounds
 
 
 def two(X):
@@ -40,7 +41,7 @@ def test_bounds_in_every_form():
 )
 def test_bounds_that_cannot_be_meant(bounds, message):
     with pytest.raises(ValueError, match=message):
-        BlackBox(two, bounds)
+        boxed(two, bounds)
 
 
 @pytest.mark.parametrize(
@@ -57,9 +58,9 @@ def test_bounds_that_cannot_be_meant(bounds, message):
 )
 def test_other_arguments_that_cannot_be_meant(arguments, message):
     with pytest.raises(ValueError, match=message):
-        BlackBox(two, [(0, 1)], **arguments)
+        boxed(two, [(0, 1)], **arguments)
     with pytest.raises(ValueError, match="function"):
-        BlackBox(3, [(0, 1)])
+        boxed(3, [(0, 1)])
 
 
 @pytest.mark.parametrize(
@@ -73,25 +74,25 @@ def test_other_arguments_that_cannot_be_meant(arguments, message):
     ],
 )
 def test_outputs_that_cannot_be_meant(function, message):
-    box = BlackBox(function, [(0, 1)])
+    box = boxed(function, [(0, 1)])
     with pytest.raises(ValueError, match=message):
         box.evaluate(middle(box))
 
 
 def test_the_number_of_objectives_may_not_contradict_the_names():
-    box = BlackBox(two, [(0, 1)], names=["a", "b", "c"])
+    box = boxed(two, [(0, 1)], names=["a", "b", "c"])
     assert box.m == 3
     with pytest.raises(ValueError, match="returned 2, 3 expected"):
         box.evaluate(middle(box))
 
 
 def test_the_number_of_objectives_comes_from_the_first_batch_and_asking_before_is_counted():
-    box = BlackBox(two, [(0, 1)])
+    box = boxed(two, [(0, 1)])
     box.evaluate(middle(box))
     assert (box.m, box.counts.evaluations) == (2, 3)
-    asked = BlackBox(two, [(0, 1)])
+    asked = boxed(two, [(0, 1)])
     assert (asked.m, asked.counts.evaluations) == (2, 1)
-    assert (asked.names, asked.units, asked.senses) == (("f1", "f2"), ("", ""), ("minimize",) * 2)
+    assert [(goal.name, goal.unit, goal.sense) for goal in asked.goals] == [("f1", "", "minimize"), ("f2", "", "minimize")]
 
 
 def test_failed_rows_constraints_and_senses():
@@ -100,7 +101,7 @@ def test_failed_rows_constraints_and_senses():
         F[1] = np.nan
         return F, np.array([[-1.0], [0.0], [0.5]])
 
-    box = BlackBox(function, [(0, 1)], senses=["minimize", "maximize"], constraints=lambda X: X - 2.0)
+    box = boxed(function, [(0, 1)], senses=["minimize", "maximize"], constraints=lambda X: X - 2.0)
     result = box.evaluate(np.array([[0.0], [0.5], [1.0]]))
     assert result.status.tolist() == ["converged", "failed", "infeasible"]
     assert result.violation.tolist() == [0.0, np.inf, 0.5]
@@ -114,13 +115,13 @@ def test_one_objective_may_come_as_a_vector_and_the_function_may_not_change_its_
         X *= 2
         return X.sum(axis=1)
 
-    box = BlackBox(function, [(0, 1), (0, 1)])
+    box = boxed(function, [(0, 1), (0, 1)])
     result = box.evaluate(np.ones((4, 2)))
     assert (result.F.shape, result.Z.max()) == ((4, 1), 1.0)
 
 
 def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
-    tnk = BlackBox(get_problem("tnk"))
+    tnk = boxed(get_problem("tnk"))
     result = tnk.evaluate(middle(tnk))
     assert (tnk.m, result.F.shape) == (2, (3, 2))
     assert (result.violation > 0).all()
@@ -132,6 +133,6 @@ def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
         def _evaluate(self, x, out, *args, **kwargs):
             out["F"], out["G"], out["H"] = [x[0], x[1]], [x[0] - 0.5], [x[0] ** 2 + x[1] ** 2 - 1]
 
-    circle = BlackBox(OnCircle())
+    circle = boxed(OnCircle())
     assert circle.lower.tolist() == [-1, -1]
     assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation.tolist() == [0.0, 0.75, 0.5]

@@ -131,9 +131,9 @@ def test_controls_jump_where_their_polynomials_do():
     assert times[np.flatnonzero(np.isnan(values))[0] + 1] == control.edges[1]
 
 
-def test_a_black_box_point_has_nothing_to_draw():
-    with pytest.raises(ValueError, match="no trajectory to draw"):
-        black_box()[0].plot()
+def test_a_black_box_point_is_drawn_among_its_variables():
+    axes = black_box()[0].plot()
+    assert [ax.get_ylabel() for ax in axes] == ["span [m]", "chord [m]", "twist"]
 
 
 def test_pictures_need_no_display(tmp_path):

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from boxes import boxed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.evaluation.blackbox import BlackBox
 from macs.evaluation.box import Box
 from macs.search import breeding
 from macs.search.macs import MACS
@@ -118,7 +118,7 @@ def test_nothing_tried_changes_nothing_that_can_be_seen():
 
 def test_the_search_credits_what_the_archive_keeps():
     settings = MACS(archive=20)
-    box = BlackBox(lambda X: np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1), [(-2, 2)] * 4)
+    box = boxed(lambda X: np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1), [(-2, 2)] * 4)
     state = settings.begin(box, 2000, np.random.default_rng(0))
     while state.evaluations < 2000:
         settings.advance(state, box, 2000)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from boxes import boxed
 from fronts import distance_to_curve
 
 from macs import MACS, Front
@@ -22,7 +23,6 @@ from macs.decisions import (
     Smaller,
     WeightedSum,
 )
-from macs.evaluation.blackbox import BlackBox
 from macs.pareto import directions
 from macs.pareto.archive import spread
 from macs.search.guide import OUTSIDE, PreferenceGuide
@@ -257,7 +257,7 @@ def test_one_objective_and_equal_ones():
     state = MACS(prefer=WeightedSum({"f1": 1.0}))
     front = state.minimize(lambda X: ((X - 0.3) ** 2).sum(axis=1), BOX, evaluations=600, seed=1)
     assert len(front) == 1 and front.F[0, 0] < 0.01
-    box = BlackBox(lambda X: np.hstack([bent(X), np.ones((len(X), 1))]), BOX)
+    box = boxed(lambda X: np.hstack([bent(X), np.ones((len(X), 1))]), BOX)
     begun = MACS(prefer=MIDDLE).begin(box, 100, np.random.default_rng(0))
     assert len(begun.archive)
 

@@ -5,10 +5,10 @@ import copy
 import numpy as np
 import pytest
 from ascent import Ascent
+from boxes import boxed
 from fronts import distance_to_curve, inverted_distance, mean_distance
 from plain import dtlz, uf, zdt
 
-from macs.evaluation.blackbox import BlackBox
 from macs.pareto.dominance import dominates
 from macs.search.macs import MACS
 from problems.cases.goddard import reference
@@ -36,25 +36,25 @@ def test_the_budget_is_met_exactly(budget, settings):
         rows.append(len(X))
         return schaffer(X)
 
-    state = run(settings, BlackBox(function, [(-2, 2)] * 3), budget)
+    state = run(settings, boxed(function, [(-2, 2)] * 3), budget)
     assert sum(rows) == budget == state.evaluations
-    settings.advance(state, BlackBox(function, [(-2, 2)] * 3), 0)
+    settings.advance(state, boxed(function, [(-2, 2)] * 3), 0)
     assert sum(rows) == budget
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
-    first, again, other = (run(MACS(), BlackBox(schaffer, [(-2, 2)] * 4), 500, seed) for seed in (1, 1, 2))
+    first, again, other = (run(MACS(), boxed(schaffer, [(-2, 2)] * 4), 500, seed) for seed in (1, 1, 2))
     assert np.array_equal(first.archive.Z, again.archive.Z)
     assert np.array_equal(first.agents.velocity, again.agents.velocity)
     assert not np.array_equal(first.archive.F, other.archive.F)
 
 
 def test_the_state_is_all_there_is_to_go_on_from():
-    settings, box = MACS(), BlackBox(schaffer, [(-2, 2)] * 4)
+    settings, box = MACS(), boxed(schaffer, [(-2, 2)] * 4)
     state = settings.begin(box, 600, np.random.default_rng(0))
     while state.evaluations < 300:
         settings.advance(state, box, 600)
-    kept, other = copy.deepcopy(state), BlackBox(schaffer, [(-2, 2)] * 4)
+    kept, other = copy.deepcopy(state), boxed(schaffer, [(-2, 2)] * 4)
     kept.rng = np.random.default_rng(9)
     kept.rng.bit_generator.state = state.rng.bit_generator.state
     other.counts.evaluations = kept.evaluations
@@ -66,7 +66,7 @@ def test_the_state_is_all_there_is_to_go_on_from():
 
 
 def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
-    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
+    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = run(MACS(), box, 1000)
     assert len(state.archive) == 0
     assert len(state.closest) == 1
@@ -74,7 +74,7 @@ def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
 
 
 def test_from_infeasible_to_feasible():
-    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
+    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
     state = run(MACS(), box, 1500)
     assert len(state.archive) == 10
     assert len(state.closest) == 0
@@ -88,29 +88,29 @@ def test_failed_evaluations_never_enter_the_archive():
         F[X[:, 1] > 0.7, 0] = np.inf
         return F
 
-    state = run(MACS(), BlackBox(function, [(-2, 2)] * 3), 600)
+    state = run(MACS(), boxed(function, [(-2, 2)] * 3), 600)
     assert len(state.archive) == 10
     assert (state.archive.Z[:, 0] <= 0.3).all()
     assert np.isfinite(state.archive.F).all()
-    nothing = run(MACS(), BlackBox(lambda X: np.full((len(X), 2), np.nan), [(0, 1)] * 2), 300)
+    nothing = run(MACS(), boxed(lambda X: np.full((len(X), 2), np.nan), [(0, 1)] * 2), 300)
     assert len(nothing.archive) == 0
     assert nothing.evaluations == 300
 
 
 def test_one_objective():
-    state = run(MACS(), BlackBox(lambda X: ((X - 0.3) ** 2).sum(axis=1), [(-2, 2)] * 5), 2000)
+    state = run(MACS(), boxed(lambda X: ((X - 0.3) ** 2).sum(axis=1), [(-2, 2)] * 5), 2000)
     assert state.archive.F.shape == (1, 1)
     assert state.archive.F[0, 0] < 1e-4
 
 
 def test_an_objective_that_does_not_vary():
-    state = run(MACS(), BlackBox(lambda X: np.hstack([schaffer(X), np.ones((len(X), 1))]), [(-2, 2)] * 2), 500)
+    state = run(MACS(), boxed(lambda X: np.hstack([schaffer(X), np.ones((len(X), 1))]), [(-2, 2)] * 2), 500)
     assert len(state.archive) == 10
 
 
 def test_periodic_variables_cross_their_bounds():
     # optimal angles are around 0 = 1: half of them just below the upper bound, half just above the lower one
-    box = BlackBox(lambda X: np.stack([1 - np.cos(2 * np.pi * (X - c)).mean(axis=1) for c in (0.03, 0.97)], axis=1), [(0, 1)] * 6)
+    box = boxed(lambda X: np.stack([1 - np.cos(2 * np.pi * (X - c)).mean(axis=1) for c in (0.03, 0.97)], axis=1), [(0, 1)] * 6)
     box.period = np.ones(6)
     state = run(MACS(), box, 2000)
     X = (state.archive.Z + 0.5) % 1.0 - 0.5
@@ -119,7 +119,7 @@ def test_periodic_variables_cross_their_bounds():
 
 
 def test_the_best_of_each_objective_is_never_lost():
-    settings, box, best = MACS(agents=5, archive=3), BlackBox(schaffer, [(-2, 2)] * 3), np.full(2, np.inf)
+    settings, box, best = MACS(agents=5, archive=3), boxed(schaffer, [(-2, 2)] * 3), np.full(2, np.inf)
     state = settings.begin(box, 1000, np.random.default_rng(0))
     while state.evaluations < 1000:
         settings.advance(state, box, 1000)
@@ -132,19 +132,19 @@ def test_the_best_of_each_objective_is_never_lost():
 
 def test_a_start_is_evaluated_first_and_too_many_are_thinned():
     start = np.random.default_rng(3).uniform(-2, 2, (25, 3))
-    box = BlackBox(schaffer, [(-2, 2)] * 3)
+    box = boxed(schaffer, [(-2, 2)] * 3)
     state = MACS().begin(box, 100, np.random.default_rng(0), start)
     assert (state.evaluations, len(state.agents)) == (25, 10)
-    few = MACS().begin(BlackBox(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.zeros((1, 3)))
+    few = MACS().begin(boxed(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.zeros((1, 3)))
     assert few.evaluations == 10
     assert 0.0 in few.archive.F[:, 0]
-    outside = MACS().begin(BlackBox(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.full((12, 3), 5.0))
+    outside = MACS().begin(boxed(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.full((12, 3), 5.0))
     assert outside.agents.Z.max() == 2.0
 
 
 def test_of_too_many_starts_the_best_become_agents():
     def begun(start, agents):
-        box = BlackBox(lambda X: X, [(-9, 9)] * 2, constraints=lambda X: -X[:, 0] - 1)
+        box = boxed(lambda X: X, [(-9, 9)] * 2, constraints=lambda X: -X[:, 0] - 1)
         state = MACS(agents=agents, social=0).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
         return state.agents.Z.tolist()
 
@@ -161,11 +161,11 @@ def test_of_too_many_starts_the_best_become_agents():
 
 
 def test_more_objectives_than_points_and_no_budget_are_refused():
-    box = BlackBox(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
+    box = boxed(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
     with pytest.raises(ValueError, match="5 objectives, not 4"):
         MACS(archive=4).begin(box, 100, np.random.default_rng(0))
     with pytest.raises(ValueError, match="leaves none"):
-        MACS().begin(BlackBox(schaffer, [(-2, 2)]), 0, np.random.default_rng(0))
+        MACS().begin(boxed(schaffer, [(-2, 2)]), 0, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -213,9 +213,9 @@ def test_settings_of_the_paper():
     assert MACS().coordinates_to_scan(29, 0, 2, 10_000) == 29
     assert MACS().coordinates_to_scan(400, 0, 2, 10_000) == 62, "20 evaluations a coordinate, an eighth of the budget in all"
     assert MACS().coordinates_to_scan(29, 0, 2, 10) == 1
-    state = run(MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3), 600)
+    state = run(MACS.paper(), boxed(schaffer, [(-2, 2)] * 3), 600)
     assert len(state.archive) == 10
-    assert len(run(MACS.paper(archive=30), BlackBox(schaffer, [(-2, 2)] * 3), 900).archive) == 30
+    assert len(run(MACS.paper(archive=30), boxed(schaffer, [(-2, 2)] * 3), 900).archive) == 30
 
 
 def distances(problem, seeds, evaluations):
@@ -223,7 +223,7 @@ def distances(problem, seeds, evaluations):
     function, bounds, front = problem
     values = []
     for seed in seeds:
-        state = run(MACS(agents=10, archive=100), BlackBox(function, bounds), evaluations, seed)
+        state = run(MACS(agents=10, archive=100), boxed(function, bounds), evaluations, seed)
         values.append(mean_distance(front, state.archive.F))
     return values
 

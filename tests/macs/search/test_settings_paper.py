@@ -4,8 +4,8 @@ import copy
 
 import numpy as np
 import pytest
+from boxes import boxed
 
-from macs.evaluation.blackbox import BlackBox
 from macs.pareto.archive import Archive
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
@@ -19,7 +19,7 @@ def schaffer(X):
 
 def begun(settings, function=schaffer, d=3):
     """Settings at work on a function: its state, and the two phases of an iteration as functions."""
-    box = BlackBox(function, [(-2, 2)] * d)
+    box = boxed(function, [(-2, 2)] * d)
     state = settings.begin(box, 10_000, np.random.default_rng(0))
     trials = Trials(settings, state, box, 10_000)
     return (
@@ -37,7 +37,7 @@ def owned(state):
 
 
 def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
-    settings, box = MACS.paper(), BlackBox(schaffer, [(-2, 2)] * 3)
+    settings, box = MACS.paper(), boxed(schaffer, [(-2, 2)] * 3)
     state = settings.begin(box, 600, np.random.default_rng(0))
     first = owned(state)
     assert np.allclose(np.sort(first), np.arange(0, 91, 10))
@@ -102,7 +102,7 @@ def test_differential_evolution_leaves_none(settings):
 
 @pytest.mark.parametrize("settings", [MACS.paper(), MACS()])
 def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_direction(settings):
-    box = BlackBox(schaffer, [(-2, 2)] * 3)
+    box = boxed(schaffer, [(-2, 2)] * 3)
     state = settings.begin(box, 100, np.random.default_rng(0))
     state.archive = Archive(np.zeros((1, 3)), np.array([[0.0, 3.0]]), np.zeros(1))
     state.ideal = state.nadir = state.archive.F[0]
@@ -113,7 +113,7 @@ def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_d
 
 
 def test_without_feasible_points_no_agent_moves():
-    box = BlackBox(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
+    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = MACS.paper().begin(box, 100, np.random.default_rng(0))
     before = state.agents.Z.copy()
     assign(state, MACS.paper())

@@ -1,0 +1,195 @@
+"""Vector problems made of plain functions and of pymoo's problems."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective, Variable
+from problems.vector import CompiledVectorProblem
+
+SENSES = ("minimize", "maximize")
+
+Outputs = np.ndarray | tuple[np.ndarray, np.ndarray]
+
+
+def plain_problem(
+    function: Any,
+    bounds: Sequence | Mapping[str, Sequence[float]] | None = None,
+    *,
+    constraints: Callable[[np.ndarray], np.ndarray] | None = None,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+    senses: Sequence[str] | None = None,
+) -> CompiledVectorProblem:
+    """The vector problem of a plain vector function or a pymoo Problem, without a name.
+
+    Parameters
+    ----------
+    function : callable or pymoo Problem
+        `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN is a failed evaluation.
+    bounds : sequence of d pairs, pair of arrays (d,), or dict of pairs by name; None for a pymoo problem
+        Two sequences of more than two numbers each are (lower, upper); all else is a list of pairs.
+    constraints : callable, optional
+        `constraints(X: (n, d)) -> G: (n, c)`; G <= 0 is feasible. Its columns come after those of the function's own G.
+    names, units : sequences of m str, optional
+        Of the objectives. Default: "f1", "f2", ..., and no units.
+    senses : sequence of m of "minimize" or "maximize", optional
+        Default: all minimised.
+
+    Returns
+    -------
+    CompiledVectorProblem
+        Its variables are called as the keys of `bounds`, else "x1", "x2", ...; its `goals` are empty if nothing says how many there are.
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong type or shape; the message names it.
+    """
+    m: int | None = None
+    if _is_pymoo(function):
+        bounds = _pymoo_bounds(function) if bounds is None else bounds
+        m = int(function.n_obj)
+        function = _pymoo_function(function)
+    if not callable(function):
+        raise ValueError(f"function: must be callable or a pymoo Problem, not {type(function).__name__}")
+    if constraints is not None and not callable(constraints):
+        raise ValueError(f"constraints: must be callable, not {type(constraints).__name__}")
+    labels = {"names": _labels("names", names), "units": _labels("units", units), "senses": _labels("senses", senses)}
+    for sense in labels["senses"] or ():
+        if sense not in SENSES:
+            raise ValueError(f"senses: must be 'minimize' or 'maximize', not {sense!r}")
+    given = labels["names"]
+    if given and len(set(given)) < len(given):
+        raise ValueError(f"names: {', '.join(given)} has a name twice")
+    for name, words in labels.items():
+        if words is not None:
+            m = learned(m, len(words), f"{name} has {len(words)}")
+    variables, lower, upper = read_bounds(bounds)
+    sides = zip(variables, lower.tolist(), upper.tolist(), strict=True)
+    return CompiledVectorProblem(
+        name="",
+        variables=tuple(Variable(name, low, high, "", high - low) for name, low, high in sides),
+        goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
+        limits=None,
+        rows=PlainRows(function, constraints),
+    )
+
+
+def default_goals(
+    m: int, names: Sequence[str] | None = None, units: Sequence[str] | None = None, senses: Sequence[str] | None = None
+) -> tuple[Objective, ...]:
+    """m objectives: "f1", "f2", ..., without units and minimised, unless said otherwise."""
+    words = names or [f"f{k + 1}" for k in range(m)], units or [""] * m, senses or [SENSES[0]] * m
+    return tuple(Objective(*those) for those in zip(*words, strict=True))
+
+
+def learned(known: int | None, count: int, source: str) -> int:
+    """The number of objectives from `source`. Raises ValueError if it is known to be another."""
+    if count < 1 or (known is not None and known != count):
+        raise ValueError(f"objectives: {source}, {known or 'at least 1'} expected")
+    return count
+
+
+@dataclass(frozen=True)
+class PlainRows:
+    """A plain function, with constraints of its own or apart, as `problems.vector.Rows`."""
+
+    function: Callable[[np.ndarray], Outputs]
+    constraints: Callable[[np.ndarray], np.ndarray] | None
+
+    def __call__(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        given = X.copy()  # the function may change its own
+        outputs = self.function(X)
+        F, G = outputs if isinstance(outputs, tuple) and len(outputs) == 2 else (outputs, None)
+        values = _rows("function: the objectives", F, len(X))
+        columns = [] if G is None else [_rows("function: the constraints", G, len(X))]
+        if self.constraints is not None:
+            columns.append(_rows("constraints: what it returned", self.constraints(given), len(X)))
+        return values, np.hstack([np.empty((len(X), 0)), *columns])
+
+
+def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """Names (d,), lower and upper bounds (d,) from a sequence of pairs, a pair of sequences longer than two, or a dict of pairs by name.
+
+    Raises
+    ------
+    ValueError
+        If they are not pairs, not finite, reversed or empty; the message names the variable.
+    """
+    if bounds is None:
+        raise ValueError("bounds: missing")
+    names = tuple(str(name) for name in bounds) if isinstance(bounds, Mapping) else None
+    pairs = list(bounds.values()) if isinstance(bounds, Mapping) else list(bounds)
+    if not pairs:
+        raise ValueError("bounds: empty")
+    if names is None and len(pairs) == 2 and all(np.ndim(side) == 1 and len(side) > 2 for side in pairs):
+        if len(pairs[0]) != len(pairs[1]):
+            raise ValueError(f"bounds: {len(pairs[0])} lower and {len(pairs[1])} upper ones")
+        pairs = list(zip(*pairs, strict=True))
+    names = names or tuple(f"x{i + 1}" for i in range(len(pairs)))
+    limits = np.empty((len(pairs), 2))
+    for i, (name, pair) in enumerate(zip(names, pairs, strict=True)):
+        try:
+            limits[i] = np.asarray(pair, dtype=float).reshape(2)
+        except (TypeError, ValueError):
+            raise ValueError(f"bounds: variable '{name}' has {pair!r}, a pair (lower, upper) expected") from None
+        lower, upper = limits[i]
+        if not (np.isfinite(lower) and np.isfinite(upper) and np.isfinite(upper - lower)):
+            raise ValueError(f"bounds: variable '{name}' has ({lower:g}, {upper:g}), finite numbers expected")
+        if lower >= upper:
+            raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
+    return names, limits[:, 0].copy(), limits[:, 1].copy()
+
+
+def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The labels as a tuple; a single string is refused."""
+    if labels is None:
+        return None
+    if isinstance(labels, str) or not all(isinstance(label, str) for label in labels):
+        raise ValueError(f"{name}: must be a sequence of strings, one for each objective, not {labels!r}")
+    return tuple(labels)
+
+
+def _rows(what: str, values: Any, count: int) -> np.ndarray:
+    """Copy (count, k) of the values that a user's function returned for `count` points; (count,) counts as one column."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be an array of numbers, not {type(values).__name__}") from None
+    if array.shape == (count,):
+        array = array[:, None]
+    if array.ndim != 2 or len(array) != count:
+        raise ValueError(f"{what} have shape {array.shape} for {count} points, ({count}, k) expected")
+    return array
+
+
+def _is_pymoo(function: Any) -> bool:
+    """Whether this is a pymoo Problem, by its attributes, without importing pymoo."""
+    return all(hasattr(function, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
+
+
+def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
+    """Pairs of bounds of a pymoo Problem with real variables."""
+    lower, upper = problem.xl, problem.xu
+    if lower is None or upper is None or isinstance(lower, dict):
+        raise ValueError(f"bounds: pymoo problem {type(problem).__name__} has no bounds of real variables")
+    lower, upper = np.broadcast_to(lower, problem.n_var), np.broadcast_to(upper, problem.n_var)
+    return list(zip(lower.tolist(), upper.tolist(), strict=True))
+
+
+def _pymoo_function(problem: Any) -> Callable[[np.ndarray], Outputs]:
+    """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); of equality constraints G has the absolute values."""
+
+    def function(X: np.ndarray) -> Outputs:
+        out = problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
+        inequality, equality = out.get("G"), out.get("H")
+        columns = [] if inequality is None or not np.size(inequality) else [inequality]
+        columns += [] if equality is None or not np.size(equality) else [np.abs(equality)]
+        return (out["F"], np.hstack(columns)) if columns else out["F"]
+
+    return function

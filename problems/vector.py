@@ -1,0 +1,97 @@
+"""Compiled vector problems: named variables, objectives and limits, and one function of batches of rows, as plain data.
+
+Everything above this floor reads a vector problem through `CompiledVectorProblem`, whether a user stated it by name, as a plain function,
+or in another library.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .compiled import Limit, Objective, Variable
+
+FINGERPRINT_ROWS = 8
+"""Rows at which a function is evaluated for the fingerprint of its problem: few, since a row may take long."""
+
+
+def without_dynamics(name: str) -> str:
+    """The reason why a vector problem is refused where dynamics or derivatives are needed."""
+    return f"'{name}' is a vector problem, which has no dynamics and no derivatives"
+
+
+Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""`rows(X: (n, d)) -> (objectives (n, m) in the user's senses, values (n, c) that the limits bound)`."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompiledVectorProblem:
+    """A vector problem: what a search needs to know of a function without trajectories.
+
+    Attributes
+    ----------
+    name : str
+    variables : tuple of d Variables
+    goals : tuple of m Objectives
+        Empty: as many as the function returns, all minimised, without names.
+    limits : tuple of c Limits, or None
+        None: as many columns as the function returns, each at most 0, with a scale of 1.
+    rows : callable
+        See `Rows`. A row with NaN is a failed evaluation.
+    limit_units : tuple of c str
+    address, data
+        As of `CompiledProblem`.
+    """
+
+    name: str
+    variables: tuple[Variable, ...]
+    goals: tuple[Objective, ...]
+    limits: tuple[Limit, ...] | None
+    rows: Rows
+    limit_units: tuple[str, ...] = ()
+    address: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        variables, goals = (", ".join(one.name for one in group) for group in (self.variables, self.goals))
+        return f"CompiledVectorProblem('{self.name}', variables=[{variables}], objectives=[{goals}])"
+
+    def compile(self) -> CompiledVectorProblem:
+        """Itself: so that every function of a VectorProblem takes a compiled one as well."""
+        return self
+
+    @property
+    def signs(self) -> np.ndarray:
+        """+1 for a minimised, -1 for a maximised objective, (m,)."""
+        return np.array([goal.sign for goal in self.goals])
+
+    def evaluate(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Objectives (n, m), all minimised, and violations (n, c), at least 0, of rows (n, d).
+
+        A violation is the excess over a limit divided by the limit's scale. NaN where the function returned it.
+        """
+        values, bounded = self.rows(X.copy())
+        if self.goals and values.shape[1] != len(self.goals):
+            raise ValueError(f"objectives: function returned {values.shape[1]}, {len(self.goals)} expected")
+        F = values * self.signs if self.goals else values
+        if self.limits is None:
+            return F, np.maximum(bounded, 0.0)
+        lower, upper, scale = (np.array([getattr(limit, side) for limit in self.limits]) for side in ("lower", "upper", "scale"))
+        return F, np.maximum(np.maximum(lower - bounded, bounded - upper), 0.0) / scale
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A hash of names, bounds, senses, limits, and of the function's values at fixed rows, to nine digits: two problems with the same
+        one are the same. The function is evaluated at `FINGERPRINT_ROWS` rows for it, once."""
+        rng = np.random.default_rng(0)
+        lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
+        values = np.hstack(self.rows(rng.uniform(lower, upper, (FINGERPRINT_ROWS, len(lower)))))
+        digest = hashlib.sha256(repr(("vector", self.name, self.variables, self.goals, self.limits)).encode())
+        digest.update(" ".join(f"{value + 0.0:.8e}" if math.isfinite(value) else "not finite" for value in values.ravel()).encode())
+        return digest.hexdigest()[:32]
