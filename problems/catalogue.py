@@ -30,6 +30,10 @@ CASES: dict[str, tuple[str, str]] = {
         "problems.cases.skip_entry.smv:problem",
         "skip entry over a turning planet: flight time, heat load, terminal speed and mass",
     ),
+    "aerocapture": (
+        "problems.cases.aerocapture.coupled:problem",
+        "aerocapture at Mars, shapes of capsules at constant bank: inverse packing efficiency against heat shield",
+    ),
     "aerocapture_bank": (
         "problems.cases.aerocapture.bank:problem",
         "aerocapture at Mars by a bank profile, to a polar orbit: delta v against heat shield",
