@@ -52,7 +52,7 @@ BANK = (0.0, pi)
 Nothing is lost but local optima that roll over to the other side where there is little air."""
 EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
 MESH = {"edges": EDGES, "order": 4, "control_order": 1}
-"""Short elements where the air is dense: on 30 equal ones of order 3, an optimum that looks as good misses the apoapsis by 48 km when simulated."""
+"""Short elements where the air is dense: on 30 equal ones of order 3, an optimum that looks as good misses the apoapsis by 48 km."""
 
 
 def problem(
