@@ -34,7 +34,7 @@ OWN = "passage"
 DECLINATION, BANK_RATE = -20.0, 10.0
 """Of the arrival's velocity, deg; greatest rate of the bank angle, deg/s."""
 DECLINATIONS = (-60.0, -5.0)
-"""For which the capsule neither meets the pole in the air nor enters far from it. Others are mirror images, or turns about the axis."""
+"""Those with which the capsule meets no pole in the air, where longitudes are lost. The planet is round, so optima do not depend on it."""
 ENTRY_SPEED = PASSAGE.entry_speed
 STEEPEST = 0.05
 """Greatest path angle at the exit, rad: it ends the trade with the heat shield at a delta v of 100 m/s."""
@@ -52,7 +52,7 @@ BANK = (0.0, pi)
 Nothing is lost but local optima that roll over to the other side where there is little air."""
 EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
 MESH = {"edges": EDGES, "order": 4, "control_order": 1}
-"""Short elements where the air is dense: on as many equal ones, optima that look as good miss the apoapsis by 50 km when simulated."""
+"""Short elements where the air is dense: on 30 equal ones of order 3, an optimum that looks as good misses the apoapsis by 48 km."""
 
 
 def problem(
@@ -82,7 +82,8 @@ def problem(
     """
     design = _design(shape)
     checks.positive(bank_rate, "aerocapture_bank: the bank rate")
-    checks.within((declination, declination), DECLINATIONS, "aerocapture_bank: the declination")
+    direction = checks.number(declination, "aerocapture_bank: the declination")
+    checks.within((direction, direction), DECLINATIONS, "aerocapture_bank: the declination")
     planar = judged(design)
     limit = float(planar.shield[0]) if shield == OWN else checks.positive(shield, "aerocapture_bank: the heat shield")
     vehicle, nose = _capsule(design)

@@ -200,6 +200,7 @@ def test_table_3_is_beside_the_front(shape, above, heavier):
         ({"shape": (0.9, 0.2, 70.0, 5.0, 0.0)}, "not captured"),
         ({"bank_rate": 0.0}, "bank rate"),
         ({"declination": 20.0}, "declination"),
+        ({"declination": np.nan}, "declination"),
         ({"shield": -1.0}, "heat shield"),
     ],
 )
