@@ -15,7 +15,7 @@ from macs.gradient_solvers import Sweep
 from macs.solvers.checkpoint import Unreadable
 from problems import load
 from problems.cases import four_bar_truss
-from transcription import DFET
+from transcription import DFET, Collocation, SingleShooting
 
 
 @pytest.fixture(scope="module")
@@ -192,6 +192,9 @@ def test_what_needs_dynamics_or_derivatives_is_refused_in_one_line(front):
         lambda: optimize(problem),
         lambda: payoff(problem),
         lambda: sweep(problem, points=5),
+        lambda: DFET(2, 2).transcribe(problem),
+        lambda: SingleShooting(4).transcribe(problem),
+        lambda: Collocation(2, 2).transcribe(problem),
         lambda: decide(problem, ReferencePoint({"near": 1.0})),
         lambda: Dialogue(front, problem),
         front.refine_mesh,
