@@ -16,6 +16,8 @@ from .population import Members, PopulationSolver, State, distinct, evaluate, fu
 
 WAITING = -1
 """In place of a number of evaluations, as long as the swarm is not complete."""
+SETTLING = 20
+"""Iterations over which the mean of the front is compared, for `settled`."""
 
 
 @dataclass(repr=False)
@@ -32,12 +34,15 @@ class ParticleState(State):
         In spans of the variables.
     launched : int
         Number of evaluations after which the swarm was complete and began to move; -1 as long as first particles are drawn.
+    means : array (k, m)
+        Mean of the front after each of the last iterations of a swarm that moves, at most `SETTLING` and one.
     """
 
     best: Members
     leaders: Members
     velocity: np.ndarray
     launched: int
+    means: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class MOPSO(PopulationSolver):
 
     Each particle is attracted by its own best position and by a leader, a point of the archive. A roulette draws leaders, with preference
     for sparsely populated hypercubes of an adaptive grid; a full archive drops points of the most populated ones. The inertia decreases
-    linearly. A wrong sign in the velocity formula of the paper, eq. (22), is corrected; see `velocities`. For any number of objectives.
+    linearly. The signs in the velocity formula of the paper, eq. (22), are corrected; see `velocities`. For any number of objectives.
 
     With handling="feasible-first", the swarm begins with feasible particles only: candidates are drawn, one swarm at a time, until there
     are enough. They count as evaluations, and use at most the fraction `search` of the budget. After that, the least violated candidates
@@ -75,6 +80,13 @@ class MOPSO(PopulationSolver):
     search : float, default 0.2
         Fraction of the budget, in [0, 1], that may be spent on feasible first particles, the first swarm included. 0: the first swarm is
         used as it is drawn.
+    one_leader : bool, default False
+        Whether all particles follow the same leader in an iteration. Default: each has one of its own, as Coello Coello and others do.
+    printed : bool, default False
+        Whether eq. (22) is used as printed, with differences of the wrong sign: particles move away from what is to attract them.
+    settled : float, default 0
+        The search ends when the mean of the front is, in each objective, within this part of what it was after each of the last 20
+        iterations; `stats["stopped"]` is then "settled". 0: the budget is spent.
     handling, penalty, degree
         As for `NSGA2`. With "penalty" and "objective", the first swarm is used as it is drawn.
 
@@ -93,25 +105,28 @@ class MOPSO(PopulationSolver):
     social: float = 2.0
     max_velocity: float = 1.0
     search: float = 0.2
+    one_leader: bool = False
+    printed: bool = False
+    settled: float = 0.0
     handling: str = "feasible-first"
     penalty: float = 1000.0
     degree: str = "largest"
     _compares_violations = False
 
     def __post_init__(self) -> None:
-        weights = dict.fromkeys(("inertia", "final_inertia", "cognitive", "social"), "[0, inf)")
+        weights = dict.fromkeys(("inertia", "final_inertia", "cognitive", "social", "settled"), "[0, inf)")
         counts = {"particles": 1, "archive": 1, "cells": 1}
-        self._check(counts, {**weights, "max_velocity": "(0, 1]", "search": "[0, 1]"})
+        self._check(counts, {**weights, "max_velocity": "(0, 1]", "search": "[0, 1]"}, ("one_leader", "printed"))
 
     @classmethod
     def paper(cls, **overrides: Any) -> MOPSO:
-        """The settings of Armellin and Lavagna: 20 particles, an archive of 100, inertia from 1.4 to 0.4. `overrides` are settings of
-        MOPSO.
+        """The settings of Armellin and Lavagna: 20 particles, one leader in an iteration, an archive of 100, inertia from 1.4 to 0.4, an
+        end when the mean of the front has settled to 1 %. `overrides` are settings of MOPSO.
 
-        Differences that remain: theirs also ends when the mean of the front no longer changes, and limits neither the search for feasible
-        first particles nor the velocities.
+        Differences that remain: theirs limits neither the search for feasible first particles nor the velocities.
         """
-        return cls(**({"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4} | overrides))
+        theirs = {"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4, "one_leader": True, "settled": 0.01}
+        return cls(**(theirs | overrides))
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> ParticleState:
         """The state after a first swarm has been evaluated; see `SearchMethod.begin`."""
@@ -130,6 +145,7 @@ class MOPSO(PopulationSolver):
             leaders=swarm.take(np.arange(0)),
             velocity=np.zeros((len(swarm), len(evaluator.free))),
             launched=WAITING,
+            means=np.empty((0, swarm.F.shape[1])),
         )
         self._update(state, swarm, evaluator, budget)
         return state
@@ -160,11 +176,13 @@ class MOPSO(PopulationSolver):
         box, rng, tolerance, free = evaluator.box, state.rng, evaluator.tolerance, evaluator.free
         swarm, d = len(state.members), len(free)
         share = (evaluator.counts.evaluations - state.launched) / (budget - state.launched)
-        followed = roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), swarm, rng)
+        count = 1 if self.one_leader else swarm
+        followed = np.broadcast_to(roulette(hypercubes(self._goals(state.leaders, tolerance), self.cells), count, rng), swarm)
         chance, rebound, coin = rng.random((2, swarm, d)), -rng.random((swarm, d)), rng.random(swarm) < 0.5
 
         X, best, leaders = (box.to_unit(some.Z[:, free]) for some in (state.members, state.best, state.leaders.take(followed)))
-        weights = inertia(share, self.inertia, self.final_inertia), self.cognitive, self.social
+        sign = -1.0 if self.printed else 1.0
+        weights = inertia(share, self.inertia, self.final_inertia), sign * self.cognitive, sign * self.social
         V = velocities(box, X, state.velocity, best, leaders, weights=weights, chance=chance, largest=self.max_velocity)
         X, V = moved(box, X, V, rebound)
 
@@ -193,6 +211,15 @@ class MOPSO(PopulationSolver):
         complete = self.handling != "feasible-first" or state.all_feasible or spent >= int(self.search * budget)
         if state.launched == WAITING and complete:
             state.launched = spent
+        if state.launched != WAITING and len(state.archive):
+            state.means = np.vstack([state.means, state.archive.F.mean(axis=0)])[-SETTLING - 1 :]
+
+    def has_settled(self, state: ParticleState) -> bool:
+        """See `SearchMethod.has_settled`."""
+        if len(state.means) <= SETTLING:
+            return False
+        now = state.means[-1]
+        return bool((np.abs(state.means - now) < self.settled * np.abs(now)).all())
 
     def _goals(self, points: Members, tolerance: float) -> np.ndarray:
         """Objectives (n, m) that include the violation; see `constraints.by_objectives`."""

@@ -35,7 +35,8 @@ from ..pareto import archive as archives
 from ..pareto.archive import Archive, Guide
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import ranges
-from .polish import CountedSolves, polish
+from .counted import CountedSolves
+from .polish import polish
 
 KEPT_INSIDE = "kept inside its limits, so that it is feasible when simulated"
 """Note of a point that was solved with tightened limits."""

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
+from ..evaluation.evaluator import CONVERGED
 from ..pareto import archive as archives
 from ..pareto.archive import Archive, Guide
-from ..pareto.directions import across, divisions_below, simplex_lattice
 from ..pareto.dominance import extremes
 from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
-
-PLACES = 500
-"""Largest number of places that cover a surface."""
-
-
-CLOSER = (1 / 3, 1 / 9)
-"""With a guide, the places are around its first anchor instead, at these parts of the distances: its region may be small, it may lie beyond
-the simplex between the ends, and far from known points it is not known where it ends."""
-
+from .counted import CountedSolves
+from .surface import cover
 
 FAIR, LOSS = 1e-4, 0.05
 """Gain in its own objective, in its range, for which an end of the front may be replaced by a point that is far worse in another; what
@@ -83,7 +73,9 @@ def polish(
         return archive
     solved = np.empty((0, archive.F.shape[1])) if optima is None else optima
     if archive.F.shape[1] > CURVE:
-        archive, solved = _cover(archive, solves, solved, limit, exponent, guide)
+        ends = _ends(archive, ranges(archive.F), solves, solved)
+        surface = cover(archive, ends, solves, limit, guide)
+        archive, solved = _thinned(surface.points(), limit, exponent, guide), np.vstack([solved, surface.solved])
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
@@ -143,49 +135,6 @@ def _descend(
 def _among(F: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Mask (n,) of the rows of F (n, m) that are rows of `known` (k, m)."""
     return (F[:, None] == known).all(axis=2).any(axis=1)
-
-
-def _cover(
-    archive: Archive, solves: CountedSolves, solved: np.ndarray, limit: int, exponent: float | None, guide: Guide | None
-) -> tuple[Archive, np.ndarray]:
-    """The points with the ends of the front, and results of solves to `limit` places between them: always the place farthest from all known
-    points. With a guide all solves go to places around the point that it puts first, and distances are multiplied by the factors that are
-    expected there. Also the objectives (k, m) of what these and earlier solves found."""
-    m, span = archive.F.shape[1], ranges(archive.F)
-    ends = _ends(archive, span, solves, solved)
-    pool = _front(ends.joined(archive), span)
-    ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
-    between = np.where(between > 0.0, between, span)
-    known, solved = across((ends.F - ideal) / between), np.vstack([solved, ends.F])
-    lattice = simplex_lattice(m, divisions_below(m, PLACES)) @ known
-    for k in range(max(limit, solves.left)):
-        # As long as it says nothing, the search is even.
-        guided = guide is not None and np.ptp(guide.factors(pool.F, pool.F)) > 0.0
-        if solves.left <= 0 or (k >= limit and not guided):
-            break
-        places, wanted = lattice, np.ones(len(lattice))
-        if guide is not None and guided:
-            best = across((pool.F[guide.anchors(pool.F)[:1]] - ideal) / between)
-            places = np.vstack([best + closer * (lattice - lattice.mean(axis=0)) for closer in CLOSER])
-            wanted = guide.factors(pool.F, ideal + between * _raised(places, (pool.F - ideal) / between))
-        apart = wanted * np.linalg.norm(places[:, None] - known, axis=2).min(axis=1)
-        place = places[np.argmax(apart)]
-        reference = ideal + between * place
-        start = np.argmin(((pool.F - reference) / between).max(axis=1))
-        found = solves(pool.Z[start : start + 1], reference[None], between[None])
-        known = np.vstack([known, place])
-        if solves.feasible(found)[0]:
-            known = np.vstack([known, across((found.F - ideal) / between)])
-            pool = Archive.of(found, np.arange(1)).joined(pool)
-        # What ran out of iterations is to go on.
-        solved = np.vstack([solved, found.F[found.status == CONVERGED]])
-    return _thinned(_front(pool, between), limit, exponent, guide), solved
-
-
-def _raised(places: np.ndarray, front: np.ndarray) -> np.ndarray:
-    """Where the diagonals from places (k, m) are expected to meet a front (n, m): as far up as its point nearest to the diagonal."""
-    beneath = np.linalg.norm(places[:, None] - across(front), axis=2).argmin(axis=1)
-    return places + front.mean(axis=1)[beneath, None]
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.ndarray) -> Archive:
@@ -266,92 +215,3 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
 def _front(points: Archive, span: np.ndarray) -> Archive:
     """The points that are non-dominated and `distinct`."""
     return points.take(distinct(points.F, span))
-
-
-@dataclass
-class PolishLog:
-    """Results of the first k solves of a polish, which can be continued with them.
-
-    Attributes
-    ----------
-    archive : Archive
-        The archive before the polish.
-    Z, F, violation, status : arrays (k, D), (k, m), (k,), (k,)
-        Results in the order of the solves; see `Evaluation`.
-    """
-
-    archive: Archive
-    Z: np.ndarray
-    F: np.ndarray
-    violation: np.ndarray
-    status: np.ndarray
-
-    @classmethod
-    def of(cls, archive: Archive) -> PolishLog:
-        """The log of a polish that begins with this archive."""
-        return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
-
-    def __len__(self) -> int:
-        return len(self.F)
-
-    def add(self, found: Evaluation) -> None:
-        """Append the results of further solves."""
-        self.Z, self.F = np.vstack([self.Z, found.Z]), np.vstack([self.F, found.F])
-        self.violation, self.status = np.append(self.violation, found.violation), np.append(self.status, found.status)
-
-    def take(self, rows: slice) -> Evaluation:
-        """The results of the solves `rows`."""
-        return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
-
-
-class CountedSolves:
-    """Gradient solves up to a number. After a request to end early no more are made.
-
-    Parameters
-    ----------
-    evaluator : Evaluator
-    left : int
-        Largest number of solves.
-    log : PolishLog, optional
-        The solves in it are not made again; all further solves are added to it.
-
-    Attributes
-    ----------
-    left : int
-        Number of solves that may still be made; 0 after a request to end early.
-    stopped : bool
-        Whether the work was asked to end while solves were left.
-    """
-
-    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None) -> None:
-        self._evaluator, self._log = evaluator, log
-        self._made = 0
-        self.left, self.stopped = left, False
-
-    def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """The results of `Evaluator.descend`; rows beyond the number of solves have failed."""
-        Z, F = np.array(starts), np.full(references.shape, np.nan)
-        violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
-        for row in range(max(min(len(starts), self.left), 0)):
-            one = slice(row, row + 1)
-            found = self._solve(starts[one], references[one], weights[one])
-            if not len(found.F):
-                self.left, self.stopped = 0, True
-                break
-            self.left -= 1
-            Z[one], F[one], violation[one], status[one] = found.Z, found.F, found.violation, found.status
-        return Evaluation(Z, F, violation, status)
-
-    def feasible(self, found: Evaluation) -> np.ndarray:
-        """Mask (k,) of the feasible results: those that ran out of iterations may be, too."""
-        return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
-
-    def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """The result of the next solve, one row, from the log or made now; no row if asked to end early."""
-        made, self._made = self._made, self._made + 1
-        if self._log is not None and made < len(self._log):
-            return self._log.take(slice(made, made + 1))
-        found = self._evaluator.descend(start, reference, weights)
-        if self._log is not None:
-            self._log.add(found)
-        return found

@@ -21,8 +21,9 @@ from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
+from ..gradients.counted import CountedSolves, PolishLog
 from ..gradients.front_polish import polished
-from ..gradients.polish import CountedSolves, PolishLog, polish
+from ..gradients.polish import polish
 from ..pareto import archive as archives
 from ..pareto import directions
 from ..pareto.archive import Archive, Guide

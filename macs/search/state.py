@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..gradients.polish import PolishLog
+from ..gradients.counted import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive

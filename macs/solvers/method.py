@@ -52,6 +52,10 @@ class SearchMethod(ABC):
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
         """Do one iteration within the budget of evaluations; changes `state`."""
 
+    def has_settled(self, state: Any) -> bool:
+        """Whether the search is to end before its budget is spent, by the state alone; most solvers go on."""
+        return False
+
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
         """Do what follows the last evaluation of a search that was not stopped, such as a polish; most solvers do nothing.
 

@@ -25,7 +25,7 @@ from .progress import Progress, SearchDisplay
 
 IDLE_ITERATIONS = 100
 """Number of successive iterations without any evaluation after which a search ends."""
-ENDED = ("budget", "idle")
+ENDED = ("budget", "idle", "settled")
 """Values of `stats["stopped"]` for a run that ended without being stopped."""
 
 
@@ -72,8 +72,8 @@ class SearchRun:
         Returns
         -------
         Front
-            Its `stats["stopped"]` is the reason for the end of the run: "budget", "interrupted", "time limit", "callback", or "idle" if
-            nothing was left to evaluate.
+            Its `stats["stopped"]` is the reason for the end of the run: "budget", "interrupted", "time limit", "callback", "settled" if the
+            method says so, or "idle" if nothing was left to evaluate.
         """
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs())
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
@@ -115,7 +115,7 @@ class SearchRun:
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         try:
-            while counts.evaluations < self.budget and self._idle < IDLE_ITERATIONS:
+            while counts.evaluations < self.budget and self._idle < IDLE_ITERATIONS and not self.solver.has_settled(self._state):
                 spent = counts.evaluations
                 self.solver.advance(self._state, self.evaluator, self.budget)
                 self._idle = self._idle + 1 if counts.evaluations == spent else 0
@@ -129,7 +129,9 @@ class SearchRun:
             return str(reason)
         if self._cut_short():
             return self._interrupts.reason
-        return "idle" if counts.evaluations < self.budget else "budget"
+        if counts.evaluations >= self.budget:
+            return "budget"
+        return "settled" if self.solver.has_settled(self._state) else "idle"
 
     def _show(self) -> Progress:
         progress = self._progress()

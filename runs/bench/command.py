@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import density, inner, methods, peers, population, prefer, search, standard, study
+from . import density, inner, methods, passages, peers, population, prefer, search, standard, study
 from .measured import Row, save
 
 BENCHMARKS = {
     "density": density,
     "inner": inner,
     "methods": methods,
+    "passages": passages,
     "peers": peers,
     "population": population,
     "prefer": prefer,
@@ -53,6 +54,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
+        "passages": lambda: passages.bench_passages(rows, passages.QUICK if quick else passages.Effort()),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "prefer": lambda: prefer.bench_prefer(rows, QUICK_SEEDS if quick else SEEDS, quick),

@@ -22,8 +22,8 @@ from problems import Problem, load
 from problems.cases.standard.phases import delta_iii as launcher
 from transcription import parse
 
-from . import peers_rockit
 from .measured import Column, Row, short, table
+from .rivals import by_rockit
 
 OURS, YAPSS, ROCKIT = "MACS", "YAPSS", "rockit"
 ASKED = "at most 1.5"
@@ -96,12 +96,12 @@ def _standard(name: str, **data: bool) -> Callable[[], Problem]:
 EXAMPLES = (
     Example("Delta III", delta_iii, "dfet:5x4", "delta_iii_ascent"),
     Example("minimum time to climb", _standard("climb"), "dfet:15x4", "minimum_time_to_climb"),
-    Example("Goddard, one phase", goddard, "dfet:20x4", "goddard_problem_1_phase", rockit=peers_rockit.goddard),
+    Example("Goddard, one phase", goddard, "dfet:20x4", "goddard_problem_1_phase", rockit=by_rockit.goddard),
     Example("Goddard, three phases", _standard("sounding_rocket", constrained=True), "dfet:6x4", "goddard_problem_3_phase"),
-    Example("orbit raising", _standard("orbit_raising"), "dfet:15x4", "orbit_raising", rockit=peers_rockit.orbit_raising),
+    Example("orbit raising", _standard("orbit_raising"), "dfet:15x4", "orbit_raising", rockit=by_rockit.orbit_raising),
     Example("dynamic soaring", _standard("dynamic_soaring"), "dfet:20x4", "dynamic_soaring"),
-    Example("isoperimetric", _standard("isoperimetric"), "dfet:10x4", "isoperimetric", rockit=peers_rockit.isoperimetric),
-    Example("Newton's nose", _standard("newton_nose"), "dfet:10x4", "newton", "setup2", rockit=peers_rockit.newton),
+    Example("isoperimetric", _standard("isoperimetric"), "dfet:10x4", "isoperimetric", rockit=by_rockit.isoperimetric),
+    Example("Newton's nose", _standard("newton_nose"), "dfet:10x4", "newton", "setup2", rockit=by_rockit.newton),
 )
 
 

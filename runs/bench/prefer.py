@@ -161,8 +161,11 @@ SKIP = "dfet:6x4:bernstein:1"
 """A coarse mesh, on which a gradient solve takes a tenth of the time."""
 ENTRY = "dfet:8x4:bernstein:1"
 """Likewise."""
+DESCENT = "dfet:12x3:bernstein:1"
+"""Likewise."""
 RANGE = ReferencePoint({"cross-range": 28.0, "heat load": 80.0, "oscillation": 0.2, "peak heating rate": 85.0})
 MASS = ReferencePoint({"terminal mass": 65e3, "terminal speed": 6500.0})
+CARGO = ReferencePoint({"flight time": 580.0, "heat load": 60.0, "terminal speed": 5700.0, "terminal mass": 60e3})
 SPEED = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 CASES = (
     Guided("zdt1", partial(black_box, zdt1), partial(curve, 0.5), ReferencePoint({"f1": 0.2, "f2": 0.2}), 3000, True),
@@ -181,6 +184,8 @@ CASES = (
         archive=20,
         known=False,
     ),
+    # This region is a piece of a space of three dimensions: twenty points of the survey, each the best to add, leave a quarter of it.
+    Guided("smv", partial(flights, "smv", DESCENT), partial(surveyed, "smv", DESCENT, CARGO), CARGO, 2000, archive=40, known=False),
 )
 
 

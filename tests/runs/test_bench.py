@@ -19,7 +19,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, density, inner, methods, population, prefer, search, standard, study
+from runs.bench import command, density, inner, methods, passages, population, prefer, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.measured import Row, short
 from runs.cli import main
@@ -62,11 +62,23 @@ def small(monkeypatch):
     monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
     monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
+    monkeypatch.setattr(command.passages, "QUICK", passages.Effort(rounds=1, coefficients=2, rows=20))
     monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
     monkeypatch.setattr(search.bench_search, "__defaults__", (search.CASES,))
+
+
+def test_passages_side_by_side():
+    """All contenders solve the same problem, to what they are asked for."""
+    rows: list[Row] = []
+    passages.bench_passages(rows, passages.Effort(rounds=1, coefficients=3, rows=30))
+    assert [row.who for row in rows] == [*passages.RIVALS, passages.SINGLY, passages.TOGETHER, passages.TABLE]
+    errors = {row.who: row.of("error") for row in rows}
+    assert max(errors[who] for who in (passages.SINGLY, passages.TOGETHER, passages.TABLE)) < 1e-9
+    assert errors["solve_bvp, 1e-8"] < errors["solve_bvp, 1e-6"] < 1e-6
+    assert "asked at least 200 times" in passages.report(rows)
 
 
 def test_inner_levels_side_by_side():
@@ -234,8 +246,8 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "POPULATIONS", "PREFERENCES", "SEARCHES", "PUBLISHED PROBLEMS", "STUDIES")
-    places = [said.out.index(words) for words in (*titles, f"values in {path}")]
+    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "PASSAGES", "POPULATIONS", "PREFERENCES", "SEARCHES")
+    places = [said.out.index(words) for words in (*titles, "PUBLISHED PROBLEMS", "STUDIES", f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
     assert "in one call, without a compiler: asked at least 2500 candidates a second, at best " in said.out
@@ -246,6 +258,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
         "density",
         "inner",
         "methods",
+        "passages",
         "peers",
         "population",
         "prefer",
@@ -287,7 +300,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "density, inner, methods, peers, population, prefer, search, standard"]),
+        (["bench", "studies"], ["studies", "study", "density, inner, methods, passages, peers, population, prefer, search, standard"]),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],

@@ -231,7 +231,49 @@ def test_inside_the_box_it_is_better_than_mopso_cd() -> None:
 
 
 def test_the_paper_s_settings() -> None:
-    assert MOPSO.paper(cells=10) == MOPSO(particles=20, archive=100, cells=10, inertia=1.4, final_inertia=0.4, cognitive=2, social=2)
+    common = {"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4, "cognitive": 2, "social": 2}
+    assert MOPSO.paper(cells=10) == MOPSO(**common, cells=10, one_leader=True, settled=0.01)
+
+
+def test_a_search_ends_when_the_mean_of_the_front_has_settled(tmp_path) -> None:
+    bounds, limit = [(-4.0, 4.0)], 200_000
+    loose = MOPSO(particles=20, settled=0.05).minimize(schaffer, bounds, evaluations=limit, seed=1)
+    assert loose.stats["stopped"] == "settled" and loose.stats["reproducible"]
+    assert 21 * 20 <= loose.stats["evaluations"] < limit
+    # A budget that is just enough: the same iterations but for the inertia, which depends on the share of the budget.
+    tight = MOPSO(particles=20, settled=0.05).minimize(schaffer, bounds, evaluations=21 * 20, seed=1)
+    assert tight.stats["stopped"] == "budget"
+    never = MOPSO(particles=20).minimize(schaffer, bounds, evaluations=2000, seed=1)
+    assert never.stats["stopped"] == "budget" and never.stats["evaluations"] == 2000
+    again = MOPSO(particles=20, settled=0.05).minimize(schaffer, bounds, evaluations=limit, seed=1, checkpoint=tmp_path / "run")
+    more = MOPSO(particles=20, settled=0.05).minimize(schaffer, bounds, evaluations=limit, seed=1, checkpoint=tmp_path / "run")
+    assert np.array_equal(again.F, loose.F) and np.array_equal(more.F, loose.F) and more.stats["stopped"] == "settled"
+
+
+def test_with_the_printed_sign_particles_move_away() -> None:
+    bounds = [(-4.0, 4.0)] * 4
+    found = {
+        printed: MOPSO(particles=20, printed=printed).minimize(sphere, bounds, evaluations=2000, seed=3).F for printed in (False, True)
+    }
+    assert found[False].sum(axis=1).min() + 1.0 < found[True].sum(axis=1).min()
+
+
+def sphere(X: np.ndarray) -> np.ndarray:
+    """Squared distances from two points; the front is the line between them."""
+    return np.stack([((X - 1.0) ** 2).sum(axis=1), ((X + 1.0) ** 2).sum(axis=1)], axis=1)
+
+
+def test_one_leader_is_followed_by_all_particles(monkeypatch) -> None:
+    counts = []
+
+    def counted(cube, count, rng):
+        counts.append(count)
+        return roulette(cube, count, rng)
+
+    monkeypatch.setattr("macs.baselines.mopso.roulette", counted)
+    for one in (True, False):
+        MOPSO(particles=20, one_leader=one).minimize(schaffer, [(-4.0, 4.0)], evaluations=100, seed=1)
+    assert counts == [1] * 4 + [20] * 4
 
 
 def srn(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

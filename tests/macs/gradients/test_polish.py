@@ -11,7 +11,8 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
-from macs.gradients.polish import CountedSolves, _ends, _helped_by_neighbours, polish
+from macs.gradients.counted import CountedSolves
+from macs.gradients.polish import _ends, _helped_by_neighbours, polish
 from macs.pareto.archive import Archive
 from macs.preferences import ReferencePoint
 from macs.search.gradient_action import allowed

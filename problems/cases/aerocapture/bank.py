@@ -1,0 +1,178 @@
+"""The bank profile of a given capsule, from the hyperbola to a polar orbit: the burn at the apoapsis against the heat shield.
+
+Armellin and Lavagna (see `mars`), section 5: the motion over a round planet, eq. (5) with drag that slows down; the capsule and its angle
+of attack are given; bank and plane of the entry are free. Eq. (26) is read as the arc cosine of the angular momentum's component over its
+size, and with the size of the eccentricity vector, not its square.
+
+The paper does not print the direction of the arrival, the limit of the bank rate, nor whether Mars turns. Chosen here: a declination of -20
+deg, 10 deg/s, and no turning. The capsule then enters over the north, past the pole, and flies south.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, pi, radians, sin
+
+import numpy as np
+
+from ... import checks
+from ...phase import Phase
+from ...problem import Problem
+from ..winged import STATES, UNITS, Winged
+from .aerodynamics import MASS, lift_and_drag
+from .designs import Designs, judged, shapes_of
+from .figures import plot, track
+from .heating import allowed_load, heating_rate, shield_fraction
+from .mars import EXIT_SPEED, MARS, circularisation
+from .orbits import apoapsis, arrival, since_arrival
+from .passage import PASSAGE, profile
+from .printed import TABLE_2
+
+__all__ = ["plot", "problem", "track"]
+
+OWN = "passage"
+DECLINATION, BANK_RATE = -20.0, 10.0
+"""Of the arrival's velocity, deg; greatest rate of the bank angle, deg/s."""
+DECLINATIONS = (-60.0, -5.0)
+"""Those with which the capsule meets no pole in the air, where longitudes are lost. The planet is round, so optima do not depend on it."""
+ENTRY_SPEED = PASSAGE.entry_speed
+STEEPEST = 0.05
+"""Greatest path angle at the exit, rad: it ends the trade with the heat shield at a delta v of 100 m/s."""
+DURATION = (150.0, 2000.0)
+BOUNDS = {
+    "altitude": (15e3, MARS.interface),
+    "longitude": (-1.5, 1.5),
+    "latitude": (radians(-80.0), radians(85.0)),
+    "speed": (2500.0, 7200.0),
+    "flight-path angle": (-0.5, 0.3),
+    "heading": (0.5 * pi, 1.5 * pi),
+}
+BANK = (0.0, pi)
+"""To one side: altitude, speed and path angle depend on the cosine alone, and the plane of the entry makes up for what turns the heading.
+Nothing is lost but local optima that roll over to the other side where there is little air."""
+EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
+MESH = {"edges": EDGES, "order": 4, "control_order": 1}
+"""Short elements where the air is dense: on 30 equal ones of order 3, an optimum that looks as good misses the apoapsis by 48 km."""
+
+
+def problem(
+    *,
+    shape: int | Sequence[float] = 2,
+    shield: float | str = OWN,
+    declination: float = DECLINATION,
+    bank_rate: float = BANK_RATE,
+) -> Problem:
+    """The case.
+
+    Parameters
+    ----------
+    shape : int or five numbers
+        Number of a solution of Table 2, or the five variables of `designs.BOUNDS`.
+    shield : float or "passage"
+        Largest heat shield, % of the mass; "passage": that of the same capsule's passage at constant bank, as in the paper.
+    declination : float
+        Of the velocity with which the capsule arrives from far away, deg.
+    bank_rate : float
+        Greatest rate of the bank angle, deg/s.
+
+    Raises
+    ------
+    ValueError
+        For a shape that is no capsule or cannot be captured, and data that make no sense.
+    """
+    design = _design(shape)
+    checks.positive(bank_rate, "aerocapture_bank: the bank rate")
+    direction = checks.number(declination, "aerocapture_bank: the declination")
+    checks.within((direction, direction), DECLINATIONS, "aerocapture_bank: the declination")
+    planar = judged(design)
+    limit = float(planar.shield[0]) if shield == OWN else checks.positive(shield, "aerocapture_bank: the heat shield")
+    vehicle, nose = _capsule(design)
+    most = 1e-3 * float(allowed_load(limit))
+    problem = Problem("aerocapture_bank")
+    phase = problem.phase("atmosphere", t0=0.0, tf=DURATION)
+    initial = {"altitude": MARS.interface, "speed": ENTRY_SPEED, "flight-path angle": (-0.4, -0.05)}
+    final = {"altitude": MARS.interface, "flight-path angle": (0.0, STEEPEST), "heading": pi}
+    states = {
+        name: phase.state(name, bounds=BOUNDS[name], initial=initial.get(name), final=final.get(name), unit=UNITS.get(name, "rad"))
+        for name in STATES
+    }
+    bank = phase.state("bank angle", bounds=BANK, unit="rad")
+    rate = phase.control("bank rate", bounds=(-radians(bank_rate), radians(bank_rate)), unit="rad/s")
+    # A state, as in the paper: a power of an integral would have second derivatives by all variables at once.
+    heat = phase.state("heat load", bounds=(0.0, 2.0 * most), initial=0.0, unit="kJ/cm2")
+    heating = heating_rate(vehicle.air(states["altitude"]), states["speed"], nose)
+    phase.dynamics(**vehicle.rates(states, 0.0, bank, MASS), **{"bank angle": rate, "heat load": 1e-3 * heating})
+    begins, ends = ({name: of(symbol) for name, symbol in states.items()} for of in (phase.initial, phase.final))
+    for name, expression in arrival(begins, declination, MARS).items():
+        problem.constraint(name, expression, lower=0.0, upper=0.0)
+    problem.constraint("apoapsis", apoapsis(ends, MARS) / 1e3, lower=MARS.target / 1e3, upper=MARS.target / 1e3, scale=100.0)
+    load = phase.final(heat)
+    problem.constraint("heat shield", load, upper=most, scale=most)
+    problem.minimize("delta v", circularisation(ends["speed"]), unit="m/s")
+    problem.minimize("TPS mass fraction", shield_fraction(1e3 * load), unit="%")
+    _guess(phase, planar, nose, most, declination)
+    problem.default_transcription = {
+        "method": "DFET",
+        "settings": {"elements": len(EDGES) - 1, "order": 4, "control_order": 1, "basis": "bernstein", "mesh": {phase.name: MESH}},
+    }
+    problem.default_evaluations, problem.default_inner, problem.default_start = 1_000, "propagate", "smooth"
+    return problem
+
+
+def _design(shape: int | Sequence[float]) -> np.ndarray:
+    """The five variables (1, 5) of a capsule that can be captured."""
+    if isinstance(shape, int | np.integer):
+        if int(shape) not in TABLE_2:
+            raise ValueError(f"aerocapture_bank: there is no solution {shape} of Table 2; there are {', '.join(map(str, TABLE_2))}")
+        shape = TABLE_2[int(shape)].design
+    if not isinstance(shape, Sequence | np.ndarray):
+        raise ValueError(f"aerocapture_bank: a shape is the number of a solution of Table 2 or five variables, not {shape!r}")
+    values = [checks.number(value, "aerocapture_bank: a variable of the shape") for value in shape]
+    if len(values) != 5:
+        raise ValueError(f"aerocapture_bank: a shape has five variables, not {len(values)}")
+    design = np.array([values])
+    reason = judged(design).reason[0]
+    if reason:
+        raise ValueError(f"aerocapture_bank: the shape {shape}: {reason}")
+    return design
+
+
+def _capsule(design: np.ndarray) -> tuple[Winged, float]:
+    """What flies, whose coefficients do not change with the angle of attack, for that is trimmed; and its nose radius, m."""
+    shapes, attack = shapes_of(design)
+    lift, drag = lift_and_drag(shapes, attack)
+    surface = MARS.density * exp(MARS.interface / MARS.scale_height)
+    vehicle = Winged(
+        radius=MARS.radius,
+        mu=MARS.mu,
+        density=surface,
+        scale_height=MARS.scale_height,
+        area=float(shapes.area[0]),
+        lift=(float(lift[0]),),
+        drag=(float(drag[0]),),
+        # Heating is that of `heating`.
+        heating=(0.0,),
+        heating_constant=0.0,
+    )
+    return vehicle, float(shapes.nose[0])
+
+
+def _guess(phase: Phase, design: Designs, nose: float, most: float, declination: float) -> None:
+    """The passage at constant bank. Its heading turns with the speed that is lost, dpsi/dx = L/D sin(bank) / 2, so that it ends polar."""
+    bank, ratio = float(design.bank[0]), float(design.lift_to_drag[0])
+    planar = profile(float(design.ballistic[0]))
+    time, lost = planar.time, 2.0 * np.log(planar.speed / EXIT_SPEED)
+    heading = pi - 0.5 * ratio * sin(bank) * lost
+    flown = since_arrival(MARS.entry_radius, ENTRY_SPEED, float(planar.path_angle[0]), MARS) + planar.ground
+    latitude = pi + radians(declination) - flown
+    ahead = np.concatenate([[0.0], np.cumsum(0.5 * (np.sin(heading[1:]) + np.sin(heading[:-1])) * np.diff(planar.ground))])
+    phase.guess(
+        tf=float(time[-1]),
+        altitude=(time, np.clip(planar.altitude, *BOUNDS["altitude"])),
+        longitude=(time, ahead - ahead[-1]),
+        latitude=(time, latitude),
+        speed=(time, planar.speed),
+        heading=(time, np.clip(heading, *BOUNDS["heading"])),
+        **{"flight-path angle": (time, planar.path_angle), "bank angle": bank, "bank rate": 0.0},
+        **{"heat load": (time, np.clip(1e-3 * planar.heat / nose**0.5, 0.0, most))},
+    )

@@ -1,0 +1,313 @@
+"""The way through the air at a constant bank angle, from a hyperbola to an ellipse: a boundary value problem, for many capsules at once.
+
+Armellin and Lavagna (see `mars`), eqs. (6)-(11), with two slips mended: eq. (9) is eps = sqrt(r_e / beta) rho_e S C_D / m, and lift grows
+with the density y in eqs. (10) and (11). With z = ln y in place of y,
+
+    dz/ds = -k sin g,  dx/ds = eps e^z + 2 (delta / k) e^x sin g,  dg/ds = (eps / 2) u e^z + (1 - delta e^x) cos g / k,
+
+k = sqrt(beta r_e), x = 2 ln(v_e / v), and u = (C_L / C_D) cos(bank). The exit is known completely, so the path is followed from there, and
+only u and the whole arc are unknown: z = x = 0 at the entry decides them. All that is asked of a passage depends on the ballistic
+coefficient alone. Newton's method solves it on collocation at Gauss-Lobatto nodes: the states inside of the intervals are eliminated, then
+those between them. Every ballistic coefficient takes Newton steps of its own: it makes no difference which others are solved with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from transcription.numerics.polynomials import lagrange_integrals, monomials, nodes
+
+from .heating import heating_rate
+from .mars import ARRIVAL_SPEED, EXIT_SPEED, MARS, Mars, entry_speed, exit_angle
+
+RANGE = (5.0, 4000.0)
+"""Ballistic coefficients for which passages are solved, kg/m2; those of the paper's capsules are 45 to 300."""
+STEPS = 40
+"""Most Newton steps; 4 to 7 are usual."""
+TOLERANCE = 1e-6
+"""Of the last step, in shares of what one may change at most. Newton's method squares errors, so what is left is near rounding."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Statement of the boundary value problem, and the mesh on which it is solved.
+
+    Attributes
+    ----------
+    mars : Mars
+    arrival_speed, exit_speed : float
+        Excess speed of the hyperbola, and speed at which the air is left, m/s.
+    intervals, degree : int
+        Of the collocation.
+    """
+
+    mars: Mars = MARS
+    arrival_speed: float = ARRIVAL_SPEED
+    exit_speed: float = EXIT_SPEED
+    intervals: int = 8
+    degree: int = 10
+    entry_speed: float = field(init=False)
+    exit_angle: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "entry_speed", entry_speed(self.arrival_speed, self.mars))
+        object.__setattr__(self, "exit_angle", exit_angle(self.exit_speed, self.mars))
+
+    @property
+    def slowing(self) -> float:
+        """x at the exit: twice the logarithm of entry speed over exit speed."""
+        return 2.0 * float(np.log(self.entry_speed / self.exit_speed))
+
+    @property
+    def stretch(self) -> float:
+        """k, the root of the interface's radius over the scale height."""
+        return float(np.sqrt(self.mars.entry_radius / self.mars.scale_height))
+
+    @property
+    def pull(self) -> float:
+        """delta: gravity at the interface, over what a circle at the entry speed asks for; eq. (9)."""
+        return self.mars.mu / (self.mars.entry_radius * self.entry_speed**2)
+
+    def drag(self, ballistic: np.ndarray) -> np.ndarray:
+        """eps of ballistic coefficients in kg/m2; eq. (9), mended."""
+        return np.sqrt(self.mars.entry_radius * self.mars.scale_height) * self.mars.density / ballistic
+
+
+PASSAGE = Passage()
+
+
+@dataclass(frozen=True)
+class Passages:
+    """What follows from ballistic coefficients: arrays (n,).
+
+    Attributes
+    ----------
+    ballistic : ndarray
+        Mass over drag area, kg/m2.
+    lift : ndarray
+        u, the lift over drag that points upward.
+    entry_angle : ndarray
+        Path angle at the entry, rad.
+    lowest : ndarray
+        Least altitude, m.
+    heat : ndarray
+        Heat load at the stagnation point of a nose of 1 m, J/cm2; in general it is this over the root of the nose radius.
+    arc : ndarray
+        Whole arc s, eq. (6).
+    """
+
+    ballistic: np.ndarray
+    lift: np.ndarray
+    entry_angle: np.ndarray
+    lowest: np.ndarray
+    heat: np.ndarray
+    arc: np.ndarray
+
+
+def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
+    """The passages of ballistic coefficients (n,), kg/m2.
+
+    Raises
+    ------
+    ValueError
+        One is outside `RANGE`.
+    RuntimeError
+        Newton's method did not converge for one: it is named. It does for all with the paper's data; the nearer the exit is to level, the
+        more lift heavy capsules would need to stay in the air, far more than there is.
+    """
+    bc = np.atleast_1d(np.asarray(ballistic, float))
+    return _measured(bc, *_solved(bc, passage), passage)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A passage in time, from the entry to the exit: arrays (k,) of time, s, altitude, m, speed, m/s, path angle, rad, the angle flown over
+    ground, rad, and the heat load until then of a nose of 1 m, J/cm2."""
+
+    time: np.ndarray
+    altitude: np.ndarray
+    speed: np.ndarray
+    path_angle: np.ndarray
+    ground: np.ndarray
+    heat: np.ndarray
+
+
+def profile(ballistic: float, passage: Passage = PASSAGE) -> Profile:
+    """The passage of one ballistic coefficient, kg/m2, in time. Raises what `passages` does."""
+    bc = np.atleast_1d(np.asarray(ballistic, float))
+    _, arc, Y = _solved(bc, passage)
+    mars = passage.mars
+    states = Y[0]
+    speed = passage.entry_speed * np.exp(-0.5 * states[..., 1])
+    altitude = mars.interface - mars.scale_height * states[..., 0]
+    length = np.sqrt(mars.entry_radius * mars.scale_height)
+    half = 0.5 * float(arc[0]) / passage.intervals
+
+    def since_entry(rate: np.ndarray) -> np.ndarray:
+        inside = half * (rate @ _integrals(passage.degree).T)
+        until = np.cumsum(inside[:, -1])
+        from_exit = inside + np.concatenate([[0.0], until[:-1]])[:, None]
+        return until[-1] - np.append(0.0, from_exit.ravel())[::-1]
+
+    def along(values: np.ndarray) -> np.ndarray:
+        return np.append(values[0, 0], values[:, 1:].ravel())[::-1]
+
+    return Profile(
+        since_entry(length / speed),
+        along(altitude),
+        along(speed),
+        along(states[..., 2]),
+        since_entry(length * np.cos(states[..., 2]) / (mars.radius + altitude)),
+        since_entry(_heating(speed, states[..., 0], passage) * length / speed),
+    )
+
+
+def _solved(bc: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lift (n,), arc (n,) and states (n, intervals, degree + 1, 3), from the exit to the entry; raises what `passages` does."""
+    outside = ~((bc >= RANGE[0]) & (bc <= RANGE[1]))
+    if outside.any():
+        raise ValueError(f"ballistic coefficient {bc[outside][0]:g} kg/m2: passages are solved from {RANGE[0]:g} to {RANGE[1]:g}")
+    eps = passage.drag(bc)
+    lift, arc, Y = _guess(bc, eps, passage)
+    active = np.arange(len(bc))
+    for _ in range(STEPS):
+        try:
+            step = _newton(Y[active], arc[active], lift[active], eps[active], passage)
+        except np.linalg.LinAlgError as error:
+            raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])}: {error}") from error
+        Y[active], arc[active], lift[active] = step.Y, step.arc, step.lift
+        active = active[step.size > TOLERANCE]
+        if not len(active):
+            return lift, arc, Y
+    raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])} in {STEPS} Newton steps")
+
+
+def _named(bc: np.ndarray) -> str:
+    """The first few of ballistic coefficients, kg/m2."""
+    return ", ".join(f"{one:g}" for one in bc[:3]) + (" or others" if len(bc) > 3 else "") + " kg/m2"
+
+
+def _guess(bc: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lift, arc and states (n, intervals, degree + 1, 3) to begin with: two parabolas of z that meet where drag is greatest."""
+    tau = (np.arange(passage.intervals)[:, None] + 0.5 * (nodes("lobatto", passage.degree) + 1.0)) / passage.intervals
+    # Measured once, for 120 kg/m2, with the change for e times as much.
+    lift, arc = -0.146 - 0.02 * np.log(bc / 120.0), 18.4 + 2.75 * np.log(bc / 120.0)
+    deepest, where = np.log(0.25 / eps), 0.72
+    side = np.where(tau < where, where, 1.0 - where)
+    share = (tau - where) / side
+    Y = np.empty((len(bc), *tau.shape, 3))
+    Y[..., 0] = deepest[:, None, None] * (1.0 - share**2)
+    Y[..., 1] = passage.slowing * (1.0 - np.clip((tau - 0.5) / 0.4, 0.0, 1.0))
+    Y[..., 2] = np.clip((deepest / (arc * passage.stretch))[:, None, None] * (-2.0 * share / side), -0.2, 0.2)
+    Y[:, 0, 0] = 0.0, passage.slowing, passage.exit_angle
+    return lift, arc, Y
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Unknowns after a Newton step, and its size (n,): 1 is the largest that is taken whole."""
+
+    Y: np.ndarray
+    arc: np.ndarray
+    lift: np.ndarray
+    size: np.ndarray
+
+
+LARGEST = np.array([1.0, 0.5, 0.1]), 0.2, 0.05
+"""Largest changes of a Newton step: of z, x and g, of the arc as a share of it, and of the lift."""
+
+
+def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> _Step:
+    """One Newton step from states Y (n, intervals, degree + 1, 3), whose intervals begin where the ones before end."""
+    n, m, q = len(Y), Y.shape[1], Y.shape[2] - 1
+    sums = _integrals(passage.degree)
+    rates, jacobian, by_lift = _rates(Y, lift, eps, passage)
+    half = (0.5 * arc / m)[:, None, None, None]
+    moved = half * (sums @ rates)
+    # Inside of an interval: dY = P [dY at its beginning, d arc, d lift, 1].
+    matrix = np.empty((n, m, q, 3, q, 3))
+    inner = (half * sums[:, 1:])[..., None, None]
+    np.multiply(-inner, jacobian[:, :, None, 1:], out=matrix.transpose(0, 1, 2, 4, 3, 5))
+    matrix = matrix.reshape(n, m, 3 * q, 3 * q)
+    matrix += np.eye(3 * q)
+    right = np.empty((n, m, q, 3, 6))
+    right[..., :3] = (half * sums[:, :1])[..., None] * jacobian[:, :, :1]
+    right[..., :3] += np.eye(3)
+    right[..., 3] = moved / arc[:, None, None, None]
+    right[..., 4] = half * (sums @ by_lift)
+    right[..., 5] = moved - (Y[:, :, 1:] - Y[:, :, :1])
+    P = np.linalg.solve(matrix, right.reshape(n, m, 3 * q, 6))
+    # Between the intervals, from the exit on, where nothing changes.
+    begins = np.zeros((n, m + 1, 6, 3))
+    begins[:, :, 3:] = np.eye(3)
+    for i in range(m):
+        np.matmul(P[:, i, -3:], begins[:, i], out=begins[:, i + 1, :3])
+    entry = begins[:, m, :2]
+    change = np.ones((n, 3, 1))
+    change[:, :2] = np.linalg.solve(entry[:, :, :2], -Y[:, -1, -1, :2, None] - entry[:, :, 2:])
+    step = (P @ (begins[:, :m] @ change[:, None])).reshape(n, m, q, 3)
+    d_arc, d_lift = change[:, 0, 0], change[:, 1, 0]
+    states = (np.abs(step) / LARGEST[0]).max(axis=(1, 2, 3))
+    size = np.maximum(states, np.maximum(np.abs(d_arc) / (LARGEST[1] * arc), np.abs(d_lift) / LARGEST[2]))
+    share = 1.0 / np.maximum(1.0, size)
+    Y = Y.copy()
+    Y[:, :, 1:] += share[:, None, None, None] * step
+    Y[:, 1:, 0] = Y[:, :-1, -1]
+    return _Step(Y, arc + share * d_arc, lift + share * d_lift, size)
+
+
+@cache
+def _integrals(degree: int) -> np.ndarray:
+    """Integrals of the Lagrange functions from the first Lobatto node to each of the others, (degree, degree + 1)."""
+    points = nodes("lobatto", degree)
+    return lagrange_integrals(points, points)[1:]
+
+
+def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rates of the states along the arc from the exit back to the entry, their derivatives by the states, and by the lift."""
+    k, (z, x, g) = passage.stretch, np.moveaxis(Y, -1, 0)
+    air = eps[:, None, None] * np.exp(z)
+    pull, sine, cosine = passage.pull * np.exp(x), np.sin(g), np.cos(g)
+    upward = 0.5 * lift[:, None, None] * air
+    rates, jacobian, by_lift = np.empty(Y.shape), np.zeros((*Y.shape, 3)), np.zeros(Y.shape)
+    rates[..., 0] = k * sine
+    rates[..., 1] = -air - 2.0 / k * pull * sine
+    rates[..., 2] = -upward - (1.0 - pull) / k * cosine
+    jacobian[..., 0, 2] = k * cosine
+    jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = -air, -2.0 / k * pull * sine, -2.0 / k * pull * cosine
+    jacobian[..., 2, 0], jacobian[..., 2, 1], jacobian[..., 2, 2] = -upward, pull / k * cosine, (1.0 - pull) / k * sine
+    by_lift[..., 2] = -0.5 * air
+    return rates, jacobian, by_lift
+
+
+def _measured(bc: np.ndarray, lift: np.ndarray, arc: np.ndarray, Y: np.ndarray, passage: Passage) -> Passages:
+    mars, points = passage.mars, nodes("lobatto", passage.degree)
+    speed = passage.entry_speed * np.exp(-0.5 * Y[..., 1])
+    # dt = sqrt(r_e / beta) ds / v: eq. (6).
+    rate = _heating(speed, Y[..., 0], passage) * np.sqrt(mars.entry_radius * mars.scale_height) / speed
+    heat = 0.5 * arc / passage.intervals * (rate @ _integrals(passage.degree)[-1]).sum(axis=1)
+    lowest = mars.interface - mars.scale_height * _deepest(Y, points)
+    return Passages(bc, lift, Y[:, -1, -1, 2].copy(), lowest, heat, arc)
+
+
+def _heating(speed: np.ndarray, z: np.ndarray, passage: Passage) -> np.ndarray:
+    """Heating rate of a nose of 1 m, W/cm2."""
+    return heating_rate(passage.mars.density * np.exp(z), speed)
+
+
+def _deepest(Y: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Greatest z (n,): where the path is level, by Newton's method on the polynomial of g in the interval in which its sign changes."""
+    rows = np.arange(len(Y))
+    inside = Y[rows, (Y[:, :, -1, 2] > 0.0).sum(axis=1)]
+    z, g = inside[..., 0], inside[..., 2]
+    tau = points[z.argmax(axis=1)][:, None]
+    # Sums of monomials, of which the degree is moderate enough.
+    sums = monomials("lobatto", len(points) - 1).T
+    z, g, powers = z @ sums, g @ sums, np.arange(len(points))
+    for _ in range(4):
+        value, slope = (g * tau**powers).sum(axis=1), (g[:, 1:] * powers[1:] * tau ** powers[:-1]).sum(axis=1)
+        tau = np.clip(tau - (value / slope)[:, None], -1.0, 1.0)
+    return (z * tau**powers).sum(axis=1)

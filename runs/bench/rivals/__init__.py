@@ -1,0 +1,1 @@
+"""Benchmarked problems as users of other programs state them."""

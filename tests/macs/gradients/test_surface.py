@@ -1,0 +1,78 @@
+"""Cover of a surface whose solves end in the valley in which they begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from macs.decisions import ReferencePoint
+from macs.evaluation.evaluator import CONVERGED, Evaluation
+from macs.gradients.surface import Surface, cover
+from macs.pareto.archive import Archive
+from macs.pareto.directions import simplex_lattice
+from macs.search.guide import PreferenceGuide
+from problems.compiled import Objective
+
+GOALS = tuple(Objective(f"f{k + 1}", "", "minimize") for k in range(3))
+GOOD, POOR = 1.0, 1.03
+GUIDE = PreferenceGuide(ReferencePoint({"f1": 0.3, "f2": 0.4, "f3": 0.5}), GOALS)
+
+
+@dataclass
+class Spheres:
+    """Solves on eighths of spheres: the only variable is the radius, which no solve changes."""
+
+    left: int
+    begun: list[float] = field(default_factory=list)
+
+    def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+        (radius,), reference, weight = starts[0], references[0], weights[0]
+        self.left -= 1
+        self.begun.append(float(radius))
+        step = brentq(lambda t: float(np.linalg.norm(np.maximum(reference + t * weight, 0.0))) - radius, -3.0, 3.0)
+        F = np.maximum(reference + step * weight, 0.0)
+        return Evaluation(starts.copy(), F[None], np.zeros(1), np.array([CONVERGED]))
+
+    def feasible(self, found: Evaluation) -> np.ndarray:
+        return np.array([True])
+
+
+def on_sphere(directions: np.ndarray, radius: float) -> Archive:
+    F = radius * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return Archive(np.full((len(F), 1), radius), F, np.zeros(len(F)))
+
+
+ENDS = on_sphere(np.eye(3), GOOD)
+"""The ends of the front; they are no good for the preference, and solves from them are tried once."""
+
+
+def test_places_are_spread_evenly_without_a_guide() -> None:
+    surface = cover(on_sphere(np.eye(3), GOOD), ENDS, Spheres(40), 12, None)  # type: ignore[arg-type]
+    assert len(surface.points()) == 15
+    apart = np.linalg.norm(surface.points().F[:, None] - surface.points().F, axis=2) + 9 * np.eye(15)
+    assert apart.min() > 0.2
+    assert len(surface.solved) == 15
+
+
+def test_a_better_valley_is_found_from_other_points_and_kept() -> None:
+    poor = on_sphere(simplex_lattice(3, 4), POOR)
+    poor = poor.take(~(poor.F == 0.0).any(axis=1))
+    solves = Spheres(40)
+    surface = cover(poor, ENDS, solves, 12, GUIDE)  # type: ignore[arg-type]
+    assert solves.left == 0
+    # The good valley is known at the ends alone, which are never good places to start from.
+    assert POOR in solves.begun[:6] and GOOD in solves.begun[:6]
+    assert set(solves.begun[6:]) == {GOOD}
+    wanted = GUIDE.factors(surface.pool.F, surface.pool.F)
+    assert np.linalg.norm(surface.pool.F[wanted == wanted.max()], axis=1) == pytest.approx(GOOD, abs=1e-9)
+
+
+def test_the_first_point_is_sought_from_each_other_once() -> None:
+    points = on_sphere(np.array([[1.0, 1, 1], [2, 1, 1], [1, 3, 1]]), GOOD)
+    surface = Surface(points, np.zeros(3), np.ones(3), np.eye(3), ENDS.F, points.F[:0])
+    starts = [surface.to_the_first(0) for _ in range(3)]
+    assert [task and task.start for task in starts] == [1, 2, None]
+    assert starts[0] is not None and starts[0].reference == pytest.approx(points.F[0])
