@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -65,6 +65,11 @@ class CompiledVectorProblem:
     def compile(self) -> CompiledVectorProblem:
         """Itself: so that every function of a VectorProblem takes a compiled one as well."""
         return self
+
+    @property
+    def phases(self) -> NoReturn:
+        """Raises ValueError: there are none, whatever was to be done with them."""
+        raise ValueError(f"{without_dynamics(self.name)}: use a search, such as MACS().solve(problem)")
 
     @property
     def signs(self) -> np.ndarray:

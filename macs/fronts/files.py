@@ -105,13 +105,15 @@ def save_csv(front: Points, path: str | PathLike[str]) -> None:
 
 def _simulated_columns(front: Points) -> dict[tuple[str, str], list[str]]:
     """What a simulation found, as text by name and unit; empty for a point that was not simulated."""
+    vector = front.source is not None and front.source.vector
+    how = "evaluated again" if vector else "simulated"
     values = {
-        ("defect", ""): front.defect,
+        **({} if vector else {("defect", ""): front.defect}),
         **{
-            (f"{goal.name}, simulated", goal.unit): column
+            (f"{goal.name}, {how}", goal.unit): column
             for goal, column in zip(front.goals, (front.simulated_F * front.signs).T, strict=True)
         },
-        ("violation, simulated", ""): front.simulated_violation,
+        (f"violation, {how}", ""): front.simulated_violation,
     }
     verified = {True: "yes", False: "no", None: ""}
     return {

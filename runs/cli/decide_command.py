@@ -53,7 +53,7 @@ def decide(arguments: Namespace) -> int:
         choice = dialogue.choose()
     print(shown(dialogue))
     source = dialogue.front.source
-    if dialogue.problem is None and source is not None and not arguments.rank_only:
+    if dialogue.problem is None and source is not None and not source.vector and not arguments.rank_only:
         print(f"The problem '{source.name}' is not at hand: give it by --problem, or --trust the code that the file names.")
     if arguments.alternatives:
         print(f"\n{alternatives_table(dialogue)}")

@@ -230,7 +230,7 @@ class Ends(Objectives, tag="ends", kw_only=True):
         return rows
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
-        known = [v.name for phase in getattr(problem, "phases", ()) for v in phase.states]  # a vector problem has none
+        known = [v.name for phase in problem.phases for v in phase.states]
         for end in self.ends:
             if end.state not in known:
                 raise ValueError(_no_state(end, known))

@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from vector_problems import parabolas
+
+from macs import MACS, Front
+from problems import load
+from runs import Study
+from runs.cli import main
+
+MINE = """
+import numpy as np
+from problems import VectorProblem
+
+def build(far: float = 2.0):
+    problem = VectorProblem("mine")
+    problem.variable("x", bounds=(-4, 4), unit="m")
+    problem.minimize("near", unit="m2")
+    problem.minimize("far", unit="m2")
+    problem.constraint("wall", upper=1.5, unit="m")
+
+    @problem.function
+    def evaluate(X):
+        (x,) = X.T
+        return {"near": x**2, "far": (x - far) ** 2, "wall": x}
+
+    problem.default_evaluations = 150
+    return problem
+"""
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(MINE)
+    return "mine.py:build"
+
+
+# Studies
+
+
+def test_a_study_runs_resumes_and_reports_vector_problems_beside_others(tmp_path, mine):
+    (tmp_path / "many.toml").write_text(
+        f"""
+        problems = {{own = {{problem = "{mine}", far = 3.0}}, truss = "four_bar_truss", ascent = "goddard"}}
+        transcriptions = {{ascent = "dfet:2x2"}}
+        evaluations = {{own = 120, truss = 200, ascent = 20}}
+        solvers = ["macs", "nsga2"]
+        runs = 1
+        seed = 1
+        """
+    )
+    study = Study.load(tmp_path / "many.toml", trust=True)
+    assert [cell.transcription for cell in study.cells] == ["no transcription"] * 4 + ["dfet:2x2"] * 2
+    assert study.cells[0].details["transcription"] is None and study.cells[0].details["problem"]["data"] == {"far": 3.0}
+    summary = study.run(tmp_path / "out", jobs=1)
+    assert all(run.finished for run in summary.runs), summary
+    files = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.nc")}
+    again = study.run(tmp_path / "out")
+    assert {path: path.stat().st_mtime_ns for path in files} == files and str(again) == str(summary)
+    front = summary.runs[2].front
+    own = Front.load(tmp_path / "out" / study.cells[0].folder / "0001.nc")
+    assert np.array_equal(own.F, MACS().solve(load(mine, far=3.0), evaluations=120, seed=own.stats["seed"]).F)
+    alone = MACS().solve(load("four_bar_truss"), evaluations=200, seed=front.stats["seed"])
+    assert np.array_equal(front.F, alone.F) and front.verified.all()
+    report = study.report(tmp_path / "out")
+    names = {path.name for path in report.files}
+    assert {"truss-no-transcription-variables.png", "truss-no-transcription-fronts.pdf", "own-no-transcription-variables.pdf"} <= names
+    assert "against the true front" in report.text and "area 3 [cm2]" in report.text
+    with (tmp_path / "out/report/truss-no-transcription-representatives.csv").open() as file:
+        head, *rows = csv.reader(file)
+    assert head[1:] == ["volume [cm3]", "displacement [cm]", *(f"area {i} [cm2]" for i in range(1, 5))] and rows
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"transcriptions": "dfet:4x6"}, "transcriptions: 'welded_beam' is a vector problem, .*state none for it"),
+        ({"transcriptions": {"welded_beam": "dfet:4x6"}}, "transcriptions: 'welded_beam' is a vector problem"),
+        ({"terms": {"macs": {"transcription": "dfet:4x6"}}}, "terms of 'macs': transcription: 'welded_beam' is a vector problem"),
+        ({"solvers": ["sweep"]}, "Sweep needs derivatives, but 'welded beam' is a vector problem"),
+        ({"solvers": {"macs": {"solver": "macs", "mesh": "adaptive"}}}, "mesh='adaptive' does not apply"),
+        ({"start": "smooth"}, "start: 'welded beam' is a vector problem.*no smooth profiles"),
+    ],
+)
+def test_a_study_that_cannot_be_made_says_so_before_any_work(changes, message):
+    stated = {"problems": ["welded_beam"], "solvers": ["macs"], "runs": 1, "seed": 1}
+    with pytest.raises(ValueError, match=message):
+        Study("beams", **{**stated, **changes})
+
+
+def test_default_budgets_are_the_problems_own_and_functions_of_a_script_are_refused():
+    assert Study("beams", problems="welded_beam", solvers="macs", runs=1, seed=1).cells[0].evaluations == 10_000
+    with pytest.raises(ValueError, match=r"parabolas.*cannot be sent to another process"):
+        Study("own", problems=parabolas(), solvers="macs", runs=1, seed=1)
+    problem = parabolas(function=_of_a_script)
+    with pytest.raises(ValueError, match="cannot import _of_a_script from a script"):
+        Study("own", problems=problem, solvers="macs", runs=1, seed=1)
+
+
+def _of_a_script(X: np.ndarray) -> dict[str, np.ndarray]:
+    return {"near": X[:, 0], "nearness": X[:, 1], "wall": X[:, 0]}
+
+
+_of_a_script.__module__ = "__main__"
+
+
+# The command line
+
+
+def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["solve", "welded_beam", "--evaluations", "600", "--seed", "1", "--out", "beam.nc", "--plot", "beam.png"]) == 0
+    assert "evaluated again, nothing differs by more than 1e-06" in capsys.readouterr().out
+    front = Front.load("beam.nc")
+    assert main(["show", "beam.nc", "--point", "2", "--plot", "point.png", "--csv", "point.csv"]) == 0
+    out = capsys.readouterr().out
+    assert f"weld length [in]     {front[2].parameters['weld length']:.10g}" in out and "buckling load" in out
+    assert Path("point.png").stat().st_size > 10_000 and Path("point.csv").read_text().startswith("cost [$],deflection [in]")
+    assert main(["verify", "beam.nc"]) == 0
+    assert f"All {len(front)} points verify: evaluated again" in capsys.readouterr().out
+    front.replace(F=front.F * 1.001).save("wrong.nc")
+    assert main(["verify", "wrong.nc"]) == 1
+    assert "evaluated again, its objectives differ by" in capsys.readouterr().out
+    assert main(["decide", "beam.nc", "--reference", "cost=8", "--json", "choice.json"]) == 0
+    out = capsys.readouterr().out
+    assert "Only points that are known were ranked" in out and "not at hand" not in out
+    assert json.loads(Path("choice.json").read_text())
+    assert main(["decide", "beam.nc", "--reference", "cost=8", "--problem", "welded_beam"]) == 2
+    assert "'welded beam' is a vector problem" in capsys.readouterr().err
+
+
+def test_a_problem_of_a_file_is_evaluated_again_only_with_trust(mine, capsys):
+    assert main(["solve", mine, "--seed", "1", "--out", "own.nc"]) == 0
+    assert "150 evaluations" in capsys.readouterr().out
+    assert main(["verify", "own.nc"]) == 2
+    assert "not run unasked" in capsys.readouterr().err
+    assert main(["verify", "own.nc", "--trust"]) == 0 == main(["verify", "own.nc", "--problem", mine])
+    Path("mine.py").write_text(MINE.replace("x - far", "x + far"))
+    assert main(["verify", "own.nc", "--trust"]) == 2
+    assert "values of the function differ" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--transcription", "dfet:4x6"], "it takes no transcription"),
+        (["--inner", "auto"], "it takes no inner level"),
+        (["--solver", "sweep"], "Sweep needs derivatives"),
+        (["--polish-on", "dfet:4x3:bernstein"], "polish_on does not apply"),
+    ],
+)
+def test_options_for_trajectories_are_refused_in_one_line(options, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["solve", "welded_beam", *options]) == 2
+    found = capsys.readouterr().err
+    assert message in found and found.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+def test_the_list_has_them(capsys):
+    assert main(["list"]) == 0
+    assert "welded_beam" in capsys.readouterr().out
