@@ -27,6 +27,8 @@ SEEDS = (1, 2, 3)
 STARTS = 3
 """For each value of the inverse packing efficiency."""
 SPAN = np.ptp(BOUNDS, axis=1)
+APART = 1e-3
+"""Points of the table differ by this part of the range in one of the objectives."""
 
 
 def searched(evaluations: int) -> np.ndarray:
@@ -76,6 +78,7 @@ def front(evaluations: int, points: int) -> np.ndarray:
     """The front (k, 7): both objectives and the five variables, by inverse packing efficiency."""
     known = searched(evaluations)
     F = objectives(known)
+    known, F = known[np.isfinite(F).all(axis=1)], F[np.isfinite(F).all(axis=1)]
     better = []
     for packing in np.linspace(F[:, 0].min(), F[:, 0].max(), points):
         nearest = known[np.argsort(np.abs(F[:, 0] - packing), kind="stable")[:STARTS]]
@@ -85,8 +88,12 @@ def front(evaluations: int, points: int) -> np.ndarray:
     rows = np.flatnonzero(np.isfinite(F).all(axis=1))
     rows = rows[nondominated(F[rows])]
     rows = rows[np.argsort(F[rows, 0], kind="stable")]
-    print(f"{len(rows)} points, {np.count_nonzero(rows >= len(known))} of them by gradients")
-    return np.hstack([F[rows], X[rows]])
+    span, kept = np.ptp(F[rows], axis=0), list(rows[:1])
+    for row in rows[1:]:
+        if (np.abs(F[row] - F[kept[-1]]) >= APART * span).any() or row == rows[-1]:
+            kept.append(row)
+    print(f"{len(kept)} points, {np.count_nonzero(np.array(kept) >= len(known))} of them by gradients")
+    return np.hstack([F[kept], X[kept]])
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ the flow, are failed evaluations.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -66,3 +67,16 @@ def problem(*, arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SP
 
     problem.default_evaluations = 2000
     return problem
+
+
+def reference() -> np.ndarray:
+    """The front (k, 2): inverse packing efficiency, 1/m2, and TPS mass fraction, %; by `python -m runs.truths.aerocapture`.
+
+    Slender capsules, a jump, and blunt ones.
+    """
+    return reference_designs()[:, :2]
+
+
+def reference_designs() -> np.ndarray:
+    """The rows of `reference` with the five variables (k, 7)."""
+    return np.loadtxt(Path(__file__).with_name("front.csv"), delimiter=",")
