@@ -32,10 +32,16 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
     heads: list[Column | str] = ["solver", "runs", "points claimed", "verified", "%"]
     heads += [Column("median defect of a claim", digits=2), Column("median violation, simulated", digits=2)]
     heads += ["of those verified not dominated, mean of a run", "median"]
-    note = (
+    dynamic = any(run.front.dynamic for runs in comparison.runs.values() for run in runs)
+    how = (
         f"All points were simulated by DOP853. A point is verified if nothing differs by more than {tolerance:g}: its states, in spans of "
         "their bounds; its bounds, final values, paths and constraints, in their scales; its objectives, in ranges of its front. "
-        "Indicators and published statistics are of these points alone, with their objectives as simulated, without those that others of "
+        if dynamic
+        else f"All points were evaluated again. A point is verified if nothing differs by more than {tolerance:g}: its constraints, in "
+        "their scales; its objectives, in ranges of its front. "
+    )
+    note = how + (
+        "Indicators and published statistics are of these points alone, with the objectives found there, without those that others of "
         "their run dominate. Figures over evaluations, iterations or time are of the points as claimed."
     )
     return {"claims": table(heads, rows, f"{comparison.name}: points claimed, and points verified.", [note])}

@@ -59,7 +59,9 @@ def best_shield(packing: float, starts: Sequence[np.ndarray]) -> list[np.ndarray
         def slack(x: np.ndarray, side: float = side) -> np.ndarray:
             one = judged(x * SPAN)
             room = VOLUME * packing
-            return np.array([room - 2.0 * one.base[0], room - one.length[0], side * one.lift_to_drag[0] - LIFT_TO_DRAG, one.length[0] - LENGTH])
+            return np.array(
+                [room - 2.0 * one.base[0], room - one.length[0], side * one.lift_to_drag[0] - LIFT_TO_DRAG, one.length[0] - LENGTH]
+            )
 
         found = minimize(
             lambda x: judged(x * SPAN).shield[0],

@@ -18,8 +18,8 @@ from .mars import ARRIVAL_SPEED, EXIT_SPEED, exit_speeds
 from .passage import PASSAGE
 
 VARIABLES = (
-    ("nose radius", "of the base radius"),
-    ("rear radius", "of the base radius"),
+    ("nose radius", "base radii"),
+    ("rear radius", "base radii"),
     ("front angle", "deg"),
     ("rear angle", "deg"),
     ("angle of attack", "deg"),
