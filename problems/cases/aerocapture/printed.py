@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
+
+from .designs import judged
+from .passage import passages
 
 
 @dataclass(frozen=True)
@@ -63,3 +69,41 @@ TABLE_1 = {1: (9.48, 0.15, 163.18, 135.99, 43.01, -8.57), 2: (7.44, 0.31, 115.7,
 whose measures are not printed."""
 TABLE_3 = {2: (40.85, -9.16, 7.98, 39.22), 3: (44.8, -9.38, 7.05, 38.25)}
 """Least altitude in km, entry angle in deg, heat shield in % and delta v in m/s of solutions 2 and 3 after their refinement."""
+
+
+def table_2() -> str:
+    """Table 2 beside ours: for each solution the printed figures, then what follows here from its five variables."""
+    found = judged(np.array([solution.design for solution in TABLE_2.values()]), way=passages)
+    bank, entry = np.degrees(found.bank), np.degrees(found.entry_angle)
+    ours = (found.shield, found.packing, found.lift_to_drag, bank, found.ballistic, found.lowest / 1e3, entry, found.base)
+    heads = ("solution", "by", "TPS %", "eta 1/m2", "L/D", "bank deg", "BC kg/m2", "h_min km", "gamma_e deg", "r_b m")
+    rows: list[tuple[str, ...]] = []
+    for (number, p), here in zip(TABLE_2.items(), np.transpose(ours), strict=True):
+        theirs = (p.shield, p.packing, p.lift_to_drag, p.bank, p.ballistic, p.lowest, p.entry_angle, p.base)
+        rows += [(str(number), "the paper", *_figures(theirs)), ("", "ours", *_figures(here))]
+    return _aligned([heads, *rows])
+
+
+def table_1() -> str:
+    """Table 1 beside ours: what the ballistic coefficient decides; the nose radii, and with them the heat shields, are not printed."""
+    ours = passages(np.array([one[3] for one in TABLE_1.values()]))
+    heads = ("shape", "by", "BC kg/m2", "L/D", "bank deg", "h_min km", "gamma_e deg")
+    rows: list[tuple[str, ...]] = []
+    for row, (number, (_, ratio, bank, ballistic, lowest, entry)) in enumerate(TABLE_1.items()):
+        # The ratio is printed with two digits, and its sign follows from the bank angle beyond 90 deg.
+        angle = np.degrees(np.arccos(ours.lift[row] / ratio))
+        rows += [
+            (str(number), "the paper", *_figures((ballistic, ratio, bank, lowest, entry))),
+            ("", "ours", *_figures((ballistic, ratio, angle, ours.lowest[row] / 1e3, np.degrees(ours.entry_angle[row])))),
+        ]
+    return _aligned([heads, *rows])
+
+
+def _figures(values: Iterable[float]) -> list[str]:
+    return [f"{value:.2f}" for value in values]
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> str:
+    """Rows of cells as text, in columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
