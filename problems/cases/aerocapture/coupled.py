@@ -82,5 +82,8 @@ def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
     X, passage = np.array([np.asarray(row) for row in front.decision]), _passage(**front.source.data)
     found, (shapes, _) = judged(X, passage), shapes_of(X)
     columns = found.ballistic, found.lift_to_drag, shapes.nose, found.entry_angle, found.bank
-    capsules = [Capsule(*row, entry_speed=passage.entry_speed) for row in np.column_stack(columns).tolist()]
+    capsules = [
+        Capsule(ballistic, ratio, nose, angle, bank, entry_speed=passage.entry_speed)
+        for ballistic, ratio, nose, angle, bank in zip(*(column.tolist() for column in columns), strict=True)
+    ]
     return outcomes(capsules, dispersions)

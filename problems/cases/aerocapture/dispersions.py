@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import radians
+from typing import Any
 
 import numpy as np
 
@@ -243,8 +244,8 @@ def as_it_is(capsule: Capsule, cases: Cases) -> Outcome:
 def solved_anew(capsule: Capsule, cases: Cases) -> Outcome:
     """The cases, each with the constant bank angle that brings its apoapsis to the target orbit.
 
-    More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which even all the lift is not enough is flown with
-    all of it in the right direction, and is not `on_target`.
+    More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which all the lift is not enough is flown with all
+    of it in the right direction, and is not `on_target`.
 
     Raises
     ------
@@ -252,7 +253,7 @@ def solved_anew(capsule: Capsule, cases: Cases) -> Outcome:
         A root is not found where there must be one.
     """
     upward = _rooted(capsule, cases)
-    return _judged(capsule, flown(capsule, cases, lambda rows, _: upward[rows]), upward)
+    return _judged(capsule, flown(capsule, cases, _constant(upward)), upward)
 
 
 def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> np.ndarray:
@@ -275,13 +276,17 @@ def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray) -> Outcome:
     goal = MARS.target_radius
     # False for NaN, too.
     captured = inverse >= goal / (MARS.radius + FARTHEST)
-    columns = [np.full(len(upward), np.nan) for _ in range(4)]
+    columns = np.full((4, len(upward)), np.nan)
     speed, path, heat, lowest = (values[captured] for values in (exits.speed, exits.path_angle, exits.heat, exits.lowest))
     error = goal / inverse[captured] - goal
-    found = (error / 1e3, two_burns(speed, path), shield_fraction(heat / capsule.nose**0.5), lowest / 1e3)
-    for column, values in zip(columns, found, strict=True):
-        column[captured] = values
-    return Outcome(captured, np.isnan(inverse), np.abs(columns[0]) <= 1e-3 * ON_TARGET, *columns, upward)
+    columns[:, captured] = error / 1e3, two_burns(speed, path), shield_fraction(heat / capsule.nose**0.5), lowest / 1e3
+    miss, delta_v, shield, least = columns
+    return Outcome(captured, np.isnan(inverse), np.abs(miss) <= 1e-3 * ON_TARGET, miss, delta_v, shield, least, upward)
+
+
+def _constant(upward: np.ndarray) -> Lift:
+    """The same lift over drag all the time, of each row its own."""
+    return lambda rows, times: upward[rows]
 
 
 def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
@@ -296,14 +301,14 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
     low, high, below, above = (np.full(k, np.nan) for _ in range(4))
     start = 0.0 if callable(capsule.bank) else capsule.lift_to_drag * np.cos(capsule.bank)
     upward, stride, last = np.full(k, start), np.full(k, STRIDE), np.zeros(k)
-    active = np.arange(k)
+    (active,) = _only(slice(None), np.arange(k))
     for _ in range(TRIALS):
         trial = upward[active]
-        excess = flown(capsule, cases[active], lambda rows, _, u=trial: u[rows]).inverse_apoapsis() - 1.0
+        excess = flown(capsule, cases[active], _constant(trial)).inverse_apoapsis() - 1.0
         excess = np.where(np.isnan(excess), np.inf, excess)
         under = excess > 0.0
         done = (np.abs(excess) <= near) | (under & (trial >= most)) | (~under & (trial <= -most))
-        active, trial, excess, under = (values[~done] for values in (active, trial, excess, under))
+        active, trial, excess, under = _only(~done, active, trial, excess, under)
         if not len(active):
             return upward
         side = np.where(under, 1.0, -1.0)
@@ -335,9 +340,9 @@ def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     motion = _Motion(capsule, MARS.density * cases.density, capsule.ballistic * cases.ballistic, lift)
     found = np.full((4, k), np.nan)
     lowest = np.full(k, np.inf)
-    rows, times, steps = np.arange(k), np.zeros(k), np.full(k, FIRST)
-    states = np.empty((4, k))
-    states[0], states[1], states[2], states[3] = MARS.interface, capsule.entry_speed, capsule.entry_angle + cases.entry_angle, 0.0
+    rows, times, steps = _only(slice(None), np.arange(k), np.zeros(k), np.full(k, FIRST))
+    states: np.ndarray = np.zeros((4, k))
+    states[0], states[1], states[2] = MARS.interface, capsule.entry_speed, capsule.entry_angle + cases.entry_angle
     slopes = motion.rates(states, times, rows)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         for _ in range(STEPS):
@@ -345,25 +350,27 @@ def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
             good = error <= 1.0
             level = good & (states[2] < 0.0) & (ends[2] >= 0.0)
             if level.any():
-                there = motion.until(2, 0.0, *(values[..., level] for values in (states, ends, slopes, times, steps, rows)))
+                there = motion.until(2, 0.0, *_only(level, states, ends, slopes, times, steps, rows))
                 lowest[rows[level]] = np.minimum(lowest[rows[level]], there[0])
             out = good & (ends[0] >= MARS.interface)
             if out.any():
-                found[:, rows[out]] = motion.until(
-                    0, MARS.interface, *(values[..., out] for values in (states, ends, slopes, times, steps, rows))
-                )
-            rest = 0.5 * ends[1] ** 2 + MARS.mu * (1.0 / MARS.entry_radius - 1.0 / (MARS.radius + ends[0]))
-            stays = ~(out | (good & ((ends[0] < FLOOR) | (rest < 0.0))))
+                found[:, rows[out]] = motion.until(0, MARS.interface, *_only(out, states, ends, slopes, times, steps, rows))
+            stays = ~(out | (good & motion.lost(ends)))
             states, slopes = np.where(good, ends, states), np.where(good, end_slopes, slopes)
             times = np.where(good, times + steps, times)
             # An error that is no number: of a step that is far too long.
             factor = np.where(np.isfinite(error), 0.9 * np.maximum(error, 1e-10) ** -0.2, 0.2)
             steps = np.minimum(steps * np.clip(factor, 0.2, 5.0), LONGEST)
             if not stays.all():
-                states, slopes, times, steps, rows = (values[..., stays] for values in (states, slopes, times, steps, rows))
+                states, slopes, times, steps, rows = _only(stays, states, slopes, times, steps, rows)
             if not len(rows):
                 return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
     raise RuntimeError(f"{len(rows)} of {k} cases did not end in {STEPS} steps")
+
+
+def _only(which: Any, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Some entries along the last axis of each array."""
+    return tuple(values[..., which] for values in arrays)
 
 
 @dataclass(frozen=True)
@@ -388,6 +395,12 @@ class _Motion:
         rates[2] = drag * self.lift(rows, times) + (speed / radius - gravity / speed) * np.cos(path)
         rates[3] = heating_rate(density, speed)
         return rates
+
+    def lost(self, states: np.ndarray) -> np.ndarray:
+        """Whether cases (m,) are below `FLOOR`, or have less energy than it takes to rise to the interface: drag only takes of it."""
+        altitude, speed = states[:2]
+        radius = MARS.radius + altitude if self.capsule.curved else MARS.entry_radius
+        return np.asarray((altitude < FLOOR) | (0.5 * speed**2 < MARS.mu / (radius * MARS.entry_radius) * (MARS.interface - altitude)))
 
     def step(
         self, states: np.ndarray, slopes: np.ndarray, times: np.ndarray, steps: np.ndarray, rows: np.ndarray
