@@ -39,9 +39,9 @@ STEPS = 5_000
 ON_TARGET = 1.0
 """How near the apoapsis is to the target where the bank is solved anew, m."""
 TRIALS = 80
-"""Most flights for that; 8 to 12 are usual."""
+"""Most flights for that; 14 are usual."""
 STRIDE = 0.01
-"""First change of the lift over drag."""
+"""First change of the lift over drag in that search."""
 
 TABLEAU = (
     np.array([1 / 5]),
@@ -187,7 +187,7 @@ class Outcome:
     lost : ndarray of bool
         Whether it does not leave the air.
     on_target : ndarray of bool
-        Whether its apoapsis is within `ON_TARGET` of the target orbit.
+        Whether its apoapsis is within `ON_TARGET` of the target orbit; None where no bank is solved.
     apoapsis_error : ndarray
         Altitude of the apoapsis above the target orbit, km.
     delta_v : ndarray
@@ -196,26 +196,28 @@ class Outcome:
         Heat shield that its heat load asks for, % of the mass.
     lowest : ndarray
         Least altitude, km.
-    upward : ndarray
-        Lift over drag that points upward, where that is constant; else NaN.
+    upward : ndarray or None
+        Lift over drag that points upward, where it is solved.
     """
 
     captured: np.ndarray
     lost: np.ndarray
-    on_target: np.ndarray
+    on_target: np.ndarray | None
     apoapsis_error: np.ndarray
     delta_v: np.ndarray
     shield: np.ndarray
     lowest: np.ndarray
-    upward: np.ndarray
+    upward: np.ndarray | None = None
 
     def measures(self) -> dict[tuple[str, str], float | None]:
         """Shares of the cases, and of those that are captured the 99th percentile of what should be small and the first of the altitude.
 
         By name and unit; None if no case is captured.
         """
-        shares = {"captured": self.captured, "lost in the air": self.lost, "on target": self.on_target}
-        found: dict[tuple[str, str], float | None] = {(name, "%"): 100.0 * float(which.mean()) for name, which in shares.items()}
+        found: dict[tuple[str, str], float | None] = {}
+        for name, which in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
+            if which is not None:
+                found[name, "%"] = 100.0 * float(which.mean())
         worst = {
             ("apoapsis error", "km"): (np.abs(self.apoapsis_error), 99.0),
             ("delta v", "m/s"): (self.delta_v, 99.0),
@@ -236,9 +238,7 @@ def outcomes(capsules: Sequence[Capsule], dispersions: Dispersions) -> list[dict
 
 def as_it_is(capsule: Capsule, cases: Cases) -> Outcome:
     """The cases with the bank angle of the nominal one, or its profile over time."""
-    exits = flown(capsule, cases, capsule.upward)
-    constant = np.nan if callable(capsule.bank) else capsule.lift_to_drag * np.cos(capsule.bank)
-    return _judged(capsule, exits, np.full(len(cases), constant))
+    return _judged(capsule, flown(capsule, cases, capsule.upward))
 
 
 def solved_anew(capsule: Capsule, cases: Cases) -> Outcome:
@@ -271,17 +271,18 @@ def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> n
     return np.asarray(first + np.abs(np.sqrt(2.0 * mars.mu * apoapsis / (goal * between)) - np.sqrt(mars.mu / goal)))
 
 
-def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray) -> Outcome:
+def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> Outcome:
     inverse = exits.inverse_apoapsis()
     goal = MARS.target_radius
     # False for NaN, too.
     captured = inverse >= goal / (MARS.radius + FARTHEST)
-    columns = np.full((4, len(upward)), np.nan)
+    columns = np.full((4, len(inverse)), np.nan)
     speed, path, heat, lowest = (values[captured] for values in (exits.speed, exits.path_angle, exits.heat, exits.lowest))
     error = goal / inverse[captured] - goal
     columns[:, captured] = error / 1e3, two_burns(speed, path), shield_fraction(heat / capsule.nose**0.5), lowest / 1e3
     miss, delta_v, shield, least = columns
-    return Outcome(captured, np.isnan(inverse), np.abs(miss) <= 1e-3 * ON_TARGET, miss, delta_v, shield, least, upward)
+    on_target = None if upward is None else np.abs(miss) <= 1e-3 * ON_TARGET
+    return Outcome(captured, np.isnan(inverse), on_target, miss, delta_v, shield, least, upward)
 
 
 def _constant(upward: np.ndarray) -> Lift:
@@ -297,10 +298,10 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
     """
     k, most = len(cases), abs(capsule.lift_to_drag)
     near = 0.5 * ON_TARGET / MARS.target_radius
+    start = 0.0 if callable(capsule.bank) else capsule.lift_to_drag * float(np.cos(capsule.bank))
     # At `low` the apoapsis is below the target, or the case is lost: infinite. At `high` it is above.
     low, high, below, above = (np.full(k, np.nan) for _ in range(4))
-    start = 0.0 if callable(capsule.bank) else capsule.lift_to_drag * np.cos(capsule.bank)
-    upward, stride, last = np.full(k, start), np.full(k, STRIDE), np.zeros(k)
+    upward, strides, last = np.full(k, start), np.full(k, STRIDE), np.zeros(k)
     (active,) = _only(slice(None), np.arange(k))
     for _ in range(TRIALS):
         trial = upward[active]
@@ -323,8 +324,8 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
             falsi = (a * fb - b * fa) / (fb - fa)
         between = np.where(np.isfinite(falsi), falsi, 0.5 * (a + b))
         open_ended = np.isnan(a) | np.isnan(b)
-        upward[active] = np.where(open_ended, np.clip(trial + side * stride[active], -most, most), between)
-        stride[active] *= 2.0
+        upward[active] = np.where(open_ended, np.clip(trial + side * strides[active], -most, most), between)
+        strides[active] *= 2.0
     raise RuntimeError(f"no constant bank found in {TRIALS} flights for {len(active)} of {k} cases")
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 MANY = 100
 """Most points of a front that are flown."""
+WIDE = 10.0
+"""Ratio of the largest and the smallest value from which on an axis is logarithmic."""
 LOOKS: Sequence[Mapping[str, Any]] = (
     {"marker": "o", "ms": 2.0, "mew": 0, "color": "black", "zorder": 3},
     {"marker": "v", "ms": 3.0, "mew": 0.6, "mfc": "none", "color": COLORS[1], "zorder": 2},
@@ -138,6 +140,9 @@ def dispersed_figure(found: DispersedFront) -> Figure:
             for (way, measured), look in zip(found.measures.items(), LOOKS, strict=False):
                 values = np.array([np.nan if one[name, unit] is None else one[name, unit] for one in measured], dtype=float)
                 ax.plot(across, values, ls="", label=way, **look)
+            low, high = ax.dataLim.intervaly
+            if low > 0.0 and high > WIDE * low:
+                ax.set_yscale("log")
             ax.set_title(label(name, unit), loc="left")
             if place + columns >= len(panels):
                 ax.set_xlabel(label(goal.name, goal.unit))
