@@ -35,7 +35,7 @@ def rolled(times: np.ndarray) -> np.ndarray:
     return np.interp(times, [0.0, 88.0, 106.0], [0.0, 0.0, np.pi])
 
 
-PROFILED = Capsule(120.0, 0.32, 1.22, np.radians(-9.6), rolled, curved=True)
+PROFILED = Capsule(120.0, 0.32, 1.22, np.radians(-10.2), rolled, curved=True)
 
 
 def heating(density: float, speed: float) -> float:
@@ -43,7 +43,7 @@ def heating(density: float, speed: float) -> float:
 
 
 def over_a_plain(design: Capsule, upward, case: Cases, row: int):
-    """Altitude over the interface, speed, path angle and heat load of a case with gravity and curvature of the interface, until it is out or down."""
+    """How a case ends with gravity and curvature of the interface: altitude above it, speed, path angle and heat load."""
     ballistic = design.ballistic * case.ballistic[row]
 
     def slope(t, y):
@@ -57,7 +57,7 @@ def over_a_plain(design: Capsule, upward, case: Cases, row: int):
 
 
 def in_space(design: Capsule, upward, case: Cases, row: int):
-    """The same in Cartesian coordinates over the round planet, the rest of the lift to the side."""
+    """The same in Cartesian coordinates over the round planet, the rest of the lift to the side: position, velocity and heat load."""
     ballistic = design.ballistic * case.ballistic[row]
 
     def slope(t, y):
@@ -158,7 +158,7 @@ def test_cases_flown_by_other_code(design, way):
             assert outcome.apoapsis_error[row] == pytest.approx(above - 200.0, rel=1e-5, abs=1e-2)
             assert outcome.shield[row] == pytest.approx(0.091 * (end[-1] / np.sqrt(design.nose)) ** 0.51575, rel=RTOL)
             assert outcome.lowest[row] == pytest.approx(least / 1e3, rel=RTOL)
-    assert {"lost", "captured"} < met
+    assert {"lost", "captured"} <= met
 
 
 def test_the_farthest_apoapsis_that_counts():
