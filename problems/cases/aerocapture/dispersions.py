@@ -30,7 +30,7 @@ FLOOR, FARTHEST = 10e3, 10_000e3
 """Altitude below which a capsule is lost, and that of the farthest apoapsis that counts as captured, m: chosen."""
 SCALES = np.array([MARS.scale_height, 1e3, 0.1, 1e3])[:, None]
 """Of altitude, speed, path angle and heat load, for the error of a step."""
-TOLERANCE = 1e-8
+TOLERANCE = 1e-9
 """Error of a step, in scales."""
 LONGEST, FIRST = 30.0, 5.0
 """Longest and first step, s."""
@@ -210,19 +210,17 @@ class Outcome:
     upward: np.ndarray | None = None
 
     def measures(self) -> dict[tuple[str, str], float | None]:
-        """Shares of the cases, and of those that are captured the 99th percentile of what should be small and the first of the altitude.
-
-        By name and unit; None if no case is captured.
-        """
+        """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and the first
+        of the altitude; None if no case is captured."""
         found: dict[tuple[str, str], float | None] = {}
         for name, which in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
             if which is not None:
                 found[name, "%"] = 100.0 * float(which.mean())
         worst = {
-            ("apoapsis error", "km"): (np.abs(self.apoapsis_error), 99.0),
-            ("delta v", "m/s"): (self.delta_v, 99.0),
-            ("TPS mass fraction", "%"): (self.shield, 99.0),
-            ("lowest altitude", "km"): (self.lowest, 1.0),
+            ("apoapsis error, P99", "km"): (np.abs(self.apoapsis_error), 99.0),
+            ("delta v, P99", "m/s"): (self.delta_v, 99.0),
+            ("TPS mass fraction, P99", "%"): (self.shield, 99.0),
+            ("lowest altitude, P1", "km"): (self.lowest, 1.0),
         }
         for what, (values, percent) in worst.items():
             found[what] = float(np.percentile(values[self.captured], percent)) if self.captured.any() else None
@@ -339,23 +337,21 @@ def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     """
     k = len(cases)
     motion = _Motion(capsule, MARS.density * cases.density, capsule.ballistic * cases.ballistic, lift)
-    found = np.full((4, k), np.nan)
-    lowest = np.full(k, np.inf)
     rows, times, steps = _only(slice(None), np.arange(k), np.zeros(k), np.full(k, FIRST))
     states: np.ndarray = np.zeros((4, k))
     states[0], states[1], states[2] = MARS.interface, capsule.entry_speed, capsule.entry_angle + cases.entry_angle
-    slopes = motion.rates(states, times, rows)
+    # Steps in which cases are level, and in which they leave the air.
+    level: list[tuple[np.ndarray, ...]] = []
+    last: list[tuple[np.ndarray, ...]] = []
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        slopes = motion.rates(states, times, rows)
         for _ in range(STEPS):
             ends, end_slopes, error = motion.step(states, slopes, times, steps, rows)
             good = error <= 1.0
-            level = good & (states[2] < 0.0) & (ends[2] >= 0.0)
-            if level.any():
-                there = motion.until(2, 0.0, *_only(level, states, ends, slopes, times, steps, rows))
-                lowest[rows[level]] = np.minimum(lowest[rows[level]], there[0])
             out = good & (ends[0] >= MARS.interface)
-            if out.any():
-                found[:, rows[out]] = motion.until(0, MARS.interface, *_only(out, states, ends, slopes, times, steps, rows))
+            for which, kept in ((good & (states[2] < 0.0) & (ends[2] >= 0.0), level), (out, last)):
+                if which.any():
+                    kept.append(_only(which, states, ends, slopes, times, steps, rows))
             stays = ~(out | (good & motion.lost(ends)))
             states, slopes = np.where(good, ends, states), np.where(good, end_slopes, slopes)
             times = np.where(good, times + steps, times)
@@ -365,7 +361,7 @@ def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
             if not stays.all():
                 states, slopes, times, steps, rows = _only(stays, states, slopes, times, steps, rows)
             if not len(rows):
-                return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
+                return motion.exits(level, last)
     raise RuntimeError(f"{len(rows)} of {k} cases did not end in {STEPS} steps")
 
 
@@ -413,6 +409,17 @@ class _Motion:
             stages.append(self.rates(ends, times + share * steps, rows))
         error = steps * sum(weight * stage for weight, stage in zip(ERROR, stages, strict=True) if weight)
         return ends, stages[-1], np.abs(error / (TOLERANCE * SCALES)).max(axis=0)
+
+    def exits(self, level: Sequence[tuple[np.ndarray, ...]], last: Sequence[tuple[np.ndarray, ...]]) -> Exits:
+        """From the steps in which cases are level, and the last ones of those that leave the air: arguments of `until`."""
+        found, lowest = np.full((4, len(self.density)), np.nan), np.full(len(self.density), MARS.interface)
+        if last:
+            steps = [np.concatenate(one, axis=-1) for one in zip(*last, strict=True)]
+            found[:, steps[-1]] = self.until(0, MARS.interface, *steps)
+        if level:
+            steps = [np.concatenate(one, axis=-1) for one in zip(*level, strict=True)]
+            np.minimum.at(lowest, steps[-1], self.until(2, 0.0, *steps)[0])
+        return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
 
     def until(
         self,

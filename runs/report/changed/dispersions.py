@@ -99,8 +99,8 @@ class DispersedFront:
         heads += [Column(name, unit, digits=4) for name, unit in measured[0]]
         rows: list[list[Cell]] = [[number, *self.points.objectives[number].tolist(), *one.values()] for number, one in enumerate(measured)]
         note = (
-            f"{self.settings}: standard deviations of normal distributions; the same draws for all points. Shares are of all cases, the "
-            "other columns are of those captured: 99th percentiles, of the lowest altitude the first."
+            f"{self.settings}: standard deviations of normal distributions; the same draws for all points. Shares are of all cases; "
+            "percentiles, P99 the 99th, are of those captured."
         )
         return table(heads, rows, f"{self.name}: the front of {self.solver} under dispersions, {way}.", [note])
 
