@@ -210,8 +210,8 @@ class Outcome:
     upward: np.ndarray | None = None
 
     def measures(self) -> dict[tuple[str, str], float | None]:
-        """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and the first
-        of the altitude; None if no case is captured."""
+        """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and
+        the first of the altitude; None if no case is captured."""
         found: dict[tuple[str, str], float | None] = {}
         for name, which in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
             if which is not None:

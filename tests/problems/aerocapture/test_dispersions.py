@@ -11,11 +11,14 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from problems.cases.aerocapture import dispersions
+from macs import payoff
+from problems import load
+from problems.cases.aerocapture import bank, dispersions
 from problems.cases.aerocapture.designs import judged, shapes_of
 from problems.cases.aerocapture.dispersions import NOMINAL, Capsule, Cases, Dispersions, as_it_is, flown, solved_anew, two_burns
 from problems.cases.aerocapture.mars import MARS, circularisation, exit_angle
 from problems.cases.aerocapture.printed import TABLE_2
+from transcription import stated
 
 MU, RADIUS, HEIGHT, DENSITY = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7
 TOP, TARGET = RADIUS + 100e3, RADIUS + 200e3
@@ -301,3 +304,16 @@ def test_draws_are_normal():
 def test_settings_that_make_no_sense(given_, words):
     with pytest.raises(ValueError, match=words):
         Dispersions(**given_)
+
+
+def test_points_of_the_bank_problem_fly_their_profiles():
+    """The nominal case of both ends of the front has the objectives that the simulation of the whole motion in space finds."""
+    problem = load("aerocapture_bank")
+    front = payoff(problem, stated(problem.default_transcription))
+    for point, found in zip(front, bank.dispersed(front, Dispersions(cases=3)), strict=True):
+        simulated = point.simulate(rtol=1e-10).objectives
+        nominal = found["nominal"]
+        assert abs(nominal.apoapsis_error[0]) < 0.5
+        assert nominal.shield[0] == pytest.approx(simulated["TPS mass fraction"], rel=1e-4)
+        assert nominal.delta_v[0] == pytest.approx(simulated["delta v"], abs=0.3)
+        assert found["bank solved anew"].on_target.all() and len(found["bank as it is"].captured) == 3
