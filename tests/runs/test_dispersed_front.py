@@ -12,6 +12,7 @@ from problems import load
 from problems.cases.aerocapture import coupled
 from runs import Study
 from runs.batch.store import Store
+from runs.report.changed import dispersions
 from runs.report.changed.dispersions import DispersedFront, dispersed_fronts
 from runs.report.comparison import comparisons
 from runs.report.report import report
@@ -27,6 +28,14 @@ def study(**changed) -> Study:
         "flights": False,
     }
     return Study("dispersed", evaluations=240, runs=2, seed=1, **(stated | changed))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few():
+    """Four points of each front."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dispersions, "MANY", 4)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +67,7 @@ def test_tables_and_figures_of_the_report(folder, found):
     made = report(folder)
     table = next(path for path in made.files if path.name.endswith("dispersed-bank-as-it-is.csv"))
     rows = list(csv.reader(table.open(encoding="utf-8")))
-    assert len(rows) == 1 + len(found.points)
+    assert len(rows) == 1 + len(found.points) == 5
     column = next(i for i, name in enumerate(rows[0]) if name.startswith("captured"))
     assert [float(row[column]) for row in rows[1:]] == [one["captured", "%"] for one in found.measures["bank as it is"]]
     shield = next(i for i, name in enumerate(rows[0]) if name.startswith("nominal TPS"))
