@@ -197,14 +197,15 @@ def test_roots_of_other_code():
 
 
 def test_not_enough_lift_is_flown_with_all_of_it():
-    """A steep case needs more lift upward than there is, a shallow one more downward; neither is on target."""
+    """A steep case needs more lift upward than there is, shallow ones more downward; none is on target, but one is captured."""
     most = abs(capsule(2).lift_to_drag * np.cos(capsule(2).bank)) + 0.01
     weak = Capsule(capsule(2).ballistic, -most, 1.0, capsule(2).entry_angle, 0.0)
-    cases = Cases(np.radians([-2.0, 0.0, 0.5]), np.ones(3), np.ones(3))
+    cases = Cases(np.radians([-2.0, 0.0, 0.5, 0.05]), np.ones(4), np.ones(4))
     found = solved_anew(weak, cases)
-    assert found.upward.tolist()[::2] == [most, -most]
-    assert found.on_target.tolist() == [False, True, False]
-    assert found.lost.tolist() == [True, False, False]
+    assert found.upward[[0, 2, 3]].tolist() == [most, -most, -most]
+    assert found.on_target.tolist() == [False, True, False, False]
+    assert found.captured.tolist() == [False, True, False, True]
+    assert found.lost.tolist() == [True, False, False, False]
 
 
 def test_small_dispersions_are_linear():
