@@ -35,7 +35,7 @@ TOLERANCE = 1e-9
 LONGEST, FIRST = 30.0, 5.0
 """Longest and first step, s."""
 STEPS = 5_000
-"""Most steps of a case; 60 to 150 are usual."""
+"""Most steps of a case; 80 to 160 are usual."""
 ON_TARGET = 1.0
 """How near the apoapsis is to the target where the bank is solved anew, m."""
 TRIALS = 80
@@ -258,7 +258,7 @@ def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> n
     """Delta v to the circular target orbit, m/s, after exits on ellipses: the first burn, at the apoapsis, brings the other apsis to the
     target radius, and the second one there makes the orbit a circle.
 
-    Lu, Cerimele, Tigges and Matz, "Optimal aerocapture guidance", Journal of Guidance, Control, and Dynamics 38(4), 2015, section II. With
+    Lu, Cerimele, Tigges and Matz, "Optimal aerocapture guidance", Journal of Guidance, Control, and Dynamics 38(4), 2015. With
     the apoapsis on the target it is `mars.circularisation`.
     """
     goal = mars.target_radius
