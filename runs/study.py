@@ -20,7 +20,8 @@ from .batch.terms import INNER, check_inner, sampling, written
 from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .execution.task import Payload, Task
 from .measures.references import ReferenceKey, check_reference
-from .report.changed_data import check as check_nominal
+from .report.changed.data import check as check_nominal
+from .report.changed.dispersions import check as check_dispersions
 from .report.goal import Goal
 from .report.published import check_against
 
@@ -95,7 +96,10 @@ class Study:
         Of which objective reports draw the goal attainment, between which values; see `report.goal.Goal`.
     nominal : str, optional
         Label of the problem whose front reports simulate under the data of all others, which have the same variables and objectives; see
-        `report.changed_data`.
+        `report.changed.data`.
+    dispersions : mapping, optional
+        Under which reports fly the points of every front, where the case knows how: settings of the case's own, such as `cases` and `seed`;
+        see `report.changed.dispersions`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
     note : str
@@ -129,6 +133,7 @@ class Study:
     paper: Sequence[Mapping[str, Any]] = field(metadata=_key(), default=())
     goal: Mapping[str, Any] | None = field(metadata=_key(), default=None)
     nominal: str | None = field(metadata=_key(), default=None)
+    dispersions: Mapping[str, Any] | None = field(metadata=_key(), default=None)
     flights: bool = field(metadata=_key(Flag), default=True)
     note: str = field(metadata=_key(Text), default="")
     trust: bool = field(default=True, repr=False)
@@ -162,6 +167,8 @@ class Study:
                 Goal.of(self.goal, stated)
             if self.nominal is not None:
                 check_nominal(self.nominal, stated)
+            if self.dispersions is not None:
+                check_dispersions(self.dispersions, stated)
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 

@@ -89,7 +89,9 @@ def module_of(case: str) -> ModuleType:
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
     - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, its name;
     - `track(values) -> {label: values, label: values}`: the track of a flight, across and up, from its states by name;
-    - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`.
+    - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`;
+    - `dispersed(front, settings)`: what becomes of each point of a front under dispersions, `{way to fly: outcome}`, the nominal case
+      first, where an outcome has `measures() -> {(name, unit): value}`; and `Dispersions`, the dataclass of the settings.
 
     Parameters
     ----------

@@ -23,7 +23,8 @@ from ..data.addresses import check_trusted
 from ..data.schema import Flag, Text, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
-from .changed_data import ChangedData, changed_data
+from .changed.data import ChangedData, changed_data
+from .changed.dispersions import DispersedFront, dispersed_fronts
 from .choices import choices_figures, choices_tables, only_choices
 from .comparison import Comparison, comparisons
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
@@ -128,7 +129,11 @@ def report(
     sections = [str(summary), *([keys.note] if keys.note else [])]
     for comparison in _shown(found) if progress else found:
         sections += _section(comparison, study, writer, figures)
-    across: list[GoalAttainment | ChangedData] = [*goal_attainments(found, study), *changed_data(found, study)]
+    across: list[GoalAttainment | ChangedData | DispersedFront] = [
+        *goal_attainments(found, study),
+        *changed_data(found, study),
+        *dispersed_fronts(found, study),
+    ]
     for part in across:
         sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():

@@ -13,7 +13,7 @@ from macs import NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.changed_data import MANY, SIMULATED, ChangedData, changed_data, changed_figure
+from runs.report.changed.data import MANY, SIMULATED, ChangedData, changed_data, changed_figure
 from runs.report.comparison import comparisons
 from runs.report.report import report
 

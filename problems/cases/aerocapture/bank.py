@@ -11,7 +11,9 @@ deg, 10 deg/s, and no turning. The capsule then enters over the north, past the 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import exp, pi, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from ...problem import Problem
 from ..winged import STATES, UNITS, Winged
 from .aerodynamics import MASS, lift_and_drag
 from .designs import Designs, judged, shapes_of
+from .dispersions import Capsule, Dispersions, Outcome, outcomes
 from .figures import plot, track
 from .heating import allowed_load, heating_rate, shield_fraction
 from .mars import EXIT_SPEED, MARS, circularisation
@@ -28,9 +31,9 @@ from .orbits import apoapsis, arrival, since_arrival
 from .passage import PASSAGE, profile
 from .printed import TABLE_2
 
-__all__ = ["plot", "problem", "track"]
+__all__ = ["Dispersions", "dispersed", "plot", "problem", "track"]
 
-OWN = "passage"
+SHAPE, OWN = 2, "passage"
 DECLINATION, BANK_RATE = -20.0, 10.0
 """Of the arrival's velocity, deg; greatest rate of the bank angle, deg/s."""
 DECLINATIONS = (-60.0, -5.0)
@@ -57,7 +60,7 @@ MESH = {"edges": EDGES, "order": 4, "control_order": 1}
 
 def problem(
     *,
-    shape: int | Sequence[float] = 2,
+    shape: int | Sequence[float] = SHAPE,
     shield: float | str = OWN,
     declination: float = DECLINATION,
     bank_rate: float = BANK_RATE,
@@ -117,6 +120,25 @@ def problem(
     }
     problem.default_evaluations, problem.default_inner, problem.default_start = 1_000, "propagate", "smooth"
     return problem
+
+
+def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
+    """What becomes of each point of a front under dispersions, with its bank profile over time, whose last value stays, and with a constant
+    bank solved anew for each case."""
+    design = _design(front.source.data.get("shape", SHAPE))
+    found, nose = judged(design), float(shapes_of(design)[0].nose[0])
+    ballistic, ratio = float(found.ballistic[0]), float(found.lift_to_drag[0])
+    flights = [next(iter(point.trajectory.values())) for point in front]
+    entries = [float(flight.at(flight.t0)["flight-path angle"]) for flight in flights]
+    capsules = [
+        Capsule(ballistic, ratio, nose, entry, partial(_bank, flight), curved=True) for flight, entry in zip(flights, entries, strict=True)
+    ]
+    return outcomes(capsules, dispersions)
+
+
+def _bank(flight: Any, times: np.ndarray) -> np.ndarray:
+    """The bank angle of a flight at times (k,)."""
+    return np.asarray(flight.at(np.clip(times, flight.t0, flight.tf))["bank angle"])
 
 
 def _design(shape: int | Sequence[float]) -> np.ndarray:

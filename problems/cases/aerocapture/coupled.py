@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...vector_problem import VectorProblem
-from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged
+from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged, shapes_of
+from .dispersions import Capsule, Dispersions, Outcome, outcomes
 from .mars import ARRIVAL_SPEED, EXIT_SPEED, exit_speeds
-from .passage import PASSAGE
+from .passage import PASSAGE, Passage
+
+__all__ = ["Dispersions", "dispersed", "problem", "reference", "reference_designs"]
 
 VARIABLES = (
     ("nose radius", "base radii"),
@@ -37,12 +41,7 @@ def problem(*, arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SP
     exit_speed : float
         Speed at which the air is left, m/s. It decides the path angle there and the delta v of the circular orbit.
     """
-    if not 0.0 <= arrival_speed <= 20e3:
-        raise ValueError(f"arrival_speed: must be from 0 to 20000 m/s, not {arrival_speed!r}")
-    least, greatest = exit_speeds()
-    if not least < exit_speed < greatest:
-        raise ValueError(f"exit_speed: must be between {least:.1f} and {greatest:.1f} m/s, not {exit_speed!r}")
-    passage = replace(PASSAGE, arrival_speed=arrival_speed, exit_speed=exit_speed)
+    passage = _passage(arrival_speed, exit_speed)
     problem = VectorProblem("aerocapture")
     for (name, unit), bounds in zip(VARIABLES, BOUNDS, strict=True):
         problem.variable(name, bounds=bounds, unit=unit)
@@ -80,3 +79,25 @@ def reference() -> np.ndarray:
 def reference_designs() -> np.ndarray:
     """The rows of `reference` with the five variables (k, 7)."""
     return np.loadtxt(Path(__file__).with_name("front.csv"), delimiter=",")
+
+
+def _passage(arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SPEED) -> Passage:
+    """The passage between two speeds, see `problem`. Raises ValueError if there is none."""
+    if not 0.0 <= arrival_speed <= 20e3:
+        raise ValueError(f"arrival_speed: must be from 0 to 20000 m/s, not {arrival_speed!r}")
+    least, greatest = exit_speeds()
+    if not least < exit_speed < greatest:
+        raise ValueError(f"exit_speed: must be between {least:.1f} and {greatest:.1f} m/s, not {exit_speed!r}")
+    return replace(PASSAGE, arrival_speed=arrival_speed, exit_speed=exit_speed)
+
+
+def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
+    """What becomes of each point of a front under dispersions, with its constant bank and with one solved anew for each case."""
+    X, passage = np.array([np.asarray(row) for row in front.decision]), _passage(**front.source.data)
+    found, (shapes, _) = judged(X, passage), shapes_of(X)
+    columns = found.ballistic, found.lift_to_drag, shapes.nose, found.entry_angle, found.bank
+    capsules = [
+        Capsule(ballistic, ratio, nose, angle, bank, entry_speed=passage.entry_speed)
+        for ballistic, ratio, nose, angle, bank in zip(*(column.tolist() for column in columns), strict=True)
+    ]
+    return outcomes(capsules, dispersions)

@@ -1,0 +1,440 @@
+"""Capsules under dispersions of the entry angle, the density of the air and the ballistic coefficient: many cases of each at once.
+
+The motion is planar, in time:
+
+    dh/dt = v sin g,  dv/dt = -rho v^2 / (2 B) - mu / r^2 sin g,  dg/dt = rho v u / (2 B) + (v / r - mu / (r^2 v)) cos g,
+
+with the ballistic coefficient B and the lift over drag that points upward, u. With r that of the interface these are eqs. (6)-(11) of
+Armellin and Lavagna, as in `passage`; with r = R + h those of `winged` over a planet that does not turn, in which altitude, speed and path
+angle depend on no other state and on the cosine of the bank angle alone.
+
+Dormand and Prince, "A family of embedded Runge-Kutta formulae", Journal of Computational and Applied Mathematics 6, 1980: each case has
+steps of its own, so it makes no difference which others are flown with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import radians
+from typing import Any
+
+import numpy as np
+
+from ... import checks
+from .heating import heating_rate, shield_fraction
+from .mars import MARS, Mars
+from .passage import PASSAGE
+
+FLOOR, FARTHEST = 10e3, 10_000e3
+"""Altitude below which a capsule is lost, and that of the farthest apoapsis that counts as captured, m: chosen."""
+SCALES = np.array([MARS.scale_height, 1e3, 0.1, 1e3])[:, None]
+"""Of altitude, speed, path angle and heat load, for the error of a step."""
+TOLERANCE = 1e-9
+"""Error of a step, in scales."""
+LONGEST, FIRST = 30.0, 5.0
+"""Longest and first step, s."""
+STEPS = 5_000
+"""Most steps of a case; 80 to 160 are usual."""
+ON_TARGET = 1.0
+"""How near the apoapsis is to the target where the bank is solved anew, m."""
+TRIALS = 80
+"""Most flights for that; 14 are usual."""
+STRIDE = 0.01
+"""First change of the lift over drag in that search."""
+
+TABLEAU = (
+    np.array([1 / 5]),
+    np.array([3 / 40, 9 / 40]),
+    np.array([44 / 45, -56 / 15, 32 / 9]),
+    np.array([19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729]),
+    np.array([9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]),
+    np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]),
+)
+TIMES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+
+Lift = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(rows (k,), times (k,)) -> lift over drag that points upward (k,)."""
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A design, and how it flies.
+
+    Attributes
+    ----------
+    ballistic, lift_to_drag, nose : float
+        Mass over drag area, kg/m2; lift over drag; nose radius, m.
+    entry_angle : float
+        Path angle at the entry, rad.
+    bank : float or callable
+        Bank angle, rad: constant, or over times (k,) in s since the entry.
+    curved : bool
+        Whether gravity and curvature change with the altitude, as in `winged`, or are those of the interface, as in `passage`.
+    entry_speed : float
+        m/s.
+    """
+
+    ballistic: float
+    lift_to_drag: float
+    nose: float
+    entry_angle: float
+    bank: float | Callable[[np.ndarray], np.ndarray]
+    curved: bool = False
+    entry_speed: float = PASSAGE.entry_speed
+
+    def upward(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """The lift over drag that points upward, as `Lift`."""
+        bank = self.bank(times) if callable(self.bank) else np.full(len(times), self.bank)
+        return self.lift_to_drag * np.cos(bank)
+
+
+@dataclass(frozen=True)
+class Dispersions:
+    """Normal distributions, their standard deviations, and how many cases are drawn.
+
+    Attributes
+    ----------
+    entry_angle : float
+        deg.
+    density, ballistic : float
+        Of a factor of the density, and of the ballistic coefficient.
+    cases : int
+    seed : int
+    """
+
+    entry_angle: float = 0.1
+    density: float = 0.1
+    ballistic: float = 0.02
+    cases: int = 1_000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, most in (("entry_angle", 1.0), ("density", 0.2), ("ballistic", 0.2)):
+            if not 0.0 <= checks.number(getattr(self, name), f"dispersions: {name}") <= most:
+                raise ValueError(f"dispersions: {name} must be from 0 to {most:g}, not {getattr(self, name):g}")
+        for name, least in (("cases", 1), ("seed", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or isinstance(value, bool) or value < least:
+                raise ValueError(f"dispersions: {name} must be a whole number of at least {least}, not {value!r}")
+
+    def draw(self) -> Cases:
+        """The cases, the same for all designs: differences between these are then not those of the draws."""
+        normal = np.random.default_rng(self.seed).standard_normal((3, self.cases))
+        angle, density, ballistic = normal
+        # Factors that are not positive are five standard deviations away or more.
+        return Cases(
+            radians(self.entry_angle) * angle,
+            np.maximum(1.0 + self.density * density, 0.01),
+            np.maximum(1.0 + self.ballistic * ballistic, 0.01),
+        )
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Arrays (k,): added to the entry angle, rad; factors of the density and of the ballistic coefficient."""
+
+    entry_angle: np.ndarray
+    density: np.ndarray
+    ballistic: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.entry_angle)
+
+    def __getitem__(self, rows: np.ndarray) -> Cases:
+        return Cases(self.entry_angle[rows], self.density[rows], self.ballistic[rows])
+
+
+NOMINAL = Cases(np.zeros(1), np.ones(1), np.ones(1))
+
+
+@dataclass(frozen=True)
+class Exits:
+    """How cases leave the air: arrays (k,); of those that do not, NaN.
+
+    Attributes
+    ----------
+    speed, path_angle : ndarray
+        m/s and rad, at the interface.
+    heat : ndarray
+        Heat load at the stagnation point of a nose of 1 m, J/cm2.
+    lowest : ndarray
+        Least altitude, m.
+    """
+
+    speed: np.ndarray
+    path_angle: np.ndarray
+    heat: np.ndarray
+    lowest: np.ndarray
+
+    def inverse_apoapsis(self, mars: Mars = MARS) -> np.ndarray:
+        """Target radius over the apoapsis radius. It is continuous from ellipses to hyperbolas, of which it is negative."""
+        momentum = mars.entry_radius * self.speed * np.cos(self.path_angle)
+        excess = self.speed**2 * mars.entry_radius / mars.mu
+        eccentricity = np.hypot((excess - 1.0) * np.cos(self.path_angle), np.sin(self.path_angle))
+        return mars.target_radius * mars.mu * (1.0 - eccentricity) / momentum**2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What becomes of cases: arrays (k,).
+
+    Attributes
+    ----------
+    captured : ndarray of bool
+        Whether a case leaves the air on an ellipse whose apoapsis is no farther than `FARTHEST`. Of others, the columns below are NaN.
+    lost : ndarray of bool
+        Whether it does not leave the air.
+    on_target : ndarray of bool
+        Whether its apoapsis is within `ON_TARGET` of the target orbit; None where no bank is solved.
+    apoapsis_error : ndarray
+        Altitude of the apoapsis above the target orbit, km.
+    delta_v : ndarray
+        Of the two burns to the target orbit, m/s: see `two_burns`.
+    shield : ndarray
+        Heat shield that its heat load asks for, % of the mass.
+    lowest : ndarray
+        Least altitude, km.
+    upward : ndarray or None
+        Lift over drag that points upward, where it is solved.
+    """
+
+    captured: np.ndarray
+    lost: np.ndarray
+    on_target: np.ndarray | None
+    apoapsis_error: np.ndarray
+    delta_v: np.ndarray
+    shield: np.ndarray
+    lowest: np.ndarray
+    upward: np.ndarray | None = None
+
+    def measures(self) -> dict[tuple[str, str], float | None]:
+        """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and
+        the first of the altitude; None if no case is captured."""
+        found: dict[tuple[str, str], float | None] = {}
+        for name, which in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
+            if which is not None:
+                found[name, "%"] = 100.0 * float(which.mean())
+        worst = {
+            ("apoapsis error, P99", "km"): (np.abs(self.apoapsis_error), 99.0),
+            ("delta v, P99", "m/s"): (self.delta_v, 99.0),
+            ("TPS mass fraction, P99", "%"): (self.shield, 99.0),
+            ("lowest altitude, P1", "km"): (self.lowest, 1.0),
+        }
+        for what, (values, percent) in worst.items():
+            found[what] = float(np.percentile(values[self.captured], percent)) if self.captured.any() else None
+        return found
+
+
+def outcomes(capsules: Sequence[Capsule], dispersions: Dispersions) -> list[dict[str, Outcome]]:
+    """Of each capsule the nominal case alone, and all cases in both ways: `as_it_is` and `solved_anew`."""
+    cases = dispersions.draw()
+    ways = {"nominal": (as_it_is, NOMINAL), "bank as it is": (as_it_is, cases), "bank solved anew": (solved_anew, cases)}
+    return [{name: way(capsule, some) for name, (way, some) in ways.items()} for capsule in capsules]
+
+
+def as_it_is(capsule: Capsule, cases: Cases) -> Outcome:
+    """The cases with the bank angle of the nominal one, or its profile over time."""
+    return _judged(capsule, flown(capsule, cases, capsule.upward))
+
+
+def solved_anew(capsule: Capsule, cases: Cases) -> Outcome:
+    """The cases, each with the constant bank angle that brings its apoapsis to the target orbit.
+
+    More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which all the lift is not enough is flown with all
+    of it in the right direction, and is not `on_target`.
+
+    Raises
+    ------
+    RuntimeError
+        A root is not found where there must be one.
+    """
+    upward = _rooted(capsule, cases)
+    return _judged(capsule, flown(capsule, cases, _constant(upward)), upward)
+
+
+def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> np.ndarray:
+    """Delta v to the circular target orbit, m/s, after exits on ellipses: the first burn, at the apoapsis, brings the other apsis to the
+    target radius, and the second one there makes the orbit a circle.
+
+    Lu, Cerimele, Tigges and Matz, "Optimal aerocapture guidance", Journal of Guidance, Control, and Dynamics 38(4), 2015. With
+    the apoapsis on the target it is `mars.circularisation`.
+    """
+    goal = mars.target_radius
+    apoapsis = goal / Exits(speed, path_angle, speed, speed).inverse_apoapsis(mars)
+    slow = mars.entry_radius * speed * np.cos(path_angle) / apoapsis
+    between = apoapsis + goal
+    first = np.abs(np.sqrt(2.0 * mars.mu * goal / (apoapsis * between)) - slow)
+    return np.asarray(first + np.abs(np.sqrt(2.0 * mars.mu * apoapsis / (goal * between)) - np.sqrt(mars.mu / goal)))
+
+
+def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> Outcome:
+    inverse = exits.inverse_apoapsis()
+    goal = MARS.target_radius
+    # False for NaN, too.
+    captured = inverse >= goal / (MARS.radius + FARTHEST)
+    columns = np.full((4, len(inverse)), np.nan)
+    speed, path, heat, lowest = (values[captured] for values in (exits.speed, exits.path_angle, exits.heat, exits.lowest))
+    error = goal / inverse[captured] - goal
+    columns[:, captured] = error / 1e3, two_burns(speed, path), shield_fraction(heat / capsule.nose**0.5), lowest / 1e3
+    miss, delta_v, shield, least = columns
+    on_target = None if upward is None else np.abs(miss) <= 1e-3 * ON_TARGET
+    return Outcome(captured, np.isnan(inverse), on_target, miss, delta_v, shield, least, upward)
+
+
+def _constant(upward: np.ndarray) -> Lift:
+    """The same lift over drag all the time, of each row its own."""
+    return lambda rows, times: upward[rows]
+
+
+def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
+    """The lift over drag (k,) with which each case's apoapsis is on the target orbit, or the limit beyond which it would be.
+
+    From the nominal one outward in strides that double until the root is between two, then by regula falsi in the Illinois form, or by
+    halving where one of the two is lost.
+    """
+    k, most = len(cases), abs(capsule.lift_to_drag)
+    near = 0.5 * ON_TARGET / MARS.target_radius
+    start = 0.0 if callable(capsule.bank) else capsule.lift_to_drag * float(np.cos(capsule.bank))
+    # At `low` the apoapsis is below the target, or the case is lost: infinite. At `high` it is above.
+    low, high, below, above = (np.full(k, np.nan) for _ in range(4))
+    upward, strides, last = np.full(k, start), np.full(k, STRIDE), np.zeros(k)
+    (active,) = _only(slice(None), np.arange(k))
+    for _ in range(TRIALS):
+        trial = upward[active]
+        excess = flown(capsule, cases[active], _constant(trial)).inverse_apoapsis() - 1.0
+        excess = np.where(np.isnan(excess), np.inf, excess)
+        under = excess > 0.0
+        done = (np.abs(excess) <= near) | (under & (trial >= most)) | (~under & (trial <= -most))
+        active, trial, excess, under = _only(~done, active, trial, excess, under)
+        if not len(active):
+            return upward
+        side = np.where(under, 1.0, -1.0)
+        again = side == last[active]
+        last[active] = side
+        low[active[under]], below[active[under]] = trial[under], excess[under]
+        high[active[~under]], above[active[~under]] = trial[~under], excess[~under]
+        above[active[under & again]] *= 0.5
+        below[active[~under & again]] *= 0.5
+        a, b, fa, fb = low[active], high[active], below[active], above[active]
+        with np.errstate(invalid="ignore"):
+            falsi = (a * fb - b * fa) / (fb - fa)
+        between = np.where(np.isfinite(falsi), falsi, 0.5 * (a + b))
+        open_ended = np.isnan(a) | np.isnan(b)
+        upward[active] = np.where(open_ended, np.clip(trial + side * strides[active], -most, most), between)
+        strides[active] *= 2.0
+    raise RuntimeError(f"no constant bank found in {TRIALS} flights for {len(active)} of {k} cases")
+
+
+def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
+    """The way of each case through the air, from the interface until it leaves it or is lost: below `FLOOR`, or too slow to rise again.
+
+    Raises
+    ------
+    RuntimeError
+        A case takes more than `STEPS` steps.
+    """
+    k = len(cases)
+    motion = _Motion(capsule, MARS.density * cases.density, capsule.ballistic * cases.ballistic, lift)
+    rows, times, steps = _only(slice(None), np.arange(k), np.zeros(k), np.full(k, FIRST))
+    states: np.ndarray = np.zeros((4, k))
+    states[0], states[1], states[2] = MARS.interface, capsule.entry_speed, capsule.entry_angle + cases.entry_angle
+    # Steps in which cases are level, and in which they leave the air.
+    level: list[tuple[np.ndarray, ...]] = []
+    last: list[tuple[np.ndarray, ...]] = []
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        slopes = motion.rates(states, times, rows)
+        for _ in range(STEPS):
+            ends, end_slopes, error = motion.step(states, slopes, times, steps, rows)
+            good = error <= 1.0
+            out = good & (ends[0] >= MARS.interface)
+            for which, kept in ((good & (states[2] < 0.0) & (ends[2] >= 0.0), level), (out, last)):
+                if which.any():
+                    kept.append(_only(which, states, ends, slopes, times, steps, rows))
+            stays = ~(out | (good & motion.lost(ends)))
+            states, slopes = np.where(good, ends, states), np.where(good, end_slopes, slopes)
+            times = np.where(good, times + steps, times)
+            # An error that is no number: of a step that is far too long.
+            factor = np.where(np.isfinite(error), 0.9 * np.maximum(error, 1e-10) ** -0.2, 0.2)
+            steps = np.minimum(steps * np.clip(factor, 0.2, 5.0), LONGEST)
+            if not stays.all():
+                states, slopes, times, steps, rows = _only(stays, states, slopes, times, steps, rows)
+            if not len(rows):
+                return motion.exits(level, last)
+    raise RuntimeError(f"{len(rows)} of {k} cases did not end in {STEPS} steps")
+
+
+def _only(which: Any, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Some entries along the last axis of each array."""
+    return tuple(values[..., which] for values in arrays)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """The equations of a capsule's cases, and steps along them; states (4, m) are altitude, speed, path angle and heat load."""
+
+    capsule: Capsule
+    density: np.ndarray
+    ballistic: np.ndarray
+    lift: Lift
+
+    def rates(self, states: np.ndarray, times: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Rates (4, m) of some rows of the cases at times (m,)."""
+        altitude, speed, path, _ = states
+        density = self.density[rows] * np.exp((MARS.interface - altitude) / MARS.scale_height)
+        radius = MARS.radius + altitude if self.capsule.curved else MARS.entry_radius
+        gravity, sine = MARS.mu / radius**2, np.sin(path)
+        drag = 0.5 * density * speed / self.ballistic[rows]
+        rates = np.empty(states.shape)
+        rates[0] = speed * sine
+        rates[1] = -drag * speed - gravity * sine
+        rates[2] = drag * self.lift(rows, times) + (speed / radius - gravity / speed) * np.cos(path)
+        rates[3] = heating_rate(density, speed)
+        return rates
+
+    def lost(self, states: np.ndarray) -> np.ndarray:
+        """Whether cases (m,) are below `FLOOR`, or have less energy than it takes to rise to the interface: drag only takes of it."""
+        altitude, speed = states[:2]
+        radius = MARS.radius + altitude if self.capsule.curved else MARS.entry_radius
+        return np.asarray((altitude < FLOOR) | (0.5 * speed**2 < MARS.mu / (radius * MARS.entry_radius) * (MARS.interface - altitude)))
+
+    def step(
+        self, states: np.ndarray, slopes: np.ndarray, times: np.ndarray, steps: np.ndarray, rows: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States and rates at the end of steps (m,), and the errors, of which 1 is allowed."""
+        stages = [slopes]
+        for weights, share in zip(TABLEAU, TIMES, strict=True):
+            ends = states + steps * sum(weight * stage for weight, stage in zip(weights, stages, strict=True) if weight)
+            stages.append(self.rates(ends, times + share * steps, rows))
+        error = steps * sum(weight * stage for weight, stage in zip(ERROR, stages, strict=True) if weight)
+        return ends, stages[-1], np.abs(error / (TOLERANCE * SCALES)).max(axis=0)
+
+    def exits(self, level: Sequence[tuple[np.ndarray, ...]], last: Sequence[tuple[np.ndarray, ...]]) -> Exits:
+        """From the steps in which cases are level, and the last ones of those that leave the air: arguments of `until`."""
+        found, lowest = np.full((4, len(self.density)), np.nan), np.full(len(self.density), MARS.interface)
+        if last:
+            steps = [np.concatenate(one, axis=-1) for one in zip(*last, strict=True)]
+            found[:, steps[-1]] = self.until(0, MARS.interface, *steps)
+        if level:
+            steps = [np.concatenate(one, axis=-1) for one in zip(*level, strict=True)]
+            np.minimum.at(lowest, steps[-1], self.until(2, 0.0, *steps)[0])
+        return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
+
+    def until(
+        self,
+        which: int,
+        value: float,
+        states: np.ndarray,
+        ends: np.ndarray,
+        slopes: np.ndarray,
+        times: np.ndarray,
+        steps: np.ndarray,
+        rows: np.ndarray,
+    ) -> np.ndarray:
+        """States where one of them has a value that it reaches within a step: Newton's method on the length of the step."""
+        length = steps * (value - states[which]) / (ends[which] - states[which])
+        for _ in range(6):
+            there, rates, _ = self.step(states, slopes, times, length, rows)
+            length = np.clip(length - (there[which] - value) / rates[which], 0.0, steps)
+        return there

@@ -1,0 +1,320 @@
+"""Capsules under dispersions against DOP853 in Cartesian coordinates, roots of other code, and what must hold for any draws."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from macs import payoff
+from problems import load
+from problems.cases.aerocapture import bank, dispersions
+from problems.cases.aerocapture.designs import judged, shapes_of
+from problems.cases.aerocapture.dispersions import NOMINAL, Capsule, Cases, Dispersions, as_it_is, flown, solved_anew, two_burns
+from problems.cases.aerocapture.mars import MARS, circularisation, exit_angle
+from problems.cases.aerocapture.printed import TABLE_2
+from transcription import stated
+
+MU, RADIUS, HEIGHT, DENSITY = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7
+TOP, TARGET = RADIUS + 100e3, RADIUS + 200e3
+RTOL = 1e-6
+
+
+@cache
+def capsule(number: int) -> Capsule:
+    """A solution of Table 2 with its constant bank."""
+    X = np.array([TABLE_2[number].design])
+    found, nose = judged(X), shapes_of(X)[0].nose
+    return Capsule(*(float(c[0]) for c in (found.ballistic, found.lift_to_drag, nose, found.entry_angle, found.bank)))
+
+
+def rolled(times: np.ndarray) -> np.ndarray:
+    """A bank profile of solution 2 that rolls from upward to downward lift while the air is dense."""
+    return np.interp(times, [0.0, 88.0, 106.0], [0.0, 0.0, np.pi])
+
+
+PROFILED = Capsule(120.0, 0.32, 1.22, np.radians(-10.2), rolled, curved=True)
+
+
+def heating(density: float, speed: float) -> float:
+    return 1.35e-8 * np.sqrt(density) * speed**3.04 * (1 - 1.395e6 / (speed**2 / 2))
+
+
+def over_a_plain(design: Capsule, upward, case: Cases, row: int):
+    """How a case ends with gravity and curvature of the interface: altitude above it, speed, path angle and heat load."""
+    ballistic = design.ballistic * case.ballistic[row]
+
+    def slope(t, y):
+        h, v, g, _ = y
+        rho = DENSITY * case.density[row] * np.exp(-h / HEIGHT)
+        turn = rho * v * upward(t) / (2 * ballistic) + (v / TOP - MU / TOP**2 / v) * np.cos(g)
+        return [v * np.sin(g), -rho * v**2 / (2 * ballistic) - MU / TOP**2 * np.sin(g), turn, heating(rho, v)]
+
+    begin = [0.0, design.entry_speed, design.entry_angle + case.entry_angle[row], 0.0]
+    return ended(slope, begin, lambda y: y[0], lambda y: y[2], [1e-5, 1e-8, 1e-12, 1e-6])
+
+
+def in_space(design: Capsule, upward, case: Cases, row: int):
+    """The same in Cartesian coordinates over the round planet, the rest of the lift to the side: position, velocity and heat load."""
+    ballistic = design.ballistic * case.ballistic[row]
+
+    def slope(t, y):
+        r, w = y[:3], y[3:6]
+        distance, speed = np.linalg.norm(r), np.linalg.norm(w)
+        rho = DENSITY * case.density[row] * np.exp(-(distance - TOP) / HEIGHT)
+        right = np.cross(w, r) / np.linalg.norm(np.cross(w, r))
+        up, along = np.cross(right, w / speed), w / speed
+        sideways = np.sqrt(max(design.lift_to_drag**2 - upward(t) ** 2, 0.0))
+        force = rho * speed**2 / (2 * ballistic) * (upward(t) * up + sideways * right - along)
+        return [*w, *(force - MU / distance**3 * r), heating(rho, speed)]
+
+    angle = design.entry_angle + case.entry_angle[row]
+    begin = [TOP, 0.0, 0.0, design.entry_speed * np.sin(angle), design.entry_speed * np.cos(angle), 0.0, 0.0]
+    return ended(
+        slope, begin, lambda y: np.linalg.norm(y[:3]) - TOP, lambda y: np.dot(y[:3], y[3:6]), [*[1e-5] * 3, *[1e-8] * 3, 1e-6], max_step=1.0
+    )
+
+
+def ended(slope, begin, height, climb, atol, max_step=np.inf):
+    """Integrated until the height above the interface is 0 again, or -95 km; with the least height, at the zeros of the climb."""
+
+    def out(t, y):
+        return height(y) if t > 20.0 else -1.0
+
+    def down(_, y):
+        return height(y) + 95e3
+
+    def level(_, y):
+        return climb(y)
+
+    out.terminal = down.terminal = True
+    out.direction = level.direction = 1
+    found = solve_ivp(slope, (0, 1e4), begin, method="DOP853", rtol=1e-11, atol=atol, events=[out, down, level], max_step=max_step)
+    assert found.status == 1
+    end = found.y[:, -1] if len(found.t_events[0]) else None
+    return end, min((height(y) for y in found.y_events[2]), default=0.0) + 100e3
+
+
+def momentum_and_energy(end: np.ndarray) -> tuple[float, float]:
+    if len(end) == 4:
+        return TOP * end[1] * np.cos(end[2]), end[1] ** 2 / 2 - MU / TOP
+    return float(np.linalg.norm(np.cross(end[:3], end[3:6]))), end[3:6] @ end[3:6] / 2 - MU / float(np.linalg.norm(end[:3]))
+
+
+def apoapsis(end: np.ndarray) -> float:
+    """Altitude of the apoapsis, km; infinite on a hyperbola."""
+    momentum, energy = momentum_and_energy(end)
+    if energy >= 0:
+        return np.inf
+    return (-MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) - RADIUS) / 1e3
+
+
+def upward_of(design: Capsule):
+    if callable(design.bank):
+        return lambda t: design.lift_to_drag * np.cos(float(design.bank(np.array([t]))[0]))
+    return lambda t: design.lift_to_drag * np.cos(design.bank)
+
+
+@pytest.mark.parametrize("number", TABLE_2)
+def test_without_dispersion_it_is_the_nominal_passage(number):
+    """The passage is solved by collocation from the exit back to the entry; this is flown forward."""
+    design, nominal = capsule(number), judged(np.array([TABLE_2[number].design]))
+    found = as_it_is(design, NOMINAL)
+    assert found.captured[0] and not found.lost[0]
+    assert found.apoapsis_error[0] == pytest.approx(0.0, abs=1e-3)
+    assert found.delta_v[0] == pytest.approx(circularisation(3500.0), rel=RTOL)
+    assert found.shield[0] == pytest.approx(nominal.shield[0], rel=RTOL)
+    assert found.lowest[0] == pytest.approx(nominal.lowest[0] / 1e3, rel=RTOL)
+    anew = solved_anew(design, NOMINAL)
+    assert anew.on_target[0]
+    assert anew.upward[0] == pytest.approx(nominal.lift[0], abs=RTOL)
+
+
+@pytest.mark.parametrize(("design", "way"), [(capsule(1), over_a_plain), (capsule(5), over_a_plain), (PROFILED, in_space)])
+def test_cases_flown_by_other_code(design, way):
+    """Those that come out, captured or not, to 1e-6; and nothing else is captured or lost."""
+    cases = Dispersions(cases=14, seed=5).draw()
+    exits, outcome = flown(design, cases, design.upward), as_it_is(design, cases)
+    met = set()
+    for row in range(len(cases)):
+        end, least = way(design, upward_of(design), cases, row)
+        assert outcome.lost[row] == (end is None)
+        if end is None:
+            assert not outcome.captured[row] and np.isnan(outcome.delta_v[row])
+            met.add("lost")
+            continue
+        momentum, energy = momentum_and_energy(end)
+        speed = np.sqrt(2 * (energy + MU / TOP))
+        assert exits.speed[row] == pytest.approx(speed, rel=RTOL)
+        assert exits.path_angle[row] == pytest.approx(np.arccos(min(momentum / (TOP * speed), 1.0)), abs=RTOL)
+        assert exits.heat[row] == pytest.approx(end[-1], rel=RTOL)
+        assert exits.lowest[row] == pytest.approx(least, rel=RTOL)
+        above = apoapsis(end)
+        assert outcome.captured[row] == (above <= 10_000)
+        met.add("captured" if above <= 10_000 else "away")
+        if outcome.captured[row]:
+            assert outcome.apoapsis_error[row] == pytest.approx(above - 200.0, rel=1e-5, abs=1e-2)
+            assert outcome.shield[row] == pytest.approx(0.091 * (end[-1] / np.sqrt(design.nose)) ** 0.51575, rel=RTOL)
+            assert outcome.lowest[row] == pytest.approx(least / 1e3, rel=RTOL)
+    assert {"lost", "captured"} <= met
+
+
+def test_the_farthest_apoapsis_that_counts():
+    """On both sides of 10,000 km, and of the parabola: lift over drags found by a root of other code."""
+    design = capsule(2)
+
+    def above(upward: float) -> float:
+        end, _ = over_a_plain(design, lambda _: upward, NOMINAL, 0)
+        return 1.0 / (apoapsis(end) + RADIUS / 1e3) if end is not None else 1.0
+
+    start = design.lift_to_drag * np.cos(design.bank)
+    limit = brentq(lambda u: above(u) - 1e3 / (RADIUS + 10_000e3), start, start + 0.06, xtol=1e-10)
+    for upward, inside in ((limit - 1e-6, True), (limit + 1e-6, False), (limit + 0.05, False), (0.3, False)):
+        flight = Capsule(design.ballistic, 1.0, design.nose, design.entry_angle, np.arccos(upward))
+        found = as_it_is(flight, NOMINAL)
+        assert found.captured[0] == inside and not found.lost[0]
+    assert found.measures()["delta v, P99", "m/s"] is None
+
+
+def test_roots_of_other_code():
+    design, cases = capsule(3), Dispersions(cases=4, seed=11).draw()
+    found = solved_anew(design, cases)
+    assert found.on_target.all() and found.captured.all()
+    for row in range(len(cases)):
+
+        def miss(upward: float, row: int = row) -> float:
+            end, _ = over_a_plain(design, lambda _: upward, cases, row)
+            return -100.0 if end is None else min(apoapsis(end), 1e6) - 200.0
+
+        near = found.upward[row]
+        assert brentq(miss, near - 1e-3, near + 1e-3, xtol=1e-12) == pytest.approx(near, abs=RTOL)
+        assert miss(near) == pytest.approx(0.0, abs=5e-3)
+
+
+def test_not_enough_lift_is_flown_with_all_of_it():
+    """A steep case needs more lift upward than there is, shallow ones more downward; none is on target, but one is captured."""
+    most = abs(capsule(2).lift_to_drag * np.cos(capsule(2).bank)) + 0.01
+    weak = Capsule(capsule(2).ballistic, -most, 1.0, capsule(2).entry_angle, 0.0)
+    cases = Cases(np.radians([-2.0, 0.0, 0.5, 0.05]), np.ones(4), np.ones(4))
+    found = solved_anew(weak, cases)
+    assert found.upward[[0, 2, 3]].tolist() == [most, -most, -most]
+    assert found.on_target.tolist() == [False, True, False, False]
+    assert found.captured.tolist() == [False, True, False, True]
+    assert found.lost.tolist() == [True, False, False, False]
+
+
+def test_small_dispersions_are_linear():
+    """The apoapsis of each case against slopes by central differences of other code."""
+    design = capsule(4)
+    small = Dispersions(entry_angle=1e-6, density=1e-7, ballistic=1e-7, cases=50, seed=3)
+    cases = small.draw()
+
+    def far(angle: float, density: float, ballistic: float) -> float:
+        case = Cases(np.array([angle]), np.array([1 + density]), np.array([1 + ballistic]))
+        return apoapsis(over_a_plain(design, upward_of(design), case, 0)[0])
+
+    slopes = [(far(*(e * 1e-6)) - far(*(-e * 1e-6))) / 2e-6 for e in np.eye(3)]
+    expected = np.column_stack([cases.entry_angle, cases.density - 1, cases.ballistic - 1]) @ slopes
+    nominal = as_it_is(design, NOMINAL).apoapsis_error[0]
+    np.testing.assert_allclose(as_it_is(design, cases).apoapsis_error - nominal, expected, rtol=0.02, atol=3e-4)
+    assert np.abs(expected).max() > 0.02
+
+
+def test_shorter_steps_converge(monkeypatch):
+    design, cases = capsule(2), Dispersions(cases=100, seed=1).draw()
+    found = []
+    for tolerance in (1e-12, 1e-8, 1e-6):
+        monkeypatch.setattr(dispersions, "TOLERANCE", tolerance)
+        found.append(flown(design, cases, design.upward).inverse_apoapsis())
+    out = np.isfinite(found[0])
+    errors = [np.abs(one - found[0])[out].max() for one in found[1:]]
+    assert 30 < out.sum() < 70
+    assert errors[0] < 1e-6 and errors[0] < 0.1 * errors[1]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.7, 1.4), st.floats(-0.2, 0.2), st.sampled_from(sorted(TABLE_2)))
+def test_density_and_ballistic_coefficient_together_change_only_the_heat(factor, angle, number):
+    """The motion depends on their ratio; the heating rate goes with the root of the density."""
+    design = capsule(number)
+    tilt, one = np.full(2, np.radians(angle)), np.array([1.0, factor])
+    exits = flown(design, Cases(tilt, one, one), lambda rows, _: np.full(len(rows), 0.1))
+    np.testing.assert_allclose(exits.speed[1], exits.speed[0], rtol=1e-7)
+    np.testing.assert_allclose(exits.lowest[1], exits.lowest[0], rtol=1e-7)
+    np.testing.assert_allclose(exits.heat[1], np.sqrt(factor) * exits.heat[0], rtol=1e-7)
+
+
+@pytest.mark.parametrize("number", TABLE_2)
+def test_heavier_thinner_and_steeper_go_deeper(number):
+    design = capsule(number)
+    steeper, thicker, heavier = np.array([0, -2e-3, 0, 0]), np.array([1, 1, 1.1, 1]), np.array([1, 1, 1, 1.1])
+    lowest = flown(design, Cases(steeper, thicker, heavier), lambda rows, _: np.full(len(rows), 0.2)).lowest
+    assert lowest[1] < lowest[0] and lowest[3] < lowest[0] < lowest[2]
+
+
+def test_two_burns():
+    """Of an exit to the target that of the paper; else the sum of two differences of speeds by vis-viva."""
+    angle = exit_angle(3500.0)
+    assert two_burns(np.array([3500.0]), np.array([angle]))[0] == pytest.approx(circularisation(3500.0), rel=1e-12)
+    speed, path = np.array([3480.0, 3600.0, 4500.0]), np.array([0.01, 0.05, 0.1])
+    for v, g, found in zip(speed, path, two_burns(speed, path), strict=True):
+        r = 1e3 * apoapsis(np.array([0.0, v, g, 0.0])) + RADIUS
+        between = 2 * MU / (r + TARGET)
+        at_apoapsis = abs(np.sqrt(2 * MU / r - between) - TOP * v * np.cos(g) / r)
+        assert found == pytest.approx(at_apoapsis + abs(np.sqrt(2 * MU / TARGET - between) - np.sqrt(MU / TARGET)), rel=1e-9)
+    assert MARS.target_radius == TARGET
+
+
+def test_the_same_seed_gives_the_same_bits():
+    """And a case does not depend on the others."""
+    settings_ = Dispersions(cases=200, seed=7)
+    cases = settings_.draw()
+    again = settings_.draw()
+    assert cases.entry_angle.tobytes() == again.entry_angle.tobytes()
+    assert cases.density.tobytes() != Dispersions(cases=200, seed=8).draw().density.tobytes()
+    design, some = capsule(2), np.arange(3, 200, 7)
+    whole, part = as_it_is(design, cases), as_it_is(design, cases[some])
+    assert whole.apoapsis_error[some].tobytes() == part.apoapsis_error.tobytes()
+    assert solved_anew(design, cases).upward.tobytes() == solved_anew(design, again).upward.tobytes()
+
+
+def test_draws_are_normal():
+    """Means and standard deviations within four standard errors, and no correlation."""
+    cases = Dispersions(cases=40_000, seed=2).draw()
+    values = np.array([np.degrees(cases.entry_angle) / 0.1, (cases.density - 1) / 0.1, (cases.ballistic - 1) / 0.02])
+    np.testing.assert_allclose(values.mean(axis=1), 0.0, atol=4 / 200)
+    np.testing.assert_allclose(np.cov(values), np.eye(3), atol=4 * np.sqrt(2) / 200)
+
+
+@pytest.mark.parametrize(
+    ("given_", "words"),
+    [
+        ({"cases": 0}, "cases must be a whole number of at least 1"),
+        ({"cases": 10.5}, "cases must be a whole number"),
+        ({"seed": -1}, "seed must be a whole number of at least 0"),
+        ({"density": -0.1}, "density must be from 0 to 0.2"),
+        ({"entry_angle": 2.0}, "entry_angle must be from 0 to 1"),
+        ({"ballistic": float("nan")}, "ballistic"),
+    ],
+)
+def test_settings_that_make_no_sense(given_, words):
+    with pytest.raises(ValueError, match=words):
+        Dispersions(**given_)
+
+
+def test_points_of_the_bank_problem_fly_their_profiles():
+    """The nominal case of both ends of the front has the objectives that the simulation of the whole motion in space finds."""
+    problem = load("aerocapture_bank")
+    front = payoff(problem, stated(problem.default_transcription))
+    for point, found in zip(front, bank.dispersed(front, Dispersions(cases=3)), strict=True):
+        simulated = point.simulate(rtol=1e-10).objectives
+        nominal = found["nominal"]
+        assert abs(nominal.apoapsis_error[0]) < 0.5
+        assert nominal.shield[0] == pytest.approx(simulated["TPS mass fraction"], rel=1e-4)
+        assert nominal.delta_v[0] == pytest.approx(simulated["delta v"], abs=0.3)
+        assert found["bank solved anew"].on_target.all() and len(found["bank as it is"].captured) == 3
