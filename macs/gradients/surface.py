@@ -21,11 +21,6 @@ CLOSER = (1 / 3, 1 / 9)
 the simplex between the ends, and far from known points it is not known where it ends."""
 
 
-SOUGHT = 0.15
-"""With a guide, this part of the solves goes from other points to the one that it puts first: those that follow begin near it, and another
-may lead to a better valley."""
-
-
 @dataclass(frozen=True)
 class Task:
     """Gradient solve to be made: the row of the point at which it starts, the reference (m,), and the place (m,) that it goes to."""
@@ -50,8 +45,6 @@ class Surface:
         Places and points in the plane; the ends first.
     solved : array (k, m)
         Objectives of what solves converged to, and of the ends.
-    sought : array (k, m)
-        Objectives of the points from which the one that the guide puts first was sought.
     """
 
     pool: Archive
@@ -59,7 +52,6 @@ class Surface:
     between: np.ndarray
     known: np.ndarray
     solved: np.ndarray
-    sought: np.ndarray
     lattice: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -77,21 +69,13 @@ class Surface:
         """To the place that is farthest from all known ones, from the point that is best for it."""
         place = self.lattice[np.argmax(self._apart(self.lattice))]
         reference = self.ideal + self.between * place
-        return Task(self._best_for(reference, np.arange(len(self.pool))), reference, place)
+        start = ((self.pool.F - reference) / self.between).max(axis=1).argmin()
+        return Task(int(start), reference, place)
 
-    def to_the_first(self, first: int) -> Task | None:
-        """To the point that the guide puts first, from the best for it of those that it was not sought from; None if there are none."""
-        tried = (self.pool.F[:, None] == self.sought).all(axis=2).any(axis=1)
-        tried[first] = True
-        if tried.all():
-            return None
-        start = self._best_for(self.pool.F[first], np.flatnonzero(~tried))
-        self.sought = np.vstack([self.sought, self.pool.F[start]])
-        return Task(start, self.pool.F[first], self.plane(self.pool.F[first : first + 1])[0])
-
-    def around(self, first: int, guide: Guide) -> Task:
-        """To the place around a point that is farthest from known ones, by the guide's factors that are expected there; from the nearest of
-        the points where the guide wants most: what is good for the place alone may lie in a poor valley."""
+    def guided(self, guide: Guide) -> Task:
+        """To the place, around the point that the guide puts first, that is farthest from known ones, by the factors that are expected
+        there; from the nearest of the points where the guide wants most: what is good for the place alone may lie in a poor valley."""
+        first = int(guide.anchors(self.pool.F)[0])
         shape = self.lattice - self.lattice.mean(axis=0)
         places = np.vstack([self.plane(self.pool.F[first : first + 1]) + closer * shape for closer in CLOSER])
         factors = guide.factors(self.pool.F, self.ideal + self.between * self._raised(places))
@@ -114,10 +98,6 @@ class Surface:
         """Distances (k,) of places (k, m) from the nearest known ones."""
         return np.linalg.norm(places[:, None] - self.known, axis=2).min(axis=1)
 
-    def _best_for(self, reference: np.ndarray, rows: np.ndarray) -> int:
-        """That of the rows whose point is the least above a reference (m,)."""
-        return int(rows[((self.pool.F[rows] - reference) / self.between).max(axis=1).argmin()])
-
     def _raised(self, places: np.ndarray) -> np.ndarray:
         """Where the diagonals from places (k, m) are expected to meet the front: as far up as its point nearest to the diagonal."""
         front = (self.pool.F - self.ideal) / self.between
@@ -135,20 +115,13 @@ def cover(archive: Archive, ends: Archive, solves: CountedSolves, limit: int, gu
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
-    surface = Surface(pool.take(distinct(pool.F, span)), ideal, between, known, ends.F, ends.F[:0])
-    for k in range(max(limit, total := solves.left)):
+    surface = Surface(pool.take(distinct(pool.F, span)), ideal, between, known, ends.F)
+    for k in range(max(limit, solves.left)):
         # As long as it says nothing, the search is even.
         guided = guide is not None and np.ptp(guide.factors(surface.pool.F, surface.pool.F)) > 0.0
         if solves.left <= 0 or (k >= limit and not guided):
             break
-        task = _next(surface, guide, SOUGHT * total) if guide is not None and guided else surface.even()
+        task = surface.guided(guide) if guide is not None and guided else surface.even()
         found = solves(surface.pool.Z[task.start : task.start + 1], task.reference[None], between[None])
         surface.add(task, found, bool(solves.feasible(found)[0]))
     return surface
-
-
-def _next(surface: Surface, guide: Guide, seeking: float) -> Task:
-    """The next solve with a guide, of which so many are to seek the point that it puts first."""
-    first = int(guide.anchors(surface.pool.F)[0])
-    task = surface.to_the_first(first) if len(surface.sought) < seeking else None
-    return surface.around(first, guide) if task is None else task

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import pytest
 from scipy.optimize import brentq
 
 from macs.decisions import ReferencePoint
 from macs.evaluation.evaluator import CONVERGED, Evaluation
 from macs.gradients.surface import Surface, cover
 from macs.pareto.archive import Archive
-from macs.pareto.directions import simplex_lattice
+from macs.pareto.directions import across, simplex_lattice
 from macs.search.guide import PreferenceGuide
 from problems.compiled import Objective
 
@@ -46,7 +45,7 @@ def on_sphere(directions: np.ndarray, radius: float) -> Archive:
 
 
 ENDS = on_sphere(np.eye(3), GOOD)
-"""The ends of the front; they are no good for the preference, and solves from them are tried once."""
+"""The ends of the front; they are no good for the preference."""
 
 
 def test_places_are_spread_evenly_without_a_guide() -> None:
@@ -57,22 +56,16 @@ def test_places_are_spread_evenly_without_a_guide() -> None:
     assert len(surface.solved) == 15
 
 
-def test_a_better_valley_is_found_from_other_points_and_kept() -> None:
-    poor = on_sphere(simplex_lattice(3, 4), POOR)
-    poor = poor.take(~(poor.F == 0.0).any(axis=1))
+def test_solves_begin_where_points_are_good_and_stay_in_the_better_valley() -> None:
+    """One point of the good valley is best; those of the poor one are nearer to most places."""
+    poor = on_sphere(simplex_lattice(3, 12), POOR)
+    poor = poor.take((poor.F > 0.0).all(axis=1))
+    best = on_sphere(np.array([[0.3, 0.4, 0.5]]), GOOD)
+    surface = Surface(ENDS.joined(poor).joined(best), np.zeros(3), np.ones(3), across(ENDS.F), ENDS.F)
+    task = surface.guided(GUIDE)
+    assert task.start == len(surface.pool) - 1
+    apart = np.linalg.norm(surface.plane(surface.pool.F) - task.place, axis=1)
+    assert apart.argmin() != task.start
     solves = Spheres(40)
-    surface = cover(poor, ENDS, solves, 12, GUIDE)  # type: ignore[arg-type]
-    assert solves.left == 0
-    # The good valley is known at the ends alone, which are never good places to start from.
-    assert POOR in solves.begun[:6] and GOOD in solves.begun[:6]
-    assert set(solves.begun[6:]) == {GOOD}
-    wanted = GUIDE.factors(surface.pool.F, surface.pool.F)
-    assert np.linalg.norm(surface.pool.F[wanted == wanted.max()], axis=1) == pytest.approx(GOOD, abs=1e-9)
-
-
-def test_the_first_point_is_sought_from_each_other_once() -> None:
-    points = on_sphere(np.array([[1.0, 1, 1], [2, 1, 1], [1, 3, 1]]), GOOD)
-    surface = Surface(points, np.zeros(3), np.ones(3), np.eye(3), ENDS.F, points.F[:0])
-    starts = [surface.to_the_first(0) for _ in range(3)]
-    assert [task and task.start for task in starts] == [1, 2, None]
-    assert starts[0] is not None and starts[0].reference == pytest.approx(points.F[0])
+    surface = cover(best.joined(poor), ENDS, solves, 12, GUIDE)  # type: ignore[arg-type]
+    assert solves.left == 0 and set(solves.begun) == {GOOD}
