@@ -16,7 +16,7 @@ import numpy as np
 
 from transcription.numerics.polynomials import gauss_legendre
 
-from .elementary import absolute, arccos, choose, column, cos, lesser, sign, sin, tan
+from .elementary import arccos, choose, column, cos, lesser, sin, tan
 from .shape import Shapes
 
 MASS = 946.0
@@ -43,7 +43,9 @@ def lift_and_drag(shapes: Shapes, attack: Any, greatest: float = GREATEST_PRESSU
     greatest : float
         Pressure coefficient at the stagnation point.
     """
-    size = absolute(attack)
+    # Not by absolute value and sign, whose derivatives vanish at zero.
+    side = choose(attack < 0.0, -1.0, 1.0)
+    size = side * attack
     axial, normal = _sphere(shapes, size)
     edge = (shapes.edge / shapes.base) ** 2
     # Of a cone the sides are straight: its area, over the sine of the half angle, is that of the ring that one sees along the axis.
@@ -51,7 +53,7 @@ def lift_and_drag(shapes: Shapes, attack: Any, greatest: float = GREATEST_PRESSU
     ring = (1.0 - edge) / (2.0 * np.pi)
     axial, normal = axial + ring * along, normal + ring * across / tan(shapes.front_angle)
     # Towards the windward side: below for a positive angle of attack, so that the force is upward.
-    normal = sign(attack) * normal
+    normal = side * normal
     drag = axial * cos(attack) + normal * sin(attack)
     lift = normal * cos(attack) - axial * sin(attack)
     return greatest * lift, greatest * drag

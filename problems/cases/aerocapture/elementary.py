@@ -19,7 +19,7 @@ def _of(array: Callable[..., Any], expression: Callable[..., Any]) -> Callable[.
 
 
 sin, cos, tan, arccos = (_of(*pair) for pair in ((np.sin, ca.sin), (np.cos, ca.cos), (np.tan, ca.tan), (np.arccos, ca.acos)))
-absolute, sign, log = _of(np.abs, ca.fabs), _of(np.sign, ca.sign), _of(np.log, ca.log)
+log = _of(np.log, ca.log)
 greater, lesser = _of(np.maximum, ca.fmax), _of(np.minimum, ca.fmin)
 choose = _of(np.where, ca.if_else)
 """(condition, value where it holds, value elsewhere); of expressions both values are computed, so both must be finite."""
