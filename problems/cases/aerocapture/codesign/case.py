@@ -53,7 +53,7 @@ def problem(*, corridor: bool = False, shape: int | None = None, declination: fl
     declination, bank_rate : float
         As in `bank.problem`.
     """
-    if shape is not None and (isinstance(capsule, bool) or shape not in TABLE_2):
+    if shape is not None and (isinstance(shape, bool) or shape not in TABLE_2):
         raise ValueError(f"aerocapture_codesign: there is no solution {shape!r} of Table 2; there are {', '.join(map(str, TABLE_2))}")
     if not isinstance(corridor, bool):
         raise ValueError(f"aerocapture_codesign: corridor is True or False, not {corridor!r}")
