@@ -38,6 +38,10 @@ CASES: dict[str, tuple[str, str]] = {
         "problems.cases.aerocapture.bank:problem",
         "aerocapture at Mars by a bank profile, to a polar orbit: delta v against heat shield",
     ),
+    "aerocapture_codesign": (
+        "problems.cases.aerocapture.codesign.case:problem",
+        "aerocapture at Mars, shape and bank profile together: inverse packing efficiency, heat shield and delta v",
+    ),
     "betts": ("problems.cases.betts:problem", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
     "betts_heating": ("problems.cases.betts_heating:problem", "the same with a limit to the heating rate"),
     "welded_beam": ("problems.cases.welded_beam:problem", "without trajectories: cost against deflection of a welded beam"),

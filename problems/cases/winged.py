@@ -34,7 +34,7 @@ class Winged:
         Of the air at the surface, kg/m3; height in which it falls by a factor e, m.
     area : float
         Of reference, m2.
-    lift, drag : tuple of float
+    lift, drag : tuple of float or expressions
         Coefficients of powers of the angle of attack in rad.
     heating : tuple of float
         Factors of powers of the angle of attack in degrees.
@@ -49,8 +49,8 @@ class Winged:
     density: float
     scale_height: float
     area: float
-    lift: tuple[float, ...]
-    drag: tuple[float, ...]
+    lift: tuple[Any, ...]
+    drag: tuple[Any, ...]
     heating: tuple[float, ...]
     heating_constant: float
     turning: float = 0.0
@@ -137,6 +137,6 @@ class Winged:
         }
 
 
-def _polynomial(coefficients: tuple[float, ...], x: Any) -> Any:
+def _polynomial(coefficients: tuple[Any, ...], x: Any) -> Any:
     """The sum of coefficients times powers of x, from the power 0."""
     return sum(c * x**k for k, c in enumerate(coefficients))

@@ -10,10 +10,13 @@ Trim: the angle of attack is taken to be that of trim, as the paper does; it pri
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from transcription.numerics.polynomials import gauss_legendre
 
+from .elementary import arccos, choose, column, cos, lesser, sin, tan
 from .shape import Shapes
 
 MASS = 946.0
@@ -22,11 +25,13 @@ MASS = 946.0
 GREATEST_PRESSURE = MASS / 520.3
 """Pressure coefficient at the stagnation point, 1.818. Only mass over pressure coefficient can be told from the paper: 520.3 kg, fitted to
 the five ballistic coefficients of Table 2."""
-POINTS = 16
-"""Of the quadrature on each part of the sphere."""
+POINTS = 8
+"""Of the quadrature on the part of the sphere that is not lit all around."""
+LIMIT = 1.0 - 1e-8
+"""Largest cosine of the azimuth where the shadow begins."""
 
 
-def lift_and_drag(shapes: Shapes, attack: np.ndarray, greatest: float = GREATEST_PRESSURE) -> tuple[np.ndarray, np.ndarray]:
+def lift_and_drag(shapes: Shapes, attack: Any, greatest: float = GREATEST_PRESSURE) -> tuple[Any, Any]:
     """Coefficients of lift and drag (n,), of the largest section.
 
     Parameters
@@ -38,52 +43,55 @@ def lift_and_drag(shapes: Shapes, attack: np.ndarray, greatest: float = GREATEST
     greatest : float
         Pressure coefficient at the stagnation point.
     """
-    attack = np.broadcast_to(np.asarray(attack, float), shapes.base.shape)
-    size = np.abs(attack)
+    # Not by absolute value and sign, whose derivatives vanish at zero.
+    side = choose(attack < 0.0, -1.0, 1.0)
+    size = side * attack
     axial, normal = _sphere(shapes, size)
     edge = (shapes.edge / shapes.base) ** 2
     # Of a cone the sides are straight: its area, over the sine of the half angle, is that of the ring that one sees along the axis.
     along, across = _ring(shapes.front_angle, size)
     ring = (1.0 - edge) / (2.0 * np.pi)
-    axial, normal = axial + ring * along, normal + ring * across / np.tan(shapes.front_angle)
+    axial, normal = axial + ring * along, normal + ring * across / tan(shapes.front_angle)
     # Towards the windward side: below for a positive angle of attack, so that the force is upward.
-    normal = np.sign(attack) * normal
-    drag = axial * np.cos(attack) + normal * np.sin(attack)
-    lift = normal * np.cos(attack) - axial * np.sin(attack)
+    normal = side * normal
+    drag = axial * cos(attack) + normal * sin(attack)
+    lift = normal * cos(attack) - axial * sin(attack)
     return greatest * lift, greatest * drag
 
 
-def ballistic_coefficient(shapes: Shapes, drag: np.ndarray, mass: float = MASS) -> np.ndarray:
+def ballistic_coefficient(shapes: Shapes, drag: Any, mass: float = MASS) -> Any:
     """Mass over drag area (n,), kg/m2."""
     return mass / (shapes.area * drag)
 
 
-def _sphere(shapes: Shapes, attack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sphere(shapes: Shapes, attack: Any) -> tuple[Any, Any]:
     """Axial and normal force coefficients (n,) of the noses, for a pressure coefficient of at most 1."""
-    nodes, weights = gauss_legendre(POINTS)
     last = 0.5 * np.pi - shapes.front_angle
     # A ring at polar angle p is lit all around while p + |attack| is at most a right angle.
-    whole = np.minimum(last, 0.5 * np.pi - attack)
-    axial, normal = np.zeros_like(last), np.zeros_like(last)
-    for begin, end in ((np.zeros_like(last), whole), (whole, last)):
-        half = 0.5 * (end - begin)
-        polar = begin[:, None] + half[:, None] * (1.0 + nodes)
-        along, across = _ring(0.5 * np.pi - polar, attack[:, None])
-        area = half[:, None] * weights * np.sin(polar) / np.pi
-        axial += (area * along * np.cos(polar)).sum(axis=1)
-        normal += (area * across * np.sin(polar)).sum(axis=1)
-    size = (shapes.nose / shapes.base) ** 2
-    return size * axial, size * normal
+    whole = lesser(last, 0.5 * np.pi - attack)
+    fourth = sin(whole) ** 4
+    axial = 0.5 * cos(attack) ** 2 * (1.0 - cos(whole) ** 4) + 0.25 * sin(attack) ** 2 * fourth
+    normal = 0.5 * sin(attack) * cos(attack) * fourth
+    nodes, weights = gauss_legendre(POINTS)
+    half = 0.5 * (last - whole)
+    polar = column(whole) + column(half) * (1.0 + nodes[None, :])
+    along, across = _ring(0.5 * np.pi - polar, column(attack))
+    area = column(half) * (weights[None, :] / np.pi) * sin(polar)
+    size, total = (shapes.nose / shapes.base) ** 2, np.ones(POINTS)
+    return size * (axial + (area * along * cos(polar)) @ total), size * (normal + (area * across * sin(polar)) @ total)
 
 
-def _ring(slope: np.ndarray, attack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _ring(slope: Any, attack: Any) -> tuple[Any, Any]:
     """Integrals around the axis of cos^2 between flow and inward normal where it is lit, and of the same times the cosine of the azimuth.
 
     The surface is inclined to the axis by `slope`, 0 to 90 deg; `attack` is not negative; the azimuth counts from the windward side.
     """
-    mean, swing = np.cos(attack) * np.sin(slope), np.sin(attack) * np.cos(slope)
-    lit = np.arccos(np.clip(-mean / np.maximum(swing, 1e-300), -1.0, 1.0))
-    sine, double = np.sin(lit), 0.5 * np.sin(2.0 * lit)
+    mean, swing = cos(attack) * sin(slope), sin(attack) * cos(slope)
+    shaded = mean < swing
+    # Next to the limit the derivatives of the arc cosine are endless. It counts for nothing there, where the flow is along the surface.
+    ratio = lesser(choose(shaded, mean, 0.0) / choose(shaded, swing, 1.0), LIMIT)
+    lit = choose(shaded, arccos(-ratio), np.pi)
+    sine, double = sin(lit), 0.5 * sin(2.0 * lit)
     along = 2.0 * ((mean**2 + 0.5 * swing**2) * lit + 2.0 * mean * swing * sine + 0.5 * swing**2 * double)
     across = 2.0 * (mean**2 * sine + mean * swing * (lit + double) + swing**2 * (sine - sine**3 / 3.0))
     return along, across

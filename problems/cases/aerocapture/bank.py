@@ -15,10 +15,10 @@ from functools import partial
 from math import exp, pi, radians, sin
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from ... import checks
-from ...phase import Phase
 from ...problem import Problem
 from ..winged import STATES, UNITS, Winged
 from .aerodynamics import MASS, lift_and_drag
@@ -54,8 +54,13 @@ BANK = (0.0, pi)
 """To one side: altitude, speed and path angle depend on the cosine alone, and the plane of the entry makes up for what turns the heading.
 Nothing is lost but local optima that roll over to the other side where there is little air."""
 EDGES = [*np.linspace(0.0, 0.03, 4), *np.linspace(0.03, 0.28, 37)[1:], *np.linspace(0.28, 1.0, 9)[1:]]
+PHASE = "atmosphere"
 MESH = {"edges": EDGES, "order": 4, "control_order": 1}
 """Short elements where the air is dense: on 30 equal ones of order 3, an optimum that looks as good misses the apoapsis by 48 km."""
+TRANSCRIPTION = {
+    "method": "DFET",
+    "settings": {"elements": len(EDGES) - 1, "order": 4, "control_order": 1, "basis": "bernstein", "mesh": {PHASE: MESH}},
+}
 
 
 def problem(
@@ -84,15 +89,42 @@ def problem(
         For a shape that is no capsule or cannot be captured, and data that make no sense.
     """
     design = _design(shape)
-    checks.positive(bank_rate, "aerocapture_bank: the bank rate")
-    direction = checks.number(declination, "aerocapture_bank: the declination")
-    checks.within((direction, direction), DECLINATIONS, "aerocapture_bank: the declination")
     planar = judged(design)
     limit = float(planar.shield[0]) if shield == OWN else checks.positive(shield, "aerocapture_bank: the heat shield")
-    vehicle, nose = _capsule(design)
+    lift, drag, nose = _capsule(design)
     most = 1e-3 * float(allowed_load(limit))
     problem = Problem("aerocapture_bank")
-    phase = problem.phase("atmosphere", t0=0.0, tf=DURATION)
+    ends, load = flight(problem, lift, drag, nose, most=2.0 * most, declination=declination, bank_rate=bank_rate)
+    problem.constraint("heat shield", load, upper=most, scale=most)
+    problem.minimize("delta v", circularisation(ends["speed"]), unit="m/s")
+    problem.minimize("TPS mass fraction", shield_fraction(1e3 * load), unit="%")
+    guess(problem, planar, nose, most, declination)
+    problem.default_transcription = TRANSCRIPTION
+    problem.default_evaluations, problem.default_inner, problem.default_start = 1_000, "propagate", "smooth"
+    return problem
+
+
+def flight(
+    problem: Problem, lift: Any, drag: Any, nose: Any, *, most: float, declination: float, bank_rate: float
+) -> tuple[dict[str, ca.MX], ca.MX]:
+    """Add the phase from the hyperbola to the polar orbit to a problem: its states at the end by name, and the heat load, kJ/cm2.
+
+    Parameters
+    ----------
+    problem : Problem
+    lift, drag : numbers or expressions
+        Coefficients times the area, m2.
+    nose : the same
+        Nose radius, m.
+    most : float
+        Greatest heat load, kJ/cm2.
+    declination, bank_rate : float
+        As in `problem`, deg and deg/s.
+    """
+    checks.positive(bank_rate, f"{problem.name}: the bank rate")
+    direction = checks.number(declination, f"{problem.name}: the declination")
+    checks.within((direction, direction), DECLINATIONS, f"{problem.name}: the declination")
+    phase = problem.phase(PHASE, t0=0.0, tf=DURATION)
     initial = {"altitude": MARS.interface, "speed": ENTRY_SPEED, "flight-path angle": (-0.4, -0.05)}
     final = {"altitude": MARS.interface, "flight-path angle": (0.0, STEEPEST), "heading": pi}
     states = {
@@ -102,24 +134,27 @@ def problem(
     bank = phase.state("bank angle", bounds=BANK, unit="rad")
     rate = phase.control("bank rate", bounds=(-radians(bank_rate), radians(bank_rate)), unit="rad/s")
     # A state, as in the paper: a power of an integral would have second derivatives by all variables at once.
-    heat = phase.state("heat load", bounds=(0.0, 2.0 * most), initial=0.0, unit="kJ/cm2")
+    heat = phase.state("heat load", bounds=(0.0, most), initial=0.0, unit="kJ/cm2")
+    vehicle = Winged(
+        radius=MARS.radius,
+        mu=MARS.mu,
+        density=MARS.density * exp(MARS.interface / MARS.scale_height),
+        scale_height=MARS.scale_height,
+        area=1.0,
+        # Coefficients do not change with the angle of attack, for that is trimmed.
+        lift=(lift,),
+        drag=(drag,),
+        # Heating is that of `heating`.
+        heating=(0.0,),
+        heating_constant=0.0,
+    )
     heating = heating_rate(vehicle.air(states["altitude"]), states["speed"], nose)
     phase.dynamics(**vehicle.rates(states, 0.0, bank, MASS), **{"bank angle": rate, "heat load": 1e-3 * heating})
     begins, ends = ({name: of(symbol) for name, symbol in states.items()} for of in (phase.initial, phase.final))
     for name, expression in arrival(begins, declination, MARS).items():
         problem.constraint(name, expression, lower=0.0, upper=0.0)
     problem.constraint("apoapsis", apoapsis(ends, MARS) / 1e3, lower=MARS.target / 1e3, upper=MARS.target / 1e3, scale=100.0)
-    load = phase.final(heat)
-    problem.constraint("heat shield", load, upper=most, scale=most)
-    problem.minimize("delta v", circularisation(ends["speed"]), unit="m/s")
-    problem.minimize("TPS mass fraction", shield_fraction(1e3 * load), unit="%")
-    _guess(phase, planar, nose, most, declination)
-    problem.default_transcription = {
-        "method": "DFET",
-        "settings": {"elements": len(EDGES) - 1, "order": 4, "control_order": 1, "basis": "bernstein", "mesh": {phase.name: MESH}},
-    }
-    problem.default_evaluations, problem.default_inner, problem.default_start = 1_000, "propagate", "smooth"
-    return problem
+    return ends, phase.final(heat)
 
 
 def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
@@ -159,28 +194,19 @@ def _design(shape: int | Sequence[float]) -> np.ndarray:
     return design
 
 
-def _capsule(design: np.ndarray) -> tuple[Winged, float]:
-    """What flies, whose coefficients do not change with the angle of attack, for that is trimmed; and its nose radius, m."""
+def _capsule(design: np.ndarray) -> tuple[float, float, float]:
+    """Coefficients of lift and drag times the area, m2, and nose radius, m."""
     shapes, attack = shapes_of(design)
     lift, drag = lift_and_drag(shapes, attack)
-    surface = MARS.density * exp(MARS.interface / MARS.scale_height)
-    vehicle = Winged(
-        radius=MARS.radius,
-        mu=MARS.mu,
-        density=surface,
-        scale_height=MARS.scale_height,
-        area=float(shapes.area[0]),
-        lift=(float(lift[0]),),
-        drag=(float(drag[0]),),
-        # Heating is that of `heating`.
-        heating=(0.0,),
-        heating_constant=0.0,
-    )
-    return vehicle, float(shapes.nose[0])
+    area = float(shapes.area[0])
+    return area * float(lift[0]), area * float(drag[0]), float(shapes.nose[0])
 
 
-def _guess(phase: Phase, design: Designs, nose: float, most: float, declination: float) -> None:
-    """The passage at constant bank. Its heading turns with the speed that is lost, dpsi/dx = L/D sin(bank) / 2, so that it ends polar."""
+def guess(problem: Problem, design: Designs, nose: float, most: float, declination: float) -> None:
+    """Set the guess of the phase of `flight`: the passage at constant bank of the first of `design`.
+
+    Its heading turns with the speed that is lost, dpsi/dx = L/D sin(bank) / 2, so that it ends polar.
+    """
     bank, ratio = float(design.bank[0]), float(design.lift_to_drag[0])
     planar = profile(float(design.ballistic[0]))
     time, lost = planar.time, 2.0 * np.log(planar.speed / EXIT_SPEED)
@@ -188,7 +214,7 @@ def _guess(phase: Phase, design: Designs, nose: float, most: float, declination:
     flown = since_arrival(MARS.entry_radius, ENTRY_SPEED, float(planar.path_angle[0]), MARS) + planar.ground
     latitude = pi + radians(declination) - flown
     ahead = np.concatenate([[0.0], np.cumsum(0.5 * (np.sin(heading[1:]) + np.sin(heading[:-1])) * np.diff(planar.ground))])
-    phase.guess(
+    problem.phases[PHASE].guess(
         tf=float(time[-1]),
         altitude=(time, np.clip(planar.altitude, *BOUNDS["altitude"])),
         longitude=(time, ahead - ahead[-1]),

@@ -283,6 +283,11 @@ def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -
     return rates, jacobian, by_lift
 
 
+def slopes(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> np.ndarray:
+    """Rates of states (n, 3) of z, x and g along the arc from the exit back to the entry, for lifts and `Passage.drag` (n,)."""
+    return _rates(Y[:, None, None], lift, eps, passage)[0][:, 0, 0]
+
+
 def _measured(bc: np.ndarray, lift: np.ndarray, arc: np.ndarray, Y: np.ndarray, passage: Passage) -> Passages:
     mars, points = passage.mars, nodes("lobatto", passage.degree)
     speed = passage.entry_speed * np.exp(-0.5 * Y[..., 1])

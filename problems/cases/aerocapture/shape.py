@@ -2,14 +2,17 @@
 
 Armellin and Lavagna (see `mars`), section 2.1 and figure 1. The nose is tangent to the cone. The paper's text does not say from where the
 rear angle is measured: from the plane of the base, for the volumes of four of the five shapes of Table 2 are then 4.9 to 5.0 m3, and up to
-118 m3 if it is measured from the axis.
+118 m3 if it is measured from the axis. All but the checks takes arrays and CasADi expressions alike.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+
+from .elementary import cos, greater, sin, tan
 
 VOLUME = 5.0
 """m3, of every capsule of the paper."""
@@ -17,7 +20,7 @@ VOLUME = 5.0
 
 @dataclass(frozen=True)
 class Shapes:
-    """Capsules: arrays (n,), lengths in m, angles in rad.
+    """Capsules: arrays (n,), or expressions of one; lengths in m, angles in rad.
 
     Attributes
     ----------
@@ -33,37 +36,37 @@ class Shapes:
         m3.
     """
 
-    base: np.ndarray
-    nose: np.ndarray
-    rear: np.ndarray
-    front_angle: np.ndarray
-    rear_angle: np.ndarray
-    cap: np.ndarray
-    cone: np.ndarray
-    frustum: np.ndarray
-    volume: np.ndarray
+    base: Any
+    nose: Any
+    rear: Any
+    front_angle: Any
+    rear_angle: Any
+    cap: Any
+    cone: Any
+    frustum: Any
+    volume: Any
 
     @property
-    def edge(self) -> np.ndarray:
+    def edge(self) -> Any:
         """Radius where the sphere meets the cone, m."""
-        return self.nose * np.cos(self.front_angle)
+        return self.nose * cos(self.front_angle)
 
     @property
-    def length(self) -> np.ndarray:
+    def length(self) -> Any:
         """From the tip to the back, m."""
         return self.cap + self.cone + self.frustum
 
     @property
-    def area(self) -> np.ndarray:
+    def area(self) -> Any:
         """Largest section, the area of reference, m2."""
         return np.pi * self.base**2
 
     @property
-    def packing(self) -> np.ndarray:
+    def packing(self) -> Any:
         """Greatest of length and diameter over the volume, 1/m2: the inverse packing efficiency, eq. (17)."""
-        return np.maximum(2.0 * self.base, self.length) / self.volume
+        return greater(2.0 * self.base, self.length) / self.volume
 
-    def scaled(self, factor: np.ndarray) -> Shapes:
+    def scaled(self, factor: Any) -> Shapes:
         """The same shapes, so many times as large."""
         powers = {"front_angle": 0, "rear_angle": 0, "volume": 3}
         return Shapes(**{f.name: getattr(self, f.name) * factor ** powers.get(f.name, 1) for f in fields(self)})
@@ -115,8 +118,14 @@ def capsules(nose: np.ndarray, rear: np.ndarray, front_angle: np.ndarray, rear_a
     if reasons.any():
         row = int(np.flatnonzero(reasons)[0])
         raise ValueError(f"shape {row}: {reasons[row]}")
-    edge, cap = nose * np.cos(front), nose * (1.0 - np.sin(front))
-    cone, frustum = (1.0 - edge) / np.tan(front), (1.0 - rear) * np.tan(back)
+    return sized(nose, rear, front, back, volume)
+
+
+def sized(nose: Any, rear: Any, front_angle: Any, rear_angle: Any, volume: float = VOLUME) -> Shapes:
+    """Capsules of a volume, of parameters that have no `faults`: arrays or expressions."""
+    edge, cap = nose * cos(front_angle), nose * (1.0 - sin(front_angle))
+    cone, frustum = (1.0 - edge) / tan(front_angle), (1.0 - rear) * tan(rear_angle)
     sphere = cap**2 * (3.0 * nose - cap)
     unit = np.pi / 3.0 * (sphere + cone * (1.0 + edge + edge**2) + frustum * (1.0 + rear + rear**2))
-    return Shapes(np.ones_like(nose), nose, rear, front, back, cap, cone, frustum, unit).scaled(np.cbrt(volume / unit))
+    base = (volume / unit) ** (1.0 / 3.0)
+    return Shapes(nose**0, nose, rear, front_angle, rear_angle, cap, cone, frustum, unit).scaled(base)

@@ -1,0 +1,1 @@
+"""Aerocapture with shape and bank profile at once."""
