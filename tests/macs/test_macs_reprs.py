@@ -18,7 +18,7 @@ def schaffer(X: np.ndarray) -> np.ndarray:
 def test_settings_are_shown_as_far_as_they_are_no_defaults() -> None:
     assert repr(MACS()) == "MACS()" and repr(MACS(agents=20)) == "MACS(agents=20)"
     assert repr(NSGA2(population=40, degree="sum")) == "NSGA2(population=40, degree='sum')"
-    assert repr(MOPSO.paper()) == "MOPSO(particles=20, inertia=1.4, final_inertia=0.4)"
+    assert repr(MOPSO.paper()) == "MOPSO(particles=20, inertia=1.4, final_inertia=0.4, one_leader=True, settled=0.01)"
 
 
 def test_a_search_shows_its_counts() -> None:

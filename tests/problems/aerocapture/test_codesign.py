@@ -163,7 +163,11 @@ def confirm(point) -> None:
     apoapsis = -MU / (2 * energy) * (1 + np.linalg.norm(np.cross(v, momentum) / MU - r / np.linalg.norm(r)))
     assert apoapsis == pytest.approx(TARGET, abs=500.0)
     assert np.degrees(np.arccos(momentum[2] / np.linalg.norm(momentum))) == pytest.approx(90.0, abs=0.01)
-    assert CIRCULAR - np.linalg.norm(momentum) / apoapsis == pytest.approx(point.objectives["delta v"], abs=0.05)
+    # A flight of least delta v is unstable: it misses the apoapsis a little, by another speed at the exit. For an exit that is nearly level
+    # d(delta v) / d(apoapsis) = h / r_a^2 - r / (r_a dr_a/dv), with dr_a/dv = 4 a^2 v / mu.
+    per_metre = np.linalg.norm(momentum) / apoapsis**2 - np.linalg.norm(r) / apoapsis * energy**2 / (MU * np.linalg.norm(v))
+    burn = point.objectives["delta v"] + per_metre * (apoapsis - TARGET)
+    assert CIRCULAR - np.linalg.norm(momentum) / apoapsis == pytest.approx(burn, abs=0.01)
     assert 0.091 * load**0.51575 == pytest.approx(point.objectives["TPS mass fraction"], abs=0.002)
     size = max(2 * float(shapes.base[0]), float(shapes.length[0])) / 5.0
     # Above it where no objective asks for a compact capsule.
