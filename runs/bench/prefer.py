@@ -184,7 +184,7 @@ CASES = (
         archive=20,
         known=False,
     ),
-    # This region is a piece of a space of three dimensions: twenty points of the survey, each the best to add, leave a quarter of it.
+    # This region is a piece of a space of three dimensions, which few points cannot cover.
     Guided("smv", partial(flights, "smv", DESCENT), partial(surveyed, "smv", DESCENT, CARGO), CARGO, 2000, archive=40, known=False),
 )
 

@@ -33,7 +33,7 @@ Payload = tuple[bytes, bytes]
 
 @dataclass(frozen=True)
 class Addressed:
-    """A problem that a process loads from its address, see `problems.load`. Whoever stated it has loaded it from there before."""
+    """A problem that a process loads from its address, see `problems.load`. The study has loaded it from there before."""
 
     address: str
     data: Mapping[str, Any]

@@ -37,7 +37,7 @@ SHAPE, OWN = 2, "passage"
 DECLINATION, BANK_RATE = -20.0, 10.0
 """Of the arrival's velocity, deg; greatest rate of the bank angle, deg/s."""
 DECLINATIONS = (-60.0, -5.0)
-"""Those with which the capsule meets no pole in the air, where longitudes are lost. The planet is round, so optima do not depend on it."""
+"""For these the flight does not pass over a pole, where the longitude is not defined. The planet is round: optima do not depend on it."""
 ENTRY_SPEED = PASSAGE.entry_speed
 STEEPEST = 0.05
 """Greatest path angle at the exit, rad: it ends the trade with the heat shield at a delta v of 100 m/s."""
