@@ -75,6 +75,8 @@ ROOM = 0.05
 """How much worse the other objectives of an end may become on another mesh, in units, before it is also sought near where it was."""
 TIED = 1e-6
 """What counts as no loss of the one objective then, in units."""
+CLOSE = 1e-3
+"""Violation up to which a start on another mesh is nearly the end itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,10 @@ class End(Task):
             return first
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         ceiling = np.where(mine, first.F, np.inf)
-        second = solves(nlp, first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
+        # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
+        (F,), (violation,) = nlp.evaluate(start[None])
+        closer = violation <= CLOSE and bool((first.F >= F).all())
+        second = solves(nlp, start if closer else first.z, np.where(mine, np.inf, first.F), self.units, ceiling)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 

@@ -25,15 +25,37 @@ class Solves:
         return self.answers[len(self.ceilings) - 1]
 
 
-def solved(*answers: tuple[str, tuple[float, float]]) -> tuple[Solved, Solves]:
+class Mesh:
+    """An NLP that knows the objectives and the violation of the start alone."""
+
+    def __init__(self, F: tuple[float, float], violation: float) -> None:
+        self.F, self.violation = F, violation
+
+    def evaluate(self, Z):
+        return np.array([self.F]), np.array([self.violation])
+
+
+FAR = Mesh((0.0, 0.0), 1.0)
+"""On it the start violates constraints by much, and is good for nothing else."""
+
+
+def solved(*answers: tuple[str, tuple[float, float]], mesh: Mesh = FAR) -> tuple[Solved, Solves]:
     solves = Solves(*answers)
-    return End(0, UNITS, KNOWN).solve(solves, None, np.array([-1.0])), solves  # type: ignore[arg-type]
+    return End(0, UNITS, KNOWN).solve(solves, mesh, np.array([-1.0])), solves  # type: ignore[arg-type]
 
 
 def test_an_end_that_stays_is_solved_once_for_each_objective():
     found, solves = solved(("converged", (1.9, 5.1)), ("converged", (1.9, 5.05)))
     assert found.F.tolist() == [1.9, 5.05] and len(solves.ceilings) == 2
     assert solves.ceilings[1].tolist() == [1.9, np.inf] and solves.starts == [-1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "begins"), [(Mesh((1.9, 5.0), 1e-5), -1.0), (Mesh((1.9, 5.2), 1e-5), 0.0), (Mesh((1.91, 5.0), 1e-5), 0.0), (FAR, 0.0)]
+)
+def test_a_start_that_is_nearly_the_end_is_where_the_others_are_lowered(mesh, begins):
+    found, solves = solved(("converged", (1.9, 5.1)), ("converged", (1.9, 5.05)), mesh=mesh)
+    assert found.F.tolist() == [1.9, 5.05] and solves.starts == [-1.0, begins]
 
 
 @pytest.mark.parametrize("first", [("converged", (2.0, 90.0)), ("failed", (2.0, 5.0))])
