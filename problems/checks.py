@@ -46,7 +46,7 @@ def interval(value: Any, what: str) -> tuple[float, float]:
         raise ValueError(f"{what} must be a pair (lower, upper), not {shown(value)}") from None
     lower, upper = number(lower, f"the lower end of {what}"), number(upper, f"the upper end of {what}")
     if lower > upper:
-        raise ValueError(f"{what} is an empty interval: {lower:g} > {upper:g}")
+        raise ValueError(f"{what}: an empty interval, {lower:g} > {upper:g}")
     return lower, upper
 
 
@@ -98,7 +98,7 @@ def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Lim
     low = -math.inf if lower is None else number(lower, f"the lower limit of {what}")
     high = math.inf if upper is None else number(upper, f"the upper limit of {what}")
     if low > high:
-        raise ValueError(f"{what} is an empty interval: {low:g} > {high:g}")
+        raise ValueError(f"{what}: an empty interval, {low:g} > {high:g}")
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
     default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
     return Limit(name, low, high, scale(given_scale, default, what))

@@ -150,7 +150,11 @@ def vector_points(
     if len(archive) or not len(closest):
         return of(archive, message="" if len(archive) else _nothing(stats))
     nearest, violation = of(closest)[0], closest.violation[0]
-    why = f"the nearest violates the constraints by {violation:.2g}" if np.isfinite(violation) else "all of them failed"
+    why = (
+        f"the nearest violates the constraints by {violation:.2g}"
+        if np.isfinite(violation)
+        else "all of them failed, their values are not finite"
+    )
     return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
 
 

@@ -13,7 +13,7 @@ from problems.compiled import Objective
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.atomic import write_whole
-from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure
+from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure, wrapped
 from .points import Points
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def _kinds(front: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _scatter(front: Points, ax: Any) -> None:
     if not len(front):
-        ax.text(0.5, 0.9, front.message, transform=ax.transAxes, ha="center", va="center", wrap=True, color=GREY)
+        words = wrapped(front.message, 0.8 * ax.bbox.width / ax.figure.dpi)
+        ax.text(0.5, 0.9, words, transform=ax.transAxes, ha="center", va="top", color=GREY)
         front = front if front.closest is None else front.closest.alone()
     values, (good, apart, infeasible) = front.objectives, _kinds(front)
     if values.shape[1] == 1:
@@ -151,7 +152,9 @@ def _parallel(front: Points, ax: Any) -> None:
     ax.grid(False)
     ax.set_xlim(-0.3, len(front.goals) - 0.7)
     ax.set_ylim(-0.12, 1.12)
-    ax.set_xticks(range(len(front.goals)), [f"{label(goal.name, goal.unit)}\n{goal.sense[:3]}" for goal in front.goals])
+    room = ax.bbox.width / ax.figure.dpi / len(front.goals)
+    names = [f"{wrapped(label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in front.goals]
+    ax.set_xticks(range(len(front.goals)), names)
     ax.set_yticks([0, 1], ["worst", "best"])
     ax.tick_params(length=0)
     for side in ("left", "bottom"):

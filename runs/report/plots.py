@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.fronts.pictures.style import COLORS, GREY, better
+from macs.fronts.pictures.style import COLORS, GREY, better, wrapped
 from macs.io.text import counted
 from problems.compiled import Objective
 
@@ -23,6 +23,10 @@ from .style import COLUMN, PAGE, legend, new_figure, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+TICKS = 0.3
+"""Inches beside a panel that the numbers on its axis take."""
+LABEL = 0.6
+"""Part of the width of a panel that a line of text beside it may take, so that it leaves room for its neighbours and powers of ten."""
 MARKERS = "o^sDvPX*"
 """One more than there are colours, so that no two of many solvers look alike."""
 
@@ -55,10 +59,11 @@ def front_figure(
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
+    room = LABEL * (COLUMN if m == 2 else PAGE / 3.0)
     with style():
         figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.3 * rows + 0.3)
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (i, j) in zip(grid, pairs, strict=True):
+        for ax, (i, j) in zip(grid, pairs, strict=False):
             if reference is not None:
                 _draw_truth(ax, truth(reference, goals), signs, (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
@@ -71,7 +76,9 @@ def front_figure(
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
             if marked is not None:
                 _mark(ax, minimised(marked, goals) * signs, signs, (i, j))
-            ax.set(xlabel=better(goals[i]), ylabel=better(goals[j]))
+            ax.set(xlabel=wrapped(better(goals[i]), room), ylabel=wrapped(better(goals[j]), room))
+        for ax in grid[len(pairs) :]:
+            ax.remove()
         legend(figure, grid[0], "best" if len(pairs) == 1 else None)
     return figure
 
@@ -108,6 +115,7 @@ def attainment_figure(
     with style():
         figure = new_figure(COLUMN if columns == 1 else PAGE, 2.6 * rows)
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+        width = (COLUMN if columns == 1 else PAGE) / columns - TICKS
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
                 _draw_truth(ax, truth(reference, goals), signs, (0, 1), truth_name)
@@ -116,7 +124,7 @@ def attainment_figure(
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
             ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
-            ax.set_title(_runs(solver, surface.runs, 0), loc="left")
+            ax.set_title(wrapped(_runs(solver, surface.runs, 0), width, 8.0), loc="left")
             ax.legend(frameon=False, loc=corner)
         for ax in grid[len(surfaces) :]:
             ax.remove()

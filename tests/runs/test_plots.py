@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -84,6 +85,28 @@ def test_more_objectives_are_drawn_in_pairs():
     assert len(figure.axes) == 6 and figure.axes[5].get_xlabel() == "← objective 3"
     with pytest.raises(ValueError, match="two or more objectives"):
         front_figure({"ours": []}, goals=goals[:1])
+
+
+@pytest.mark.parametrize("m", [5, 6])
+def test_panels_of_many_objectives_do_not_fill_the_last_row(m):
+    goals = [Objective(f"objective {i} with a name that is longer than a panel is high", "kg") for i in range(m)]
+    figure = front_figure({"ours": [np.eye(m)]}, goals=goals)
+    assert len(figure.axes) == m * (m - 1) // 2
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        for axis, side in ((ax.xaxis, "width"), (ax.yaxis, "height")):
+            text = axis.label.get_window_extent()
+            assert getattr(text, side) < getattr(ax.bbox, side)
+
+
+def test_long_names_of_solvers_stay_above_their_panels():
+    names = [f"the solver of the paper, until it has settled, number {k}" for k in range(3)]
+    figure = attainment_figure({name: attainment([foreign(A, GOALS), foreign(B, GOALS)]) for name in names}, goals=GOALS)
+    figure.draw_without_rendering()
+    titles = [ax.get_title("left") for ax in figure.axes]
+    assert all(" ".join(title.split()) == f"{name}, 2 runs" for title, name in zip(titles, names, strict=True))
+    extents = [ax._left_title.get_window_extent() for ax in figure.axes]
+    assert all(one.x1 < other.x0 for one, other in pairwise(extents)) and extents[-1].x1 < figure.bbox.x1
 
 
 def test_surfaces_are_staircases():

@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.compiled import Objective, Variable
 
-from .style import COLORS, GREY, STYLE, label, new_figure
+from .style import COLORS, GREY, STYLE, label, new_figure, wrapped
 
 MOST = 30
 """Variables that are drawn; of more, those that vary most within their bounds."""
@@ -80,7 +80,7 @@ def draw_designs(
             figure.colorbar(drawn, ax=list(used), label=label(goals[1].name, goals[1].unit)).outline.set_visible(False)
         left_out = len(variables) - len(names)
         text = f"{title}; {left_out} variables that vary less are left out" if left_out else title
-        figure.suptitle(text, fontsize=9, x=0.01, ha="left")
+        figure.suptitle(wrapped(text, figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
         figure.supxlabel(label(goals[0].name, goals[0].unit), fontsize=9)
     return used
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from .style import COLORS, GREY, STYLE, label, new_figure
+from .style import COLORS, GREY, STYLE, label, new_figure, wrapped
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -207,4 +207,4 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
 
         handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(trajectory)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
-    figure.suptitle(title, fontsize=9, x=0.01, ha="left")
+    figure.suptitle(wrapped(title, figure.get_figwidth()), fontsize=9, x=0.01, ha="left")

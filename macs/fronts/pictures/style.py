@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 from problems.compiled import Objective
@@ -11,6 +12,10 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#88
 
 
 GREY = "#666666"
+
+
+LETTER = 0.6
+"""Width of a letter, of its size: more than that of most words, so that lines end before the picture does."""
 
 
 STYLE = {
@@ -54,6 +59,11 @@ def blank_figure() -> Any:
 def label(name: str, unit: str) -> str:
     """Label of an axis: `name [unit]`."""
     return f"{name} [{unit}]" if unit else name
+
+
+def wrapped(text: str, width: float, size: float = 9.0) -> str:
+    """Text in lines of at most `width` inches in letters of `size` points, as wide as they are on average."""
+    return textwrap.fill(text, max(int(72.0 * width / (LETTER * size)), 1))
 
 
 def better(goal: Objective) -> str:

@@ -4,6 +4,7 @@ import io
 import subprocess
 import sys
 import warnings
+from itertools import pairwise
 
 import matplotlib
 import numpy as np
@@ -13,6 +14,7 @@ from synthetic_fronts import black_box, empty, flights, marked
 
 from macs.fronts.pictures.flight_plot import _dense
 from macs.fronts.pictures.style import blank_figure
+from problems.compiled import Objective
 
 
 def draw(figure: Figure) -> bytes:
@@ -102,6 +104,24 @@ def test_parallel_coordinates_end_where_verified_points_do():
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["not verified"]
     assert [text.get_text() for text in ax.texts] == ["1", "3", "2", "4", "2", "4", "1", "3"]
     assert black_box(3, 4).plot().get_legend() is None
+
+
+def test_long_names_and_messages_stay_within_the_picture():
+    names = [f"expected economic loss number {k} due to floods" for k in range(5)]
+    front = black_box(4, 5, goals=[Objective(name, "M$") for name in names])
+    ax = front.plot()
+    ax.figure.draw_without_rendering()
+    shown = [text.get_window_extent() for text in ax.get_xticklabels()]
+    assert all(one.x1 < other.x0 for one, other in pairwise(shown)) and shown[-1].x1 < ax.figure.bbox.x1
+    picture = front[1].plot()[0].figure
+    picture.draw_without_rendering()
+    assert picture._suptitle.get_window_extent().x1 < picture.bbox.x1
+    nothing = (
+        empty().replace(message="no feasible point in 500 evaluations; the nearest violates the load by 3 of its scale, 2000 kN").plot()
+    )
+    nothing.figure.draw_without_rendering()
+    message = next(text for text in nothing.texts if "no feasible" in text.get_text()).get_window_extent()
+    assert nothing.bbox.x0 <= message.x0 and message.x1 <= nothing.bbox.x1
 
 
 def test_given_axes_are_used_and_style_does_not_leak():
