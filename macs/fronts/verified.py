@@ -27,7 +27,7 @@ PART = 1e-4
 """Error of the integrator, as a fraction of what a point may miss."""
 COARSEST, FINEST = 1e-7, 1e-12
 """Relative tolerances of the integrator."""
-CONSTANT = 1e-5
+CONSTANT = 1e-6
 """An objective that varies less over a front, as a fraction of its size, is judged by its size."""
 NOTHING = 1e-6
 """Smallest scale of an objective, as a fraction of how much it varies within the bounds of the problem."""

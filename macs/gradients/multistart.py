@@ -230,7 +230,8 @@ class MultistartSolver:
             ceiling[i] = best.F[i]
             best, ceiling = self._tied(j, best, ceiling, spans, optima[j])
             ceiling[j] = best.F[j]
-        if best.F[i] - least > LIMIT * spans[i]:
+        # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
+        if best.F[i] - least > LIMIT * max(spans[i], nlp_scales(self.nlp)[i]):
             # What was lost for the others is worth a little of what they gained.
             near = np.where(np.arange(m) == i, np.inf, best.F + SLACK * spans)
             with self._solves.at_most(TIES):
