@@ -44,6 +44,9 @@ BLUNT = 1e-3
 """Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
 HOLLOW = 0.1
 """Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs."""
+SLIP = 0.1
+"""If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a finer
+mesh may take moving edges away from the switches at which they lay."""
 DRIFT = 1e-2
 """If a point gets worse by more than this, in units, other starts are tried too."""
 
@@ -356,13 +359,14 @@ class MeshLoop:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
         best = None
-        attempts = [(present.trajectory, False), (present.trajectory, True), *((other, False) for other in others)]
-        for trajectory, near in attempts:
+        slip = min(SLIP * self.wanted.settled, DRIFT)
+        attempts = [(present.trajectory, False, slip), (present.trajectory, True, DRIFT), *((other, False, DRIFT) for other in others)]
+        for trajectory, near, drift in attempts:
             with self.solves.nearby() if near else nullcontext():
                 solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))
             if best is None or (solved.status != CONVERGED, task.loss(solved.F)) < (best.status != CONVERGED, task.loss(best.F)):
                 best = solved
-            if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + DRIFT):
+            if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + drift):
                 break
         assert best is not None
         return best, True

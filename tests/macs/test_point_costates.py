@@ -104,10 +104,11 @@ def refined(name: str):
     ],
 )
 def test_the_hamiltonian_is_constant_where_nothing_depends_on_time(name, value):
-    """Minus the slope of the objective in the free final time: 1 where this is the objective, else 0."""
+    """Minus the slope of the objective in the free final time: 1 where this is the objective, else 0. To 1e-5 of the unit of time; a
+    range of a kilometre is known to the 1e-7 of it to which the mesh was refined."""
     point = refined(name)
     (along,) = point.hamiltonian.values()
-    assert along == pytest.approx(np.full(len(along), value), abs=1e-5)
+    assert along == pytest.approx(np.full(len(along), value), abs=max(1e-5, 1e-7 * abs(float(point.F[0]))))
 
 
 @pytest.mark.slow
