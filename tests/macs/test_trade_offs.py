@@ -394,7 +394,7 @@ LIMITS = np.array([2000.0, 0.0, -5000.0, -66000.0])
 
 @pytest.fixture(scope="module")
 def gentle() -> tuple[NLP, Front, Front]:
-    """That flight of least heat at a terminal speed and mass, on elements of half the number: as it was solved, and feasible to round-off."""
+    """That flight of least heat at a terminal speed and mass, on half the elements: as it was solved, and feasible to round-off."""
     problem = load("smv")
     edges = {"descent": np.linspace(0, 1, 25).tolist(), "ascent": np.linspace(0, 1, 13).tolist()}
     mesh = {phase: {"edges": one, "order": 3} for phase, one in edges.items()}
