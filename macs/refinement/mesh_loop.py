@@ -45,8 +45,8 @@ BLUNT = 1e-3
 HOLLOW = 0.1
 """Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs."""
 SLIP = 0.1
-"""If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a finer
-mesh may take moving edges away from the switches at which they lay."""
+"""If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a
+finer mesh may take moving edges away from the switches at which they lay."""
 DRIFT = 1e-2
 """If a point gets worse by more than this, in units, other starts are tried too."""
 
