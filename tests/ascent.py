@@ -37,7 +37,7 @@ class Ascent(Evaluator):
         jacobian = np.concatenate([by_angles, by_time[:, :, None]], axis=2)
         return error / SCALE, jacobian / SCALE[:, None] * (self.upper - self.lower)
 
-    def _evaluate(self, Z):
+    def _evaluate(self, Z, way=None):
         Z, iterations = Z.copy(), 0
         for _ in range(50):
             error, jacobian = self._final(Z)

@@ -15,9 +15,6 @@ from .evaluator import Counts, Evaluation, Evaluator
 
 PATIENCE = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
-LIGHT = 0.25
-"""What an iteration of Newton's method on propagated states, or a propagation, takes, in iterations of IPOPT on the same problem: measured
-0.1 to 0.7, more where few candidates are feasible."""
 INSIDE = 2
 """A solve that is to keep away from limits may take so many times as many: its start is outside of them, and no other stands in for it."""
 
@@ -43,6 +40,7 @@ class Bilevel(Evaluator):
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
         self.m_known = len(nlp.problem.goals)
+        self.ways = tuple(type(one).__name__.lower() for one in inner.ways)
         self.counts = Counts()
         try:
             refuse_peaks(nlp.problem)
@@ -63,8 +61,9 @@ class Bilevel(Evaluator):
         """See `NLP.first_guess`."""
         return self.nlp.first_guess(candidates)
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
-        found = self.inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
+        inner = self.inner if way is None else self.inner.ways[way]
+        found = inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
 
         def itemise() -> np.ndarray:
             return self.nlp.by_constraint(self.nlp.residuals(found.z)[1] if found.residuals is None else found.residuals)
@@ -77,7 +76,7 @@ class Bilevel(Evaluator):
             found.status,
             clocked=found.clocked,
             fallbacks=found.fallbacks,
-            work=round((iterations - (1.0 - LIGHT) * found.light) * Z.shape[1]),
+            work=round((iterations if found.work is None else found.work) * Z.shape[1]),
             itemise=itemise,
         )
         return evaluation, iterations

@@ -63,7 +63,7 @@ class BlackBox(Evaluator):
         """The candidates (k, d) themselves: all variables of a black box are free."""
         return np.array(candidates, dtype=float)
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         F, violations = self.problem.evaluate(Z)
         self.m_known = learned(self.m_known, F.shape[1], f"function returned {F.shape[1]}")
         violation = violations.max(axis=1, initial=0.0)

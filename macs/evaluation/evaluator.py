@@ -140,6 +140,8 @@ class Evaluator(ABC):
         A point whose violation is at most this is feasible.
     has_gradients : bool
         Whether `descend` works.
+    ways : tuple of str
+        Names of the inner solvers between which a search may choose for each batch; none where there is no choice.
     m_known : int or None
         Number of objectives; None if it is not known before the first evaluation.
     counts : Counts
@@ -153,6 +155,7 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     has_gradients: bool = False
+    ways: tuple[str, ...] = ()
     m_known: int | None = None
     counts: Counts
     before_batch: Callable[[], Any] = staticmethod(lambda: None)
@@ -185,13 +188,20 @@ class Evaluator(ABC):
         """Full vectors (k, D) for new candidates (k, d)."""
 
     @abstractmethod
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         """The evaluation of full vectors (k, D), k > 0, and the number of inner iterations."""
 
-    def evaluate(self, Z: np.ndarray) -> Evaluation:
-        """Evaluate full vectors (k, D): free entries are the candidates, the inner solve starts from the others. Counts k evaluations."""
+    def evaluate(self, Z: np.ndarray, way: int | None = None) -> Evaluation:
+        """Evaluate full vectors (k, D): free entries are the candidates, the inner solve starts from the others. Counts k evaluations.
+
+        Parameters
+        ----------
+        Z : array (k, D)
+        way : int, optional
+            Number of the inner solver, of `ways`. Default: the evaluator's rule.
+        """
         self.before_batch()
-        evaluation, iterations = self._evaluate(Z)
+        evaluation, iterations = self._evaluate(Z, way)
         self.counts.evaluations += len(Z)
         self.counts.inner_iterations += iterations
         self.counts.clocked += evaluation.clocked

@@ -142,6 +142,9 @@ def _footer(front: Points) -> list[str]:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
     if front.stats["fallbacks"]:
         lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
+    if ways := front.stats.get("ways"):
+        shown = ", ".join(f"{counted(one['evaluations'], 'candidate')} by {name}" for name, one in ways.items() if one["evaluations"])
+        lines.append(f"Made feasible: {shown}.")
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"

@@ -33,6 +33,7 @@ from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
+from .effort import FIRST, Gains, begun, credited, no_effort, projected, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .settings import Settings
@@ -41,6 +42,9 @@ from .state import SearchState, agents_at, remember
 from .trials import Trials
 
 log = logging.getLogger(__name__)
+
+ITERATIONS = 50
+"""Of a gradient solve, about: they are measured once it was made."""
 
 
 class MACS(Settings, Solver):
@@ -77,7 +81,7 @@ class MACS(Settings, Solver):
             batches.append(evaluator.first_guess(evaluator.opening(box.to_values(box.sample(missing, rng)))))
         Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
         Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
-        seen = evaluator.evaluate(Z)
+        seen = evaluator.evaluate(Z, FIRST if evaluator.ways else None)
         m = seen.F.shape[1]
         self.check_objectives(m)
         guide = self._checked_guide(evaluator)
@@ -90,18 +94,22 @@ class MACS(Settings, Solver):
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
             credit=no_credit(),
+            effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1] if self.refines and evaluator.has_gradients else 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
             optima=np.empty((0, m)),
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
-        infeasible = not (seen.violation <= evaluator.tolerance).any()
-        if self.refines and infeasible and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
+        if self.refines and not len(state.archive) and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
             optima = gradient_action.first_optima(seen, start, evaluator, rng)
             remember(state, [optima], self, evaluator)
             state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
+        if not len(state.archive) and not stopping():
+            seen = projected(evaluator, seen, Z, self.agents, budget)
+            remember(state, [seen], self, evaluator)
+            state.evaluations = evaluator.counts.evaluations
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
         assign(state, self, guide)
@@ -117,15 +125,22 @@ class MACS(Settings, Solver):
         """Do one iteration, of some tens of evaluations; changes `state`. Once the budget is spent it does nothing."""
         if state.evaluations >= budget:
             return
+        empty = not len(state.archive)
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
             remember(state, trials.seen, self, evaluator)
+        if empty and len(state.archive):
+            state.effort = begun(state.effort)
         guide = guide_of(self.prefer, evaluator)
         breed_archive(Trials(self, state, evaluator, budget))
         if self.refines and evaluator.has_gradients:
             for _ in range(gradient_action.allowed(state.evaluations, self.refine_every, state.refinements)):
-                remember(state, gradient_action.individual_action(state, evaluator, self.F, guide), self, evaluator)
+                gains, before = Gains(state, evaluator.tolerance), evaluator.counts.work
+                found = gradient_action.individual_action(state, evaluator, self.F, guide)
+                brought = sum(gains.of(one) for one in found)
+                state.effort = credited(state.effort, len(evaluator.ways), brought, evaluator.counts.work - before, len(found))
+                remember(state, found, self, evaluator)
         assign(state, self, guide)
         state.iteration += 1
 
@@ -189,9 +204,11 @@ class MACS(Settings, Solver):
             check_preference(self.prefer, goals)
 
     def extra_stats(self, state: SearchState, evaluator: Evaluator) -> dict[str, Any]:
-        """With a preference that the archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
+        """Where the inner level was chosen during the search, "ways" are the evaluations and the work of each. With a preference that the
+        archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
         objection = self._objection(state, evaluator)
-        return {"prefer": f"not followed: {objection}"} if objection else {}
+        found: dict[str, Any] = {"ways": spent(state.effort, evaluator.ways)} if evaluator.ways else {}
+        return found | ({"prefer": f"not followed: {objection}"} if objection else {})
 
     def _objection(self, state: SearchState, evaluator: Evaluator) -> str:
         """Why the preference says nothing on the archive, if that is so."""

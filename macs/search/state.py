@@ -96,6 +96,8 @@ class SearchState:
         Displacements of the last improvements of all agents, in units of span, oldest first.
     credit : array (o, 2)
         For each breeding operator, the number of offspring that the archive kept and of all offspring; see `breeding.updated_credit`.
+    effort : array (w + 1, 4)
+        What the inner solvers, and the gradient solves, have brought for how much work; see `effort`.
     iteration, evaluations, refinements : int
         Iterations done; evaluations counted by the evaluator; gradient solves of agents.
     optima : array (k, m)
@@ -114,6 +116,7 @@ class SearchState:
     directions: np.ndarray
     experience: np.ndarray
     credit: np.ndarray
+    effort: np.ndarray
     iteration: int
     evaluations: int
     optima: np.ndarray

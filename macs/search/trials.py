@@ -7,6 +7,7 @@ import numpy as np
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
+from .effort import Gains, evaluated
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
 
@@ -39,6 +40,7 @@ class Trials:
         self.settings, self.state, self.evaluator, self.budget = settings, state, evaluator, budget
         self.box = evaluator.box
         self.seen: list[Evaluation] = []
+        self._gains = Gains(state, evaluator.tolerance)
         self.credited = np.zeros(len(state.agents), dtype=bool)
 
     def positions(self, rows: np.ndarray | None = None) -> np.ndarray:
@@ -62,7 +64,7 @@ class Trials:
         X, trial, free = X[moved], trial[moved], self.evaluator.free
         Z = Z[moved]
         Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
-        result = self.evaluator.evaluate(Z)
+        result = evaluated(self.state, self.evaluator, Z, self._gains)
         self.state.evaluations = self.evaluator.counts.evaluations
         self.seen.append(result)
         return moved, result

@@ -36,8 +36,8 @@ class InnerResult:
         How many candidates a faster method left to a slower one.
     residuals : array (k, n + r), optional
         What `NLP.residuals` returns there, from which the violation of each constraint follows; None: to be computed from z.
-    light : int
-        How many of all iterations were not IPOPT's: they take less time.
+    work : float, optional
+        What all of it took, in iterations of IPOPT on the same program; None: all iterations were of IPOPT.
     """
 
     z: np.ndarray
@@ -49,7 +49,7 @@ class InnerResult:
     clocked: bool = False
     fallbacks: int = 0
     residuals: np.ndarray | None = None
-    light: int = 0
+    work: float | None = None
 
     def __repr__(self) -> str:
         found, counts = np.unique(self.status, return_counts=True)
@@ -67,6 +67,11 @@ class InnerSolver(ABC):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         cls.__repr__ = short_repr  # type: ignore[method-assign]
+
+    @property
+    def ways(self) -> tuple[InnerSolver, ...]:
+        """The solvers between which a search may choose for each batch, those first that take least; none where there is no choice."""
+        return ()
 
     def program(self, nlp: NLP) -> NLP:
         """The NLP whose free variables are to be searched with this inner level: as it is, unless candidates have more."""

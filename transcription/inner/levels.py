@@ -1,4 +1,4 @@
-"""The inner levels by name, and those that need no file of their own: the default, propagation alone, and none."""
+"""The inner levels by name, and those that need no file of their own: the default, projection, propagation alone, and none."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base import CONVERGED, INFEASIBLE, NLP
 from .base import InnerResult, InnerSolver, scored, started
+from .effort import evaluation, propagation
 from .ipopt import Ipopt
 from .newton import Newton
 
@@ -16,8 +17,12 @@ PATIENCE = 150
 that fail take all."""
 
 
+QUICK = 15
+"""Steps of Newton's method as a way of its own: most of what it makes feasible takes fewer."""
+
+
 @dataclass(frozen=True)
-class Auto(InnerSolver):
+class Projection(InnerSolver):
     """Newton's method over propagated states, which needs one propagation where these are feasible already; a projection by IPOPT for what
     it leaves infeasible."""
 
@@ -32,7 +37,18 @@ class Auto(InnerSolver):
         for name in ("z", "F", "violation", "status", "moved", "residuals"):
             getattr(found, name)[rest] = getattr(repaired, name)
         found.iterations[rest] += repaired.iterations
-        return replace(found, clocked=repaired.clocked, fallbacks=len(rest))
+        return replace(found, clocked=repaired.clocked, fallbacks=len(rest), work=(found.work or 0.0) + int(repaired.iterations.sum()))
+
+
+@dataclass(frozen=True)
+class Auto(Projection):
+    """The same, for those who do not choose; and for a search, which may, propagation, some steps of Newton's method, or a projection by
+    IPOPT."""
+
+    @property
+    def ways(self) -> tuple[InnerSolver, ...]:
+        """See `InnerSolver.ways`."""
+        return Propagate(), Newton(QUICK, exact=False), Ipopt(max_iterations=PATIENCE)
 
 
 @dataclass(frozen=True)
@@ -44,7 +60,7 @@ class Propagate(InnerSolver):
         start = started(nlp, candidates, warm)
         k = len(start)
         found = scored(nlp, nlp.propagate_and_score(start), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
-        return replace(found, light=k)
+        return replace(found, work=k * propagation(nlp))
 
 
 @dataclass(frozen=True)
@@ -61,11 +77,12 @@ class Whole(InnerSolver):
         start = nlp.tighten(started(nlp, candidates, warm))
         k = len(start)
         found = scored(nlp, (start, *nlp.residuals(start)), start, np.full(k, INFEASIBLE), np.ones(k, dtype=int), tolerance)
-        return replace(found, light=k)
+        return replace(found, work=k * evaluation(nlp))
 
 
 NAMED: dict[str, InnerSolver] = {
     "auto": Auto(),
+    "projection": Projection(),
     "propagate": Propagate(),
     "none": Whole(),
     "ipopt": Ipopt(),

@@ -10,6 +10,7 @@ from ..base import INFEASIBLE, NLP, TIMEOUT
 from ..phases.reduced import Propagated, Reduced
 from ..stopping import stopping
 from .base import InnerResult, InnerSolver, scored, started
+from .effort import newton_step
 from .least_distance import least_distance
 
 NEAR = 0.1
@@ -36,16 +37,20 @@ class Newton(InnerSolver):
     Parameters
     ----------
     max_iterations : int
+    exact : bool
+        Whether each step is found exactly, by non-negative least squares where the faster method does not end. They may take many times as
+        long as all else; without them, fewer candidates become feasible.
     """
 
     max_iterations: int = 40
+    exact: bool = True
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`. If the work is to end early (`stopping`), what was not done with by then has the status "timeout"."""
         start = started(nlp, candidates, warm)
         Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
         otherwise = np.full(len(start), INFEASIBLE)
-        going = _Going(nlp, start)
+        going = _Going(nlp, start, self.exact)
         # Overflow shows in the results; warnings would add nothing.
         with np.errstate(invalid="ignore", over="ignore"):
             for iteration in range(self.max_iterations):
@@ -71,7 +76,8 @@ class Newton(InnerSolver):
                 self._advance(going, iteration, propagated, outside, pull, tolerance)
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
-        return replace(scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance), light=int(iterations.sum()))
+        found = scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
+        return replace(found, work=int(iterations.sum()) * newton_step(nlp))
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
@@ -123,8 +129,9 @@ class _Going:
     memory : Anderson
     """
 
-    def __init__(self, nlp: NLP, start: np.ndarray) -> None:
+    def __init__(self, nlp: NLP, start: np.ndarray, exact: bool) -> None:
         (k, _), free, self.reduced = start.shape, nlp.free, nlp.reduced
+        self._exact = exact
         self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)
         self.origin, self.span, self.period = nlp.lower[free], nlp.span[free], nlp.period[free]
         self.top, self.periodic = self.origin + self.span, bool(self.period.any())
@@ -172,13 +179,13 @@ class _Going:
         if not equation.all():
             on = watched[:, rows]
             lower, upper, multipliers = np.where(on, lower, -np.inf), np.where(on, upper, np.inf), np.where(on, multipliers, 0.0)
-        step, met, multipliers = least_distance(pull, A, lower, upper, box, multipliers)
+        step, met, multipliers = least_distance(pull, A, lower, upper, box, multipliers, self._exact)
         if not met.all():
             # Far from feasibility they may contradict each other: then inequalities wait until the equations are satisfied.
             again = ~met
             lower[:, ~equation], upper[:, ~equation], multipliers[again] = -np.inf, np.inf, 0.0
             there = box[0][again], box[1][again]
-            step[again] = least_distance(pull[again], A[again], lower[again], upper[again], there, multipliers[again])[0]
+            step[again] = least_distance(pull[again], A[again], lower[again], upper[again], there, multipliers[again], self._exact)[0]
         self.multipliers[slice(None) if isinstance(some, slice) else some[:, None], rows] = multipliers
         return step
 

@@ -41,6 +41,11 @@ class Batched:
     wide : callable, optional
         k -> what `function.map(k)` is, to the last bit, but faster. It is asked for one number of calls only, that into which the first
         large batch divides evenly: batches are mostly of one size.
+
+    Attributes
+    ----------
+    instructions : int
+        That one call goes through.
     """
 
     def __init__(self, function: ca.Function, *, compiled: bool = True, wide: Callable[[int], ca.Function] | None = None) -> None:
@@ -50,7 +55,7 @@ class Batched:
         self._width = 0
         self._may_compile = compiled and compiler() is not None
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
-        self._work, self._each, self._length = 0, work(function), _length(function)
+        self._work, self.instructions, self._length = 0, work(function), _length(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -65,7 +70,7 @@ class Batched:
         k = len(inputs[0])
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
-        self._work += k * self._each
+        self._work += k * self.instructions
         if self._may_compile and self._work * TYPICAL > self._pays * max(self._length, TYPICAL):
             self._compile(arrays, outputs)
         return outputs

@@ -104,6 +104,16 @@ class Reduced(Deriving):
             found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
         return found
 
+    @property
+    def instructions(self) -> int:
+        """Of the compiled function, for each vector that is propagated."""
+        return self._propagation(False).instructions
+
+    @property
+    def instructions_of_derivatives(self) -> int:
+        """Of the compiled function, for the derivatives at the ends of each vector."""
+        return self._derivatives(False).instructions
+
     @remembered
     def _propagation(self, robust: bool) -> Batched:
         function = self._propagation_function(robust)

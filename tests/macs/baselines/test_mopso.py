@@ -319,7 +319,7 @@ class Compass(Evaluator):
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         return candidates.copy()
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         assert ((Z >= 0) & (Z <= 360)).all()
         F = 1 - np.cos(np.deg2rad(Z - [350, 10]))
         return Evaluation(Z.copy(), F, np.zeros(len(Z)), np.full(len(Z), "converged")), 0

@@ -323,7 +323,7 @@ class Moved(Evaluator):
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         return np.hstack([candidates, np.zeros((len(candidates), 1))])
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         self.sent.append(Z.copy())
         Z = Z.copy()
         Z[:, :3] /= np.linalg.norm(Z[:, :3], axis=1, keepdims=True)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from macs import MACS
-from macs.evaluation.bilevel import LIGHT, Bilevel
+from macs.evaluation.bilevel import Bilevel
 from macs.fronts.provenance import merged_stats, more_costs
 from problems import load
 from transcription import DFET
 from transcription.inner import Ipopt, Newton, Propagate, inner_solver
+from transcription.inner.effort import newton_step, propagation
 
 METHOD = DFET(3, 3)
 
@@ -24,10 +25,16 @@ def evaluated(inner, count: int = 4) -> tuple[Bilevel, int]:
     return evaluator, len(evaluator.nlp.variables)
 
 
-@pytest.mark.parametrize(("inner", "part"), [(Ipopt(), 1.0), (Newton(), LIGHT), (Propagate(), LIGHT)])
+@pytest.mark.parametrize(("inner", "part"), [(Ipopt(), lambda nlp: 1.0), (Newton(), newton_step), (Propagate(), propagation)])
 def test_iterations_count_by_what_they_take(inner, part):
     evaluator, n = evaluated(inner)
-    assert evaluator.counts.inner_iterations >= 4 and evaluator.counts.work == round(part * n * evaluator.counts.inner_iterations)
+    each = part(evaluator.nlp)
+    assert evaluator.counts.inner_iterations >= 4 and evaluator.counts.work == round(each * n * evaluator.counts.inner_iterations)
+
+
+def test_less_is_taken_without_derivatives():
+    nlp = METHOD.nlp(load("goddard"))
+    assert 0.0 < propagation(nlp) < newton_step(nlp) < 1.0
 
 
 def test_what_goes_to_ipopt_counts_more(monkeypatch):
@@ -36,7 +43,8 @@ def test_what_goes_to_ipopt_counts_more(monkeypatch):
     monkeypatch.setattr(Newton, "solve", lambda self, *given, **more: solve(Newton(max_iterations=1), *given, **more))
     evaluator, n = evaluated(inner_solver("auto"))
     counts = evaluator.counts
-    assert counts.fallbacks == 4 and counts.work == round(n * (counts.inner_iterations - (1.0 - LIGHT) * 4))
+    light = newton_step(evaluator.nlp)
+    assert counts.fallbacks == 4 and counts.work == round(n * (counts.inner_iterations - (1.0 - light) * 4))
 
 
 def test_gradient_solves_count_all_their_iterations():

@@ -44,7 +44,7 @@ class Circle(Evaluator):
     def objectives(Z: np.ndarray) -> np.ndarray:
         return 1.0 - Z[:, :1] * np.column_stack([np.cos(Z[:, 1]), np.sin(Z[:, 1])])
 
-    def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+    def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         return Evaluation(Z.copy(), self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), 0
 
     def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
@@ -100,7 +100,7 @@ def test_no_more_solves_than_allowed() -> None:
 
 def test_where_no_candidate_is_feasible_gradients_find_what_is() -> None:
     class Closed(Circle):
-        def _evaluate(self, Z: np.ndarray) -> tuple[Evaluation, int]:
+        def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
             return Evaluation(Z.copy(), self.objectives(Z), np.ones(len(Z)), np.full(len(Z), "infeasible")), 0
 
     def found(**settings) -> SearchState:

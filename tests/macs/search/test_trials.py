@@ -19,7 +19,7 @@ class Sticky(Evaluator):
     def first_guess(self, candidates):
         return np.hstack([np.full((len(candidates), 1), 7.0), candidates])
 
-    def _evaluate(self, Z):
+    def _evaluate(self, Z, way=None):
         self.started_from.append(Z[:, 0].copy())
         back = Z.copy()
         back[:, 2] = 0.5

@@ -1,0 +1,128 @@
+"""Which inner solver the next proposals go to: that which has brought most for its work, and to the others a stated little.
+
+What a way of making candidates feasible is worth differs from problem to problem, and during a search: where the ends of trajectories are
+free, propagation finds a front in no time; where they are fixed, nothing that is only propagated is feasible. Gradient solves compete, too.
+Where these bring most, proposals are only propagated: they are what the solves begin from. Work is counted, not timed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..evaluation.evaluator import Evaluation, Evaluator
+from ..pareto.directions import tchebycheff
+from .state import SearchState
+
+FORGET = 0.1
+"""Part of what was brought, and of the work for it, that is forgotten with each batch."""
+FIRST = 1
+"""The way of the first population."""
+CHEAP = 0.1
+"""Least share of all evaluations of a way that takes less work than that which most proposals go to."""
+DEAR = 0.15
+"""Least share of all work, gradient solves included, of a way that takes more."""
+BROUGHT, FOR, WORK, EVALUATIONS = range(4)
+"""Columns of the effort of each way, the last of which are the gradient solves: what it brought, for which work, older ones count less;
+all work; all evaluations, or solves."""
+
+
+def no_effort(ways: int, gradients: int) -> np.ndarray:
+    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, 0 without them, are believed to bring a
+    whole front each, until they were tried."""
+    effort = np.zeros((ways + 1, 4))
+    effort[ways, [BROUGHT, FOR]] = 1.0 if gradients else 0.0, gradients
+    return effort
+
+
+def begun(effort: np.ndarray) -> np.ndarray:
+    """The effort when a front has been begun: what was brought before is of another kind."""
+    effort = effort.copy()
+    effort[:-1, [BROUGHT, FOR]] = 0.0
+    return effort
+
+
+def ways_of(effort: np.ndarray, count: int) -> np.ndarray:
+    """The way (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient solves
+    do; or ways that have not had their shares."""
+    ways, rate = effort[:-1], effort[:, BROUGHT] / np.maximum(effort[:, FOR], 1.0)
+    main = int(np.argmax(rate)) % len(ways)
+    for way in range(main):
+        if ways[way, EVALUATIONS] <= CHEAP * ways[:, EVALUATIONS].sum():
+            return np.full(count, way)
+    chosen, free = np.full(count, main), count
+    for way in range(main + 1, len(ways)):
+        left = DEAR * effort[:, WORK].sum() - ways[way, WORK]
+        each = ways[way, WORK] / max(ways[way, EVALUATIONS], 1.0)
+        some = min(free, max(int(left / each), 0) if each else 1)
+        chosen[free - some : free] = way
+        free -= some
+    return chosen
+
+
+def credited(effort: np.ndarray, way: int, brought: float, work: int, count: int) -> np.ndarray:
+    """The effort after `count` evaluations, or solves, by one way. What gradient solves brought is not forgotten: when proposals improve a
+    front by little any more, it is still to be polished by these."""
+    effort = effort.copy()
+    effort[:-1, [BROUGHT, FOR]] *= 1.0 - FORGET
+    effort[way] += brought, work, work, count
+    return effort
+
+
+class Gains:
+    """What points bring to a front: by how much they improve the best values of its directions, on average, each of which counts one from
+    the ideal point to the nadir. As long as there is no front, each feasible point counts one."""
+
+    def __init__(self, state: SearchState, tolerance: float) -> None:
+        self._directions, self._tolerance = state.directions, tolerance
+        self._ideal, self._nadir = state.ideal, state.nadir
+        self._best = self._values(state.archive.F) if len(state.archive) else None
+
+    def of(self, found: Evaluation) -> float:
+        """What these points bring, which then count as known."""
+        F = found.F[found.violation <= self._tolerance]
+        if self._best is None or not len(F):
+            return float(len(F))
+        values = np.minimum(self._values(F), self._best)
+        brought = float(np.mean(np.minimum(self._best - values, 1.0)))
+        self._best = values
+        return brought
+
+    def _values(self, F: np.ndarray) -> np.ndarray:
+        return tchebycheff(F[:, None], self._directions, self._ideal, self._nadir).min(axis=0)
+
+
+def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Gains) -> Evaluation:
+    """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought."""
+    if not evaluator.ways:
+        return evaluator.evaluate(Z)
+    chosen, parts = ways_of(state.effort, len(Z)), []
+    for way in np.unique(chosen).tolist():
+        before = evaluator.counts.work
+        parts.append(evaluator.evaluate(Z[chosen == way], way))
+        done = evaluator.counts.work - before
+        state.effort = credited(state.effort, way, gains.of(parts[-1]), done, len(parts[-1].F))
+    order = np.argsort(np.argsort(chosen, kind="stable"), kind="stable")
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = whole.joined(part)
+    return whole if len(parts) == 1 else whole.take(order)
+
+
+def projected(evaluator: Evaluator, seen: Evaluation, Z: np.ndarray, most: int, budget: int) -> Evaluation:
+    """A first population, of full vectors (k, D), of which some more are feasible: the `most` that miss least take the last of several
+    ways, as far as the budget goes."""
+    order = np.argsort(np.where(np.isnan(seen.violation), np.inf, seen.violation), kind="stable")
+    rest = np.sort(order[seen.violation[order] > evaluator.tolerance][: max(0, min(most, budget - evaluator.counts.evaluations))])
+    if not (evaluator.ways and len(rest)):
+        return seen
+    better = evaluator.evaluate(Z[rest], len(evaluator.ways) - 1)
+    rows = np.arange(len(seen.F))
+    rows[rest] = len(seen.F) + np.arange(len(better.F))
+    return seen.joined(better).take(rows)
+
+
+def spent(effort: np.ndarray, ways: Sequence[str]) -> dict[str, dict[str, int]]:
+    """Evaluations, and work, by the name of their way; those of the first population are not among them."""
+    return {name: {"evaluations": int(row[EVALUATIONS]), "work": int(row[WORK])} for name, row in zip(ways, effort, strict=False)}
