@@ -21,8 +21,8 @@ FIRST = 1
 """The way of the first population."""
 CHEAP = 0.1
 """Least share of all evaluations of a way that takes less work than that which most proposals go to."""
-DEAR = 0.15
-"""Least share of all work, gradient solves included, of a way that takes more."""
+DEAR, LEAST = 0.15, 0.03
+"""Share of all work, with the gradient solves to come, of the ways that take more; least share of each."""
 BROUGHT, FOR, WORK, EVALUATIONS = range(4)
 """Columns of the effort of each way, the last of which are the gradient solves: what it brought, for which work, older ones count less;
 all work; all evaluations, or solves."""
@@ -43,17 +43,24 @@ def begun(effort: np.ndarray) -> np.ndarray:
     return effort
 
 
-def ways_of(effort: np.ndarray, count: int) -> np.ndarray:
+def ways_of(effort: np.ndarray, count: int, every: int | None) -> np.ndarray:
     """The way (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient solves
-    do; or ways that have not had their shares."""
+    do, one of which is made for `every` evaluations in the end; or ways that have not had their shares."""
     ways, rate = effort[:-1], effort[:, BROUGHT] / np.maximum(effort[:, FOR], 1.0)
     main = int(np.argmax(rate)) % len(ways)
+    evaluations = ways[:, EVALUATIONS].sum()
     for way in range(main):
-        if ways[way, EVALUATIONS] <= CHEAP * ways[:, EVALUATIONS].sum():
+        if ways[way, EVALUATIONS] <= CHEAP * evaluations:
             return np.full(count, way)
+    _, _, solving, solves = effort[-1]
+    ahead = 0.0 if every is None else max(0.0, evaluations / every - solves) * (solving / solves if solves else effort[-1, FOR])
     chosen, free = np.full(count, main), count
-    for way in range(main + 1, len(ways)):
-        left = DEAR * effort[:, WORK].sum() - ways[way, WORK]
+    dear = np.arange(main + 1, len(ways))
+    shares = np.full(len(dear), LEAST)
+    if len(dear):
+        shares[np.argmax(rate[dear])] = DEAR - LEAST * (len(dear) - 1)
+    for way, share in zip(dear.tolist(), shares.tolist(), strict=True):
+        left = share * (effort[:, WORK].sum() + ahead) - ways[way, WORK]
         each = ways[way, WORK] / max(ways[way, EVALUATIONS], 1.0)
         some = min(free, max(int(left / each), 0) if each else 1)
         chosen[free - some : free] = way
@@ -93,11 +100,11 @@ class Gains:
         return tchebycheff(F[:, None], self._directions, self._ideal, self._nadir).min(axis=0)
 
 
-def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Gains) -> Evaluation:
+def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Gains, every: int | None) -> Evaluation:
     """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought."""
     if not evaluator.ways:
         return evaluator.evaluate(Z)
-    chosen, parts = ways_of(state.effort, len(Z)), []
+    chosen, parts = ways_of(state.effort, len(Z), every), []
     for way in np.unique(chosen).tolist():
         before = evaluator.counts.work
         parts.append(evaluator.evaluate(Z[chosen == way], way))

@@ -101,12 +101,13 @@ class MACS(Settings, Solver):
             rng=rng,
         )
         remember(state, [seen], self, evaluator)
-        if self.refines and not len(state.archive) and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
+        wanted = self.refines and (evaluator.ways or not len(state.archive))
+        if wanted and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
             optima = gradient_action.first_optima(seen, start, evaluator, rng)
             remember(state, [optima], self, evaluator)
             state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
-        if not len(state.archive) and not stopping():
+        if evaluator.ways and not len(state.archive) and not stopping():
             seen = projected(evaluator, seen, Z, self.agents, budget)
             remember(state, [seen], self, evaluator)
             state.evaluations = evaluator.counts.evaluations

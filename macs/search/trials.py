@@ -41,6 +41,7 @@ class Trials:
         self.box = evaluator.box
         self.seen: list[Evaluation] = []
         self._gains = Gains(state, evaluator.tolerance)
+        self._every = settings.polish_every if settings.refines and evaluator.has_gradients else None
         self.credited = np.zeros(len(state.agents), dtype=bool)
 
     def positions(self, rows: np.ndarray | None = None) -> np.ndarray:
@@ -64,7 +65,7 @@ class Trials:
         X, trial, free = X[moved], trial[moved], self.evaluator.free
         Z = Z[moved]
         Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
-        result = evaluated(self.state, self.evaluator, Z, self._gains)
+        result = evaluated(self.state, self.evaluator, Z, self._gains, self._every)
         self.state.evaluations = self.evaluator.counts.evaluations
         self.seen.append(result)
         return moved, result

@@ -17,7 +17,7 @@ Box = tuple[np.ndarray, np.ndarray]
 
 
 def least_distance(
-    center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box, multipliers: np.ndarray, exact: bool = True
+    center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box, multipliers: np.ndarray, exact: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise |x - center|^2 subject to lower <= A x <= upper and box[0] <= x <= box[1].
 
@@ -36,8 +36,9 @@ def least_distance(
     box : pair of arrays (k, d)
     multipliers : array (k, r)
         Where to begin: those of a problem nearby, or zeros.
-    exact : bool
-        Whether non-negative least squares decide where Newton's method does not end; if not, the point is where it got to.
+    exact : array (k,) of int
+        Of how many steps more non-negative least squares may decide where Newton's method does not end, one of which is counted here;
+        otherwise the point is where it got to.
 
     Returns
     -------
@@ -52,12 +53,10 @@ def least_distance(
     if not finite.all():
         # Derivatives overflow where states are about to. Without them a step leads back to the center.
         x[~finite], met[~finite], multipliers[~finite] = np.clip(center, *box)[~finite], False, 0.0
-    if not exact:
-        multipliers[~met] = 0.0
-        return x, met, multipliers
-    for i in np.flatnonzero(~met & finite):
+    multipliers[~met] = 0.0
+    for i in np.flatnonzero(~met & finite & (exact > 0)):
+        exact[i] -= 1
         nearest = _exact(center[i], A[i], lower[i], upper[i], (box[0][i], box[1][i]))
-        multipliers[i] = 0.0
         if nearest is not None:
             x[i], multipliers[i] = nearest
             values = A[i] @ x[i]

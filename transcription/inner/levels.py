@@ -1,4 +1,4 @@
-"""The inner levels by name, and those that need no file of their own: the default, projection, propagation alone, and none."""
+"""The inner levels by name, and those that need no file of their own: the default, several, propagation alone, and none."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ PATIENCE = 150
 that fail take all."""
 
 
-QUICK = 15
-"""Steps of Newton's method as a way of its own: most of what it makes feasible takes fewer."""
+QUICK, EXACT = 25, 1
+"""Steps of Newton's method as a way of its own, and those of them that are found exactly where that takes long: most of what it makes
+feasible takes no more."""
 
 
 @dataclass(frozen=True)
-class Projection(InnerSolver):
+class Auto(InnerSolver):
     """Newton's method over propagated states, which needs one propagation where these are feasible already; a projection by IPOPT for what
     it leaves infeasible."""
 
@@ -41,14 +42,15 @@ class Projection(InnerSolver):
 
 
 @dataclass(frozen=True)
-class Auto(Projection):
-    """The same, for those who do not choose; and for a search, which may, propagation, some steps of Newton's method, or a projection by
-    IPOPT."""
+class Divided(Auto):
+    """The same for those who do not choose. MACS divides its effort among propagation, some steps of Newton's method, and a projection by
+    IPOPT, by what each has brought for its work, see `macs.search.effort`: where solves by IPOPT take most of the time and gradient solves
+    find the front, a search takes a small part of the time."""
 
     @property
     def ways(self) -> tuple[InnerSolver, ...]:
         """See `InnerSolver.ways`."""
-        return Propagate(), Newton(QUICK, exact=False), Ipopt(max_iterations=PATIENCE)
+        return Propagate(), Newton(QUICK, EXACT), Ipopt(max_iterations=PATIENCE)
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class Whole(InnerSolver):
 
 NAMED: dict[str, InnerSolver] = {
     "auto": Auto(),
-    "projection": Projection(),
+    "divided": Divided(),
     "propagate": Propagate(),
     "none": Whole(),
     "ipopt": Ipopt(),

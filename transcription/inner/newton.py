@@ -37,13 +37,13 @@ class Newton(InnerSolver):
     Parameters
     ----------
     max_iterations : int
-    exact : bool
-        Whether each step is found exactly, by non-negative least squares where the faster method does not end. They may take many times as
-        long as all else; without them, fewer candidates become feasible.
+    exact : int
+        How many steps of a candidate are found exactly, by non-negative least squares, where the faster method does not end. They may take
+        many times as long as all else; with few of them, fewer candidates become feasible.
     """
 
     max_iterations: int = 40
-    exact: bool = True
+    exact: int = 1000
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`. If the work is to end early (`stopping`), what was not done with by then has the status "timeout"."""
@@ -126,12 +126,14 @@ class _Going:
         Whether they are near enough to their candidates and only have to be feasible.
     last : array (k,)
         Length of the last step.
+    exact : array (k,) of int
+        How many steps more are found exactly where that takes long.
     memory : Anderson
     """
 
-    def __init__(self, nlp: NLP, start: np.ndarray, exact: bool) -> None:
+    def __init__(self, nlp: NLP, start: np.ndarray, exact: int) -> None:
         (k, _), free, self.reduced = start.shape, nlp.free, nlp.reduced
-        self._exact = exact
+        self.exact = np.full(k, exact)
         self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)
         self.origin, self.span, self.period = nlp.lower[free], nlp.span[free], nlp.period[free]
         self.top, self.periodic = self.origin + self.span, bool(self.period.any())
@@ -144,7 +146,7 @@ class _Going:
 
     def keep(self, on: np.ndarray) -> None:
         """Go on with some of them only."""
-        for name in ("index", "_vectors", "x", "center", "watched", "multipliers", "settled", "last"):
+        for name in ("index", "_vectors", "x", "center", "watched", "multipliers", "settled", "last", "exact"):
             setattr(self, name, getattr(self, name)[on])
         self.memory.keep(on)
 
@@ -179,13 +181,17 @@ class _Going:
         if not equation.all():
             on = watched[:, rows]
             lower, upper, multipliers = np.where(on, lower, -np.inf), np.where(on, upper, np.inf), np.where(on, multipliers, 0.0)
-        step, met, multipliers = least_distance(pull, A, lower, upper, box, multipliers, self._exact)
+        exact = self.exact[some]
+        step, met, multipliers = least_distance(pull, A, lower, upper, box, multipliers, exact)
         if not met.all():
             # Far from feasibility they may contradict each other: then inequalities wait until the equations are satisfied.
             again = ~met
             lower[:, ~equation], upper[:, ~equation], multipliers[again] = -np.inf, np.inf, 0.0
             there = box[0][again], box[1][again]
-            step[again] = least_distance(pull[again], A[again], lower[again], upper[again], there, multipliers[again], self._exact)[0]
+            left = exact[again]
+            step[again] = least_distance(pull[again], A[again], lower[again], upper[again], there, multipliers[again], left)[0]
+            exact[again] = left
+        self.exact[some] = exact
         self.multipliers[slice(None) if isinstance(some, slice) else some[:, None], rows] = multipliers
         return step
 
