@@ -78,9 +78,7 @@ def in_space(design: Capsule, upward, case: Cases, row: int):
 
     angle = design.entry_angle + case.entry_angle[row]
     begin = [TOP, 0.0, 0.0, design.entry_speed * np.sin(angle), design.entry_speed * np.cos(angle), 0.0, 0.0]
-    return ended(
-        slope, begin, lambda y: norm(y[:3]) - TOP, lambda y: np.dot(y[:3], y[3:6]), [*[1e-5] * 3, *[1e-8] * 3, 1e-6], max_step=1.0
-    )
+    return ended(slope, begin, lambda y: norm(y[:3]) - TOP, lambda y: np.dot(y[:3], y[3:6]), [*[1e-5] * 3, *[1e-8] * 3, 1e-6], max_step=1.0)
 
 
 def ended(slope, begin, height, climb, atol, max_step=np.inf):
