@@ -27,7 +27,6 @@ from transcription.inner import Auto, Newton
 from transcription.nlp.optimality import optimality
 from transcription.stopping import stopped_by, stopping
 
-
 ANGLES = np.linspace(0.0, np.pi / 2, 20_001)
 CURVE = 1.0 - np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 """The front of `Circle`, which its solves search."""
