@@ -1,13 +1,41 @@
 """What all tests share."""
 
+import os
 import sys
 
 import pytest
 from hypothesis import settings
 
+# Numpy is not imported yet. Each worker has one core, and threads for small matrices take more time than they save.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
 # How long an example takes says nothing of what it does: machines are noisy.
 settings.register_profile("macs", deadline=None)
 settings.load_profile("macs")
+
+LONGEST = (
+    "test_every_point_of_a_front_flown_again",
+    "test_the_four_ends_are_flights",
+    "test_points_that_the_default_search_calls_verified_are_right",
+    "test_the_two_step_design_is_dominated",
+    "test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_optima",
+    "test_goddard_on_the_papers_mesh",
+    "test_with_gradients_the_front_is_as_exact_as_its_mesh",
+    "test_two_phases_of_a_skip_entry",
+)
+"""Tests of minutes: they begin first, so that no worker waits in the end for another one's."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest tests first; with `--dist loadgroup` those that share a fixture of their module stay together: it is made once."""
+    items.sort(key=lambda item: not item.name.startswith(LONGEST))
+    for item in items:
+        if isinstance(item, pytest.Function):
+            fixtures = item._fixtureinfo.name2fixturedefs.values()
+            if any(definitions[-1].scope == "module" for definitions in fixtures):
+                item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture(autouse=True)

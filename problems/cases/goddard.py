@@ -8,6 +8,7 @@ the states are those of its authors' published implementation.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import atanh, cosh, sinh
 
 import casadi as ca
 import numpy as np
@@ -125,14 +126,14 @@ def _ends(tf: float) -> tuple[float, float]:
     # The tangent z = tan u runs linearly from p = sinh a to q = sinh b, so dt = tf/(p - q) dz, and sin u = z/sqrt(1 + z^2). vy(tf) = 0
     # means that the mean of sin u, (cosh a - cosh b)/(sinh a - sinh b) = tanh((a + b)/2), is g/THRUST: the sum of a and b is known, and
     # the height fixes their difference.
-    total = 2.0 * np.arctanh(GRAVITY / THRUST)
+    total = 2.0 * atanh(GRAVITY / THRUST)
 
     def missing_height(difference: float) -> float:
         a, b = 0.5 * (total + difference), 0.5 * (total - difference)
-        p, q = np.sinh(a), np.sinh(b)
+        p, q = sinh(a), sinh(b)
         # The time to go is proportional to z - q; this is the integral of (z - q) z/sqrt(1 + z^2) from q to p.
-        antiderivative = 0.25 * (np.sinh(2 * a) - np.sinh(2 * b)) - 0.5 * (a - b) - q * (np.cosh(a) - np.cosh(b))
-        return float(THRUST * tf**2 * antiderivative / (p - q) ** 2 - 0.5 * GRAVITY * tf**2 - HEIGHT)
+        antiderivative = 0.25 * (sinh(2 * a) - sinh(2 * b)) - 0.5 * (a - b) - q * (cosh(a) - cosh(b))
+        return THRUST * tf**2 * antiderivative / (p - q) ** 2 - 0.5 * GRAVITY * tf**2 - HEIGHT
 
     difference = brentq(missing_height, 1e-3, 200.0, xtol=1e-13, rtol=1e-14)
     return 0.5 * (total + difference), 0.5 * (total - difference)

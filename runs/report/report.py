@@ -237,6 +237,8 @@ class _Writer:
         for suffix in ("png", "pdf"):
             content = io.BytesIO()
             figure.savefig(content, format=suffix, dpi=200)
+            # To lay it out takes as long as to draw it, and once does.
+            figure.set_layout_engine("none")
             self.write(f"{stem}.{suffix}", content.getvalue())
 
     def _free(self, kind: str, name: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from statements import refused
+from vectors import cross
 
 from problems import load
 from problems.cases.skip_entry import smv
@@ -38,7 +39,7 @@ def axes(lon: float, lat: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Up, east and north in the frame of the planet."""
     up = np.array([math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)])
     east = np.array([-math.sin(lon), math.cos(lon), 0.0])
-    return up, east, np.cross(up, east)
+    return up, east, cross(up, east)
 
 
 def velocity(x: np.ndarray) -> np.ndarray:
@@ -59,13 +60,13 @@ def by_vectors(x: np.ndarray, u: np.ndarray) -> np.ndarray:
     above, right = math.cos(path) * up - math.sin(path) * level, math.cos(heading) * east - math.sin(heading) * north
     force = (thrust * math.cos(a) - drag) * along + (lift * math.cos(bank) + thrust * math.sin(a)) * above + lift * math.sin(bank) * right
     spin = np.array([0.0, 0.0, OMEGA])
-    acceleration = force / m - g * up - 2 * np.cross(spin, moving) - np.cross(spin, np.cross(spin, position))
+    acceleration = force / m - g * up - 2 * cross(spin, moving) - cross(spin, cross(spin, position))
     r, east_rate, north_rate = R + h, moving @ east, moving @ north
     lon_rate, lat_rate = east_rate / (r * math.cos(lat)), north_rate / r
     # The axes turn with the place: rates of the components of the velocity.
     turning = lon_rate * np.array([0.0, 0.0, 1.0]) - lat_rate * east
     upward, eastward, northward = (
-        acceleration @ axis + moving @ np.cross(turning, axis) for axis in (up, east, north)
+        acceleration @ axis + moving @ cross(turning, axis) for axis in (up, east, north)
     )  # fmt: skip
     ground = math.hypot(east_rate, north_rate)
     outward = (east_rate * eastward + north_rate * northward) / ground

@@ -32,9 +32,9 @@ def study(**changed) -> Study:
 
 @pytest.fixture(scope="module", autouse=True)
 def few():
-    """Four points of each front."""
+    """Three points of each front."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dispersions, "MANY", 4)
+        patch.setattr(dispersions, "MANY", 3)
         yield
 
 
@@ -67,7 +67,7 @@ def test_tables_and_figures_of_the_report(folder, found):
     made = report(folder)
     table = next(path for path in made.files if path.name.endswith("dispersed-bank-as-it-is.csv"))
     rows = list(csv.reader(table.open(encoding="utf-8")))
-    assert len(rows) == 1 + len(found.points) == 5
+    assert len(rows) == 1 + len(found.points) == 4
     column = next(i for i, name in enumerate(rows[0]) if name.startswith("captured"))
     assert [float(row[column]) for row in rows[1:]] == [one["captured", "%"] for one in found.measures["bank as it is"]]
     shield = next(i for i, name in enumerate(rows[0]) if name.startswith("nominal TPS"))

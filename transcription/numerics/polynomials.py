@@ -73,8 +73,15 @@ def nodes(basis: str, degree: int) -> np.ndarray:
 def bernstein_matrix(degree: int, tau: np.ndarray) -> np.ndarray:
     """Values of the Bernstein functions of a degree at `tau` (n,), shape (n, degree + 1)."""
     s = 0.5 * (np.asarray(tau, dtype=float)[:, None] + 1.0)
+    i, binomials = _binomials(degree)
+    return binomials * s**i * (1.0 - s) ** (degree - i)
+
+
+@cache
+def _binomials(degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """0, ..., degree, and the binomial coefficients of the degree over these."""
     i = np.arange(degree + 1)
-    return comb(degree, i) * s**i * (1.0 - s) ** (degree - i)
+    return i, comb(degree, i)
 
 
 def bernstein_derivative(degree: int, tau: np.ndarray) -> np.ndarray:

@@ -40,7 +40,8 @@ class PiecewisePolynomial:
         """Values at `times` (any shape), with a last axis of length k. Times outside the elements use the nearest element."""
         times = np.asarray(times, dtype=float)
         flat = times.ravel()
-        element = np.clip(np.searchsorted(self.edges, flat, side="right") - 1, 0, len(self.edges) - 2)
+        # Not by np.clip, which takes longer than all the rest of a single time.
+        element = np.minimum(np.maximum(self.edges.searchsorted(flat, side="right") - 1, 0), len(self.edges) - 2)
         left, right = self.edges[element], self.edges[element + 1]
         length = np.where(right > left, right - left, 1.0)
         values = basis_matrix(self.basis, self.coefficients.shape[1] - 1, 2.0 * (flat - left) / length - 1.0)
@@ -140,13 +141,14 @@ class PhaseTrajectory:
             If a time lies outside the phase.
         """
         times = np.asarray(time, dtype=float)
-        slack = 1e-12 * max(1.0, abs(self.t0), abs(self.tf))
         # A phase of no duration may end before it begins, by the tolerance of a feasible point.
-        first, last = min(self.t0, self.tf), max(self.t0, self.tf)
-        if not np.all((times >= first - slack) & (times <= last + slack)):
+        first, last = sorted((self.t0, self.tf))
+        slack = 1e-12 * max(1.0, abs(first), abs(last))
+        if not ((times >= first - slack) & (times <= last + slack)).all():
             raise ValueError(f"phase '{self.name}' lasts from {self.t0:g} to {self.tf:g} {self.time_unit}; asked for {time}")
         values = np.concatenate([self.state(times), wrapped(self.control(times), self.control_variables)], axis=-1)
-        return {name: values[..., i] if times.ndim else float(values[i]) for i, name in enumerate(self.names[: values.shape[-1]])}
+        columns = np.moveaxis(values, -1, 0) if times.ndim else values.tolist()
+        return dict(zip((v.name for v in (*self.state_variables, *self.control_variables)), columns, strict=True))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

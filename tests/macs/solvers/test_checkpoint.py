@@ -30,6 +30,7 @@ from macs.solvers import checkpoint, checkpoint_file
 from macs.solvers.checkpoint_file import to_bytes
 from macs.solvers.solver import Solver
 from problems import load
+from problems.compiled import CompiledProblem
 from transcription import DFET
 from transcription.inner import Ipopt
 from transcription.nlp.scalarized import Solved
@@ -49,8 +50,14 @@ def minimize(solver: Solver = SMALL, box: Any = BOX, f: Any = function, evaluati
     return solver.minimize(f, box, evaluations=evaluations, seed=seed, **more)
 
 
+@cache
+def compiled(problem: str) -> CompiledProblem:
+    """A case, with which its NLPs are kept."""
+    return load(problem).compile()
+
+
 def solve(solver: Solver = POLISHED, evaluations: int = 160, seed: int | None = 1, problem: str = "orbit_rise", **more: Any) -> Front:
-    return solver.solve(load(problem), more.pop("mesh", MESH), evaluations=evaluations, seed=seed, **more)
+    return solver.solve(compiled(problem), more.pop("mesh", MESH), evaluations=evaluations, seed=seed, **more)
 
 
 uninterrupted, solved = cache(minimize), cache(solve)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from vectors import cross, norm
 
 from macs import payoff
 from problems import load
@@ -42,18 +44,18 @@ PROFILED = Capsule(120.0, 0.32, 1.22, np.radians(-10.2), rolled, curved=True)
 
 
 def heating(density: float, speed: float) -> float:
-    return 1.35e-8 * np.sqrt(density) * speed**3.04 * (1 - 1.395e6 / (speed**2 / 2))
+    return 1.35e-8 * math.sqrt(density) * speed**3.04 * (1 - 1.395e6 / (speed**2 / 2))
 
 
 def over_a_plain(design: Capsule, upward, case: Cases, row: int):
     """How a case ends with gravity and curvature of the interface: altitude above it, speed, path angle and heat load."""
-    ballistic = design.ballistic * case.ballistic[row]
+    ballistic, surface = float(design.ballistic * case.ballistic[row]), float(DENSITY * case.density[row])
 
     def slope(t, y):
-        h, v, g, _ = y
-        rho = DENSITY * case.density[row] * np.exp(-h / HEIGHT)
-        turn = rho * v * upward(t) / (2 * ballistic) + (v / TOP - MU / TOP**2 / v) * np.cos(g)
-        return [v * np.sin(g), -rho * v**2 / (2 * ballistic) - MU / TOP**2 * np.sin(g), turn, heating(rho, v)]
+        h, v, g, _ = y.tolist()
+        rho = surface * math.exp(-h / HEIGHT)
+        turn = rho * v * upward(t) / (2 * ballistic) + (v / TOP - MU / TOP**2 / v) * math.cos(g)
+        return [v * math.sin(g), -rho * v**2 / (2 * ballistic) - MU / TOP**2 * math.sin(g), turn, heating(rho, v)]
 
     begin = [0.0, design.entry_speed, design.entry_angle + case.entry_angle[row], 0.0]
     return ended(slope, begin, lambda y: y[0], lambda y: y[2], [1e-5, 1e-8, 1e-12, 1e-6])
@@ -61,23 +63,22 @@ def over_a_plain(design: Capsule, upward, case: Cases, row: int):
 
 def in_space(design: Capsule, upward, case: Cases, row: int):
     """The same in Cartesian coordinates over the round planet, the rest of the lift to the side: position, velocity and heat load."""
-    ballistic = design.ballistic * case.ballistic[row]
+    ballistic, surface = float(design.ballistic * case.ballistic[row]), float(DENSITY * case.density[row])
 
     def slope(t, y):
         r, w = y[:3], y[3:6]
-        distance, speed = np.linalg.norm(r), np.linalg.norm(w)
-        rho = DENSITY * case.density[row] * np.exp(-(distance - TOP) / HEIGHT)
-        right = np.cross(w, r) / np.linalg.norm(np.cross(w, r))
-        up, along = np.cross(right, w / speed), w / speed
-        sideways = np.sqrt(max(design.lift_to_drag**2 - upward(t) ** 2, 0.0))
-        force = rho * speed**2 / (2 * ballistic) * (upward(t) * up + sideways * right - along)
+        distance, speed = norm(r), norm(w)
+        rho = surface * math.exp(-(distance - TOP) / HEIGHT)
+        right = cross(w, r) / norm(cross(w, r))
+        up, along = cross(right, w / speed), w / speed
+        lift = upward(t)
+        sideways = math.sqrt(max(design.lift_to_drag**2 - lift**2, 0.0))
+        force = rho * speed**2 / (2 * ballistic) * (lift * up + sideways * right - along)
         return [*w, *(force - MU / distance**3 * r), heating(rho, speed)]
 
     angle = design.entry_angle + case.entry_angle[row]
     begin = [TOP, 0.0, 0.0, design.entry_speed * np.sin(angle), design.entry_speed * np.cos(angle), 0.0, 0.0]
-    return ended(
-        slope, begin, lambda y: np.linalg.norm(y[:3]) - TOP, lambda y: np.dot(y[:3], y[3:6]), [*[1e-5] * 3, *[1e-8] * 3, 1e-6], max_step=1.0
-    )
+    return ended(slope, begin, lambda y: norm(y[:3]) - TOP, lambda y: np.dot(y[:3], y[3:6]), [*[1e-5] * 3, *[1e-8] * 3, 1e-6], max_step=1.0)
 
 
 def ended(slope, begin, height, climb, atol, max_step=np.inf):
@@ -117,7 +118,8 @@ def apoapsis(end: np.ndarray) -> float:
 def upward_of(design: Capsule):
     if callable(design.bank):
         return lambda t: design.lift_to_drag * np.cos(float(design.bank(np.array([t]))[0]))
-    return lambda t: design.lift_to_drag * np.cos(design.bank)
+    constant = float(design.lift_to_drag * np.cos(design.bank))
+    return lambda _: constant
 
 
 @pytest.mark.parametrize("number", TABLE_2)
