@@ -11,7 +11,6 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -33,8 +32,6 @@ HEAD = 16
 """Bytes before the objects of a collection, and before the content of each of them."""
 DIMENSION_ONLY = b"This is a netCDF dimension but not a netCDF variable"
 """What netCDF-4 calls a dimension without labels."""
-DIMENSION, DIMENSIONS = "_Netcdf4Dimid", "_Netcdf4Coordinates"
-"""Attributes in which netCDF-4 notes the number of a dimension, at its labels, and those of all dimensions of an array."""
 
 
 class Labels(NamedTuple):
@@ -112,55 +109,23 @@ class Group:
 
 
 def to_bytes(groups: Mapping[str, Labelled]) -> bytes:
-    """The content of a file with these groups, by their paths; "" is the root.
-
-    It has what netCDF-4 asks of an HDF5 file: dimensions that are scales, with numbers, and everything in the order in which it was made.
-    """
+    """The content of a file with these groups, by their paths; "" is the root."""
+    import h5netcdf
     import h5py
 
-    buffer, numbers = io.BytesIO(), count()
-    with h5py.File(buffer, "w", track_order=True) as file:
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
         for path, data in groups.items():
-            _write(file.create_group(path, track_order=True) if path else file, data, {one: next(numbers) for one in data.sizes})
-        file.attrs["_NCProperties"] = _fixed(f"version=2,hdf5={h5py.version.hdf5_version},h5py={h5py.__version__}")
+            group = file.create_group(path) if path else file
+            group.dimensions = data.sizes
+            for name, labels in data.labels.items():
+                values = data[name]
+                dtype = h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
+                variable = group.create_variable(name, labels.dimensions, dtype=dtype, data=values)
+                variable.attrs["long_name"], variable.attrs["units"] = labels.long_name, labels.units
+            for key, value in data.attrs.items():
+                group.attrs[key] = _fixed(value) if isinstance(value, str) else value
     return buffer.getvalue()
-
-
-def _write(group: Any, data: Labelled, numbers: Mapping[str, int]) -> None:
-    """Write the content of a group, whose dimensions have these numbers."""
-    scales = {}
-    for dimension, length in data.sizes.items():
-        if dimension not in data.labels:
-            scales[dimension] = _dataset(group, dimension, (length,), ">f4")
-            scales[dimension].make_scale(DIMENSION_ONLY + f".{length:10}".encode())
-    for name, labels in data.labels.items():
-        array = _dataset(group, name, data[name].shape, data[name].dtype, data[name])
-        array.attrs["long_name"], array.attrs["units"] = labels.long_name, labels.units
-        if labels.dimensions:
-            array.attrs[DIMENSIONS] = np.array([numbers[one] for one in labels.dimensions], np.int32)
-            if len(data[name]):
-                array.attrs[DIMENSION] = np.int32(numbers[labels.dimensions[0]])
-        if labels.dimensions == (name,):
-            scales[name] = array
-            array.make_scale(name)
-    for dimension, scale in scales.items():
-        scale.attrs[DIMENSION] = np.int32(numbers[dimension])
-    for name, labels in data.labels.items():
-        if name not in scales:
-            array = group[name]
-            for axis, dimension in enumerate(labels.dimensions):
-                array.dims[axis].attach_scale(scales[dimension])
-    for key, value in data.attrs.items():
-        group.attrs[key] = _fixed(value) if isinstance(value, str) else np.atleast_1d(value)
-
-
-def _dataset(group: Any, name: str, shape: tuple[int, ...], dtype: Any, values: np.ndarray | None = None) -> Any:
-    """A new dataset. A dimension without entries is an unlimited one, as netCDF has no others that are empty."""
-    import h5py
-
-    kind = h5py.string_dtype() if np.dtype(dtype).kind == "O" else dtype
-    most = tuple(length or None for length in shape)
-    return group.create_dataset(name, shape, kind, values, maxshape=most if None in most else None, track_order=True)
 
 
 def _fixed(text: str) -> np.ndarray:
