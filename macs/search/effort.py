@@ -117,12 +117,15 @@ def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Ga
     return whole if len(parts) == 1 else whole.take(order)
 
 
-def projected(evaluator: Evaluator, seen: Evaluation, Z: np.ndarray, most: int, budget: int) -> Evaluation:
-    """A first population, of full vectors (k, D), of which some more are feasible: the `most` that miss least take the last of several
-    ways, as far as the budget goes."""
-    order = np.argsort(np.where(np.isnan(seen.violation), np.inf, seen.violation), kind="stable")
-    rest = np.sort(order[seen.violation[order] > evaluator.tolerance][: max(0, min(most, budget - evaluator.counts.evaluations))])
-    if not (evaluator.ways and len(rest)):
+def opened(evaluator: Evaluator, Z: np.ndarray, budget: int) -> Evaluation:
+    """The first population, of full vectors (k, D). Where there are several ways, it is made feasible with more effort than what follows,
+    since which valleys are searched begins here: by Newton's method, and what that leaves infeasible by the last way, as far as the budget
+    goes."""
+    if not evaluator.ways:
+        return evaluator.evaluate(Z)
+    seen = evaluator.evaluate(Z, FIRST)
+    rest = np.flatnonzero(~(seen.violation <= evaluator.tolerance))[: max(0, budget - evaluator.counts.evaluations)]
+    if not len(rest):
         return seen
     better = evaluator.evaluate(Z[rest], len(evaluator.ways) - 1)
     rows = np.arange(len(seen.F))

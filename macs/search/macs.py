@@ -33,7 +33,7 @@ from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
-from .effort import FIRST, Gains, begun, credited, no_effort, projected, spent
+from .effort import Gains, begun, credited, no_effort, opened, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .settings import Settings
@@ -81,7 +81,7 @@ class MACS(Settings, Solver):
             batches.append(evaluator.first_guess(evaluator.opening(box.to_values(box.sample(missing, rng)))))
         Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
         Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
-        seen = evaluator.evaluate(Z, FIRST if evaluator.ways else None)
+        seen = opened(evaluator, Z, budget)
         m = seen.F.shape[1]
         self.check_objectives(m)
         guide = self._checked_guide(evaluator)
@@ -107,10 +107,6 @@ class MACS(Settings, Solver):
             remember(state, [optima], self, evaluator)
             state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
-        if evaluator.ways and not len(state.archive) and not stopping():
-            seen = projected(evaluator, seen, Z, self.agents, budget)
-            remember(state, [seen], self, evaluator)
-            state.evaluations = evaluator.counts.evaluations
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
         assign(state, self, guide)
