@@ -27,6 +27,9 @@ from .points import Points
 OPTIMAL = 1e-3
 """Largest `optimality`, and largest violation, of points whose multipliers are costates."""
 
+NAMED, SIDE = 3, 0.1
+"""Most constraints that are named where nothing is feasible; part of the largest violation from which on others are, too."""
+
 
 def trajectory_points(
     nlp: NLP,
@@ -99,9 +102,12 @@ def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Ma
 
 
 def nearest_violation(nearest: Point) -> str:
-    """Text with the constraint that the least infeasible point violates most, and its violation."""
-    label, amount = max(nearest.violations.items(), key=lambda item: item[1])
-    return f"the nearest violates {label} by {amount:.2g} of its scale" if np.isfinite(amount) else f"all failed: {label} is not a number"
+    """Text with the constraints that the least infeasible point violates most, and its violations."""
+    (label, amount), *others = sorted(nearest.violations.items(), key=lambda item: -item[1])[:NAMED]
+    if not np.isfinite(amount):
+        return f"all failed: {label} is not a number"
+    also = "".join(f", and {name} by {size:.2g}" for name, size in others if size > SIDE * amount)
+    return f"the nearest violates {label} by {amount:.2g} of its scale{also}"
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
@@ -163,4 +169,5 @@ def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
-    return f"no feasible point in {counted(stats['evaluations'], 'evaluation')}"
+    ended = ": near none of them there is one, as far as solves for feasibility tell" if stats.get("stopped") == "settled" else ""
+    return f"no feasible point in {counted(stats['evaluations'], 'evaluation')}{ended}"

@@ -43,6 +43,8 @@ from .trials import Trials
 
 log = logging.getLogger(__name__)
 
+HOPELESS = 30
+"""Candidates without a feasible point nearby after which a search that has none at all ends."""
 ITERATIONS = 50
 """Of a gradient solve, about: they are measured once it was made."""
 
@@ -140,6 +142,11 @@ class MACS(Settings, Solver):
                 remember(state, found, self, evaluator)
         assign(state, self, guide)
         state.iteration += 1
+
+    def has_settled(self, state: SearchState) -> bool:
+        """See `SearchMethod.has_settled`: where solves for feasibility from many places end at violations that can get no smaller, more of
+        them would take long and find nothing."""
+        return not len(state.archive) and state.hopeless >= HOPELESS
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
         """Polish the archive by gradients, if the problem has them. If asked to end early, the polish continues at the next call."""

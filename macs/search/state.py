@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..evaluation.evaluator import Evaluation, Evaluator
+from ..evaluation.evaluator import INFEASIBLE, Evaluation, Evaluator
 from ..gradients.counted import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
@@ -104,6 +104,8 @@ class SearchState:
         Objectives of the optima that the search began with.
     rng : numpy.random.Generator
         The generator of all random numbers; a checkpoint keeps its `bit_generator.state`.
+    hopeless : int
+        As long as no point was feasible: number of candidates that the inner level left where the violation can get no smaller nearby.
     polishing : PolishLog, optional
         Solves of a polish that has begun and is not finished.
     """
@@ -122,6 +124,7 @@ class SearchState:
     optima: np.ndarray
     rng: np.random.Generator
     refinements: int = 0
+    hopeless: int = 0
     polishing: PolishLog | None = None
 
     def __repr__(self) -> str:
@@ -146,6 +149,7 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
         state.closest = state.closest.take(np.arange(0))
         return
     state.closest = archives.least_violated(state.closest, Z, F, violation)
+    state.hopeless += sum(np.count_nonzero(e.status == INFEASIBLE) for e in seen if e.fallbacks)
 
 
 def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: Settings) -> Agents:

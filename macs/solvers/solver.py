@@ -69,7 +69,7 @@ class Solver(SearchMethod):
             Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.search_mesh`.
         evaluations : int, optional
             Largest number of candidates that are sent to the inner level, or of rows that a vector problem evaluates. Default: the
-            problem's own number.
+            problem's own number. MACS ends before where no candidate is feasible and projections find nothing feasible near them.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver, optional
