@@ -210,6 +210,7 @@ def test_pictures_show_commands_and_limits(tmp_path):
         smv.plot([Flight(None)])
 
 
+@pytest.mark.slow
 def test_a_solve_from_the_nominal_flight_is_confirmed():
     """The greatest terminal speed is its bound; flown by code of its own, the flight ends at 79.248 km within 20 m and keeps its limits."""
     from macs import optimize

@@ -242,6 +242,7 @@ def test_verdicts(change, verdict):
     assert standard.compared("moon_landing", standard.published("moon_landing")[0], found).who == verdict
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0

@@ -10,7 +10,7 @@ import pytest
 from cases import candidates, oscillator
 from euler import Euler, EulerPhase
 
-from macs import MACS, payoff, sweep
+from macs import MACS, Front, payoff, sweep
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, Collocation, from_dict, parse, word
@@ -68,9 +68,9 @@ def test_gradient_tools_searches_and_mesh_refinement_work_on_it():
     assert len(searched) == 10 and searched.violation.max() < 1e-6
     coarse = sweep(problem, METHOD, points=3)
     assert (coarse.status == "converged").all() and coarse[1].simulate().max_defect > 1e-2
-    refined = coarse.refine_mesh(tolerance=1e-2, limit=8)
-    assert refined[1].simulate().max_defect < 1e-2
-    assert len(refined[1].trajectory["ascent"].time) > len(coarse[1].trajectory["ascent"].time)
+    refined = Front.of(coarse[1].alone()).refine_mesh(tolerance=1e-2, limit=8)
+    assert refined[0].simulate().max_defect < 1e-2
+    assert len(refined[0].trajectory["ascent"].time) > len(coarse[1].trajectory["ascent"].time)
 
 
 def jump() -> Problem:

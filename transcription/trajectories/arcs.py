@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -93,18 +94,22 @@ class Arcs:
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
         able = np.flatnonzero(np.isfinite(y).all(axis=1))
         if len(able):
-            rates = self.take(able)._rates()(-1.0, y[able].ravel()).reshape(len(able), -1)
+            rates = self._some(able)._rates(-1.0, y[able].ravel()).reshape(len(able), -1)
             able = able[np.isfinite(rates).all(axis=1)]
         groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
         while groups:
             group = groups.pop()
-            values = self.take(group)._integrated(y[group], rtol, atol, method) if len(group) else None
+            values = self._some(group)._integrated(y[group], rtol, atol, method) if len(group) else None
             if values is not None:
                 found[group] = values
             elif len(group) > 1:
                 # One that breaks down takes the others with it: look for it.
                 groups += np.array_split(group, 2)
         return found
+
+    def _some(self, rows: np.ndarray) -> Arcs:
+        """The arcs of `rows`, in their order: itself, with its rates, if these are all."""
+        return self if len(rows) == len(self.begins) else self.take(rows)
 
     def _integrated(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
         """All together; None if the integration breaks down."""
@@ -113,12 +118,13 @@ class Arcs:
         share = np.sqrt(n)
         options = {"rtol": max(rtol / share, 3e-14), "atol": np.tile(atol / share, n), "t_eval": DENSE}
         try:
-            solution = solve_ivp(self._rates(), (-1.0, 1.0), y.ravel(), method=method, **options)
+            solution = solve_ivp(self._rates, (-1.0, 1.0), y.ravel(), method=method, **options)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):
             # The implicit methods raise where rates are no numbers; so do ours after too many evaluations.
             return None
         return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
 
+    @cached_property
     def _rates(self) -> Callable[[float, np.ndarray], np.ndarray]:
         """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a trajectory."""
         n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
@@ -126,8 +132,8 @@ class Arcs:
         laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
         # As sums of powers they cost a tenth of the time; the digits that this loses are few.
         law = monomials(self.basis, degree) @ laws if degree <= MODERATE else None
-        exponents = np.arange(degree + 1)
-        half = 0.5 * self.lengths[:, None]
+        exponents, line = np.arange(degree + 1), np.ones(2)
+        half, half_of_each = 0.5 * self.lengths[:, None], 0.5 * self.lengths
         x, u, time = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n)
         out = np.zeros((n, function.size1_out(0)))
         arguments = x, u, time, np.array(self.s, dtype=float)
@@ -135,7 +141,9 @@ class Arcs:
         for i, argument in enumerate(arguments):
             buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
         buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
-        periodic, calls = any(v.period for v in self.phase.controls), 0
+        controls, basis, begins = self.phase.controls, self.basis, self.begins
+        periodic, calls = any(v.period for v in controls), 0
+        flat_x, flat_u = x.ravel(), u.ravel()
 
         def rates(tau: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
             # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
@@ -145,11 +153,22 @@ class Arcs:
                 raise ArithmeticError("too many evaluations of the dynamics")
             if not calls % EVERY:
                 check_stopping(GRACE)
-            x[:] = y.reshape(n, -1)[:, :nx]
-            time[:] = self.begins + (tau + 1.0) * half[:, 0]
-            values = tau**exponents @ law if law is not None else basis_matrix(self.basis, degree, np.array([tau])) @ laws
-            values = values.reshape(n, nu)
-            u[:] = wrapped(values, self.phase.controls) if periodic else values
+            # Written into place: an operation of numpy on a few numbers takes longer than the dynamics.
+            if n == 1:
+                flat_x[:] = y[:nx]
+            else:
+                x[:] = y.reshape(n, -1)[:, :nx]
+            np.multiply(half_of_each, tau + 1.0, out=time)
+            np.add(begins, time, out=time)
+            if law is None:
+                u[:] = (basis_matrix(basis, degree, np.array([tau])) @ laws).reshape(n, nu)
+            elif degree == 1:
+                line[1] = tau
+                np.matmul(line, law, out=flat_u)
+            else:
+                np.matmul(tau**exponents, law, out=flat_u)
+            if periodic:
+                u[:] = wrapped(u, controls)
             trigger()
             return (half * out).ravel()
 
