@@ -149,7 +149,7 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
         state.closest = state.closest.take(np.arange(0))
         return
     state.closest = archives.least_violated(state.closest, Z, F, violation)
-    state.hopeless += sum(np.count_nonzero(e.status == INFEASIBLE) for e in seen if e.fallbacks)
+    state.hopeless += sum(e.status.tolist().count(INFEASIBLE) for e in seen if e.fallbacks)
 
 
 def agents_at(seen: Evaluation, rows: np.ndarray, d: int, settings: Settings) -> Agents:

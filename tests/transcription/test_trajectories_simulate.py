@@ -10,6 +10,7 @@ from cases import candidates, decay, integrator, oscillator, propagated, solved
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
 from transcription.inner import inner_solver
+from transcription.trajectories import arcs
 from transcription.trajectories.limits import excursions
 from transcription.trajectories.simulate import simulate, simulate_all
 
@@ -39,6 +40,19 @@ def test_a_flight_without_controls_has_its_closed_form(method):
     assert check.objectives == pytest.approx(exact, rel=1e-5)
     assert check.trajectory["fall"].at(0.7)["x"] == pytest.approx(np.exp(-0.7), rel=1e-5)
     assert check.max_defect < 1e-6 and check.violation < 1e-9
+
+
+def test_evaluations_of_one_integration_are_limited_not_those_of_several(monkeypatch):
+    problem, _phase = decay(tf=1.5)
+    nlp = DFET(2, 3).transcribe(problem)
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
+    along = arcs.Arcs.of(nlp.problem.phases[0], [(flight, 0, np.zeros(0))])
+    y = flight.edge_states[:1]
+    found = along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853")
+    monkeypatch.setattr(arcs, "MOST_CALLS", 200)
+    assert all(np.array_equal(along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853"), found) for _ in range(10))
+    monkeypatch.setattr(arcs, "MOST_CALLS", 10)
+    assert np.isnan(along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853")).all()
 
 
 def test_an_exact_trajectory_has_no_defect():

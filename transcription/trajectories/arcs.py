@@ -92,6 +92,7 @@ class Arcs:
         """
         check_stopping(GRACE)
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
+        self._calls[0] = 0
         able = np.flatnonzero(np.isfinite(y).all(axis=1))
         if len(able):
             rates = self._some(able)._rates(-1.0, y[able].ravel()).reshape(len(able), -1)
@@ -125,6 +126,11 @@ class Arcs:
         return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
 
     @cached_property
+    def _calls(self) -> list[int]:
+        """Number of evaluations of the rates since the last integration began."""
+        return [0]
+
+    @cached_property
     def _rates(self) -> Callable[[float, np.ndarray], np.ndarray]:
         """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a trajectory."""
         n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
@@ -142,16 +148,15 @@ class Arcs:
             buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
         buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
         controls, basis, begins = self.phase.controls, self.basis, self.begins
-        periodic, calls = any(v.period for v in controls), 0
+        periodic, calls = any(v.period for v in controls), self._calls
         flat_x, flat_u = x.ravel(), u.ravel()
 
         def rates(tau: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
             # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
-            nonlocal calls
-            calls += 1
-            if calls > MOST_CALLS:
+            calls[0] += 1
+            if calls[0] > MOST_CALLS:
                 raise ArithmeticError("too many evaluations of the dynamics")
-            if not calls % EVERY:
+            if not calls[0] % EVERY:
                 check_stopping(GRACE)
             # Written into place: an operation of numpy on a few numbers takes longer than the dynamics.
             if n == 1:
