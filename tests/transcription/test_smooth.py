@@ -113,7 +113,7 @@ def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
 
     batches, mesh = [], DFET(10, 2)
     inside = Bilevel._evaluate
-    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (batches.append(Z.copy()), inside(self, Z))[1])
+    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z, way=None: (batches.append(Z.copy()), inside(self, Z, way))[1])
     nlp = mesh.transcribe(climb(**GUESS))
 
     def roughness(start) -> float:
@@ -134,7 +134,7 @@ def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
 
     nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
     inside = Bilevel._evaluate
-    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z: (first.append(Z.copy()), inside(self, Z))[1])
+    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z, way=None: (first.append(Z.copy()), inside(self, Z, way))[1])
     solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="propagate")
     throttle = nlp.profiles[0].columns
     assert not np.isclose(np.vstack(first)[:, nlp.free][:, throttle], nlp.guess[throttle]).all(axis=1).any()

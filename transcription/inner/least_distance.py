@@ -17,7 +17,13 @@ Box = tuple[np.ndarray, np.ndarray]
 
 
 def least_distance(
-    center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray, box: Box, multipliers: np.ndarray, exact: np.ndarray
+    center: np.ndarray,
+    A: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    box: Box,
+    multipliers: np.ndarray,
+    exact: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise |x - center|^2 subject to lower <= A x <= upper and box[0] <= x <= box[1].
 
@@ -36,9 +42,9 @@ def least_distance(
     box : pair of arrays (k, d)
     multipliers : array (k, r)
         Where to begin: those of a problem nearby, or zeros.
-    exact : array (k,) of int
-        Of how many steps more non-negative least squares may decide where Newton's method does not end, one of which is counted here;
-        otherwise the point is where it got to.
+    exact : array (k,) of int, optional
+        How often non-negative least squares may still decide where Newton's method does not end, less once where they did; otherwise the
+        point is where it got to. Default: always.
 
     Returns
     -------
@@ -54,6 +60,7 @@ def least_distance(
         # Derivatives overflow where states are about to. Without them a step leads back to the center.
         x[~finite], met[~finite], multipliers[~finite] = np.clip(center, *box)[~finite], False, 0.0
     multipliers[~met] = 0.0
+    exact = np.ones(len(x), dtype=int) if exact is None else exact
     for i in np.flatnonzero(~met & finite & (exact > 0)):
         exact[i] -= 1
         nearest = _exact(center[i], A[i], lower[i], upper[i], (box[0][i], box[1][i]))

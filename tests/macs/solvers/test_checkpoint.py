@@ -512,7 +512,10 @@ class Mine:
 def test_pickles_are_never_opened(file) -> None:
     np.savez(file.with_suffix(".npz"), document=np.array([Mine()], dtype=object))
     archive = file.with_suffix(".npz").read_bytes()
-    file.write_bytes(f"MACS checkpoint 3: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode() + archive)
+    file.write_bytes(
+        f"MACS checkpoint {checkpoint_file.VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode()
+        + archive
+    )
     with pytest.raises(ValueError, match="is no valid checkpoint: document is no array"):
         minimize(checkpoint=file)
 
