@@ -67,7 +67,7 @@ def mended(
         if joined is job.points and joined.verified.all():
             return joined[best_rows(joined)].sorted()
         # The ranges of the objectives may be others now.
-        kept = job.marked(joined[best_rows(joined)])
+        kept = job.marked(joined[best_rows(joined, verify * objective_scales(joined))])
         if joined is not job.points:
             kept = job.marked(job.filled(kept, len(points), guide))
         return job.paid(job.explained(kept.sorted()), interrupts.elapsed, interrupts.reason)

@@ -157,8 +157,7 @@ class GoalAttainment:
             for cell, runs in self.histories.items()
         }
         what = f"goal attainment of {self.objective.name}"
-        # Runs that find something feasible late leave no corner free.
-        figure = convergence_figure(named, xlabel="evaluations", ylabel=what, larger=True, log=False, inside=False)
+        figure = convergence_figure(named, xlabel="evaluations", ylabel=what, larger=True, log=False)
         return {f"{self.problem}-goal-attainment": figure}
 
 

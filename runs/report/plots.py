@@ -138,7 +138,6 @@ def convergence_figure(
     ylabel: str,
     larger: bool = False,
     log: bool = True,
-    inside: bool = True,
 ) -> Figure:
     """An indicator over the cost of a run: the median of each solver's runs as a line, their quartiles as a band.
 
@@ -154,8 +153,6 @@ def convergence_figure(
         Whether larger values are better.
     log : bool
         Whether the indicator's axis is logarithmic, if a value is positive; those that are not are then not drawn.
-    inside : bool
-        Whether the legend of a few solvers is within the axes, in the corner that an indicator leaves free as it converges.
     """
     with style():
         figure = new_figure(COLUMN, 2.5)
@@ -185,8 +182,8 @@ def convergence_figure(
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
         ax.set(xlim=(0, last), xlabel=xlabel, ylabel=ylabel)
-        corner = "lower right" if larger else "upper right"
-        legend(figure, ax, corner if inside else None, "median, quartiles")
+        # Where an indicator that converges usually leaves room.
+        legend(figure, ax, "lower right" if larger else "upper right", "median, quartiles")
     return figure
 
 

@@ -9,13 +9,27 @@ from macs.baselines.population import PopulationSolver
 
 from ..data.schema import check_known, checked, errors_begin_with
 from .comparison import Comparison
-from .published_kinds import KINDS, STATISTIC, Published, figures_of
+from .published_designs import Designs
+from .published_kinds import (
+    STATISTIC,
+    Degrees,
+    Ends,
+    Feasibility,
+    Hypervolume,
+    Indicators,
+    Objectives,
+    PayoffTable,
+    Published,
+    figures_of,
+)
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
     from macs.solvers.solver import Solver
     from problems.compiled import CompiledProblem
     from problems.vector import CompiledVectorProblem
+
+KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable | Degrees | Designs
 
 
 def papers(given: Any) -> list[Published]:
@@ -72,7 +86,7 @@ def _section(number: int, paper: Any) -> str:
 def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None:
     """One published table and ours; None if there are no runs of its problems."""
     columns = paper.columns
-    keys = list(columns or dict.fromkeys(key for row in paper.rows for key in figures_of(row)))
+    keys = [*(columns or dict.fromkeys(key for row in paper.rows for key in figures_of(row))), *paper.further]
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for problem in dict.fromkeys(row["problem"] for row in paper.rows):
@@ -81,7 +95,7 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
         if not here:
             continue
         seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
-        rows += [[problem, row["by"], None, *_cells(paper.theirs(row), keys, None)] for row in theirs]
+        rows += [[problem, row["by"], None, *_cells(paper.theirs(row), keys, None, paper.statistics)] for row in theirs]
         seen = set[tuple[str, str]]()
         for comparison in here:
             for solver, figures in paper.ours(comparison).items():
@@ -89,7 +103,8 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
                     continue  # it works apart, and is on each of the others' comparisons
                 seen.add((solver, comparison.place(solver)))
                 runs = len(comparison.fronts[solver]) + comparison.failures.get(solver, 0)
-                rows += [[problem, f"{solver}, {comparison.place(solver)}", runs, *_cells(one, keys, seconds)] for one in figures]
+                by = f"{solver}, {comparison.place(solver)}"
+                rows += [[problem, by, runs, *_cells(one, keys, seconds, paper.statistics)] for one in figures]
         remarks = {comparison.transcription: paper.remark(comparison) for comparison in here}
         if len(set(remarks.values())) == 1:
             notes.append(f"{problem}: {remarks[here[0].transcription]}")
@@ -101,16 +116,17 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
     heads += [Column(name, grouped=paper.statistics) for name in ("by", "runs")]
     heads += [paper.statistic_head] if paper.statistics else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
-    heads += [columns[key] if columns else Column(key, units.get(key, ""), digits=4) for key in keys]
+    known = {**(columns or {}), **paper.further}
+    heads += [known.get(key) or Column(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper.source}" if paper.source else "Beside published figures"
     words = [f"{word}: {text}." for word, text in (("The paper", paper.note), ("What differs", paper.differs)) if text]
     return table(heads, rows, f"{caption}.", [*notes, *words])
 
 
-def _cells(figures: Mapping[str, Any], keys: Sequence[str], theirs: float | None) -> list[Cell]:
-    """A row's figures; `theirs` are the seconds that the paper's took."""
-    cells: list[Cell] = [figures[STATISTIC]] if STATISTIC in figures else []
+def _cells(figures: Mapping[str, Any], keys: Sequence[str], theirs: float | None, statistics: bool) -> list[Cell]:
+    """A row's figures, after its statistic in tables that have `statistics`; `theirs` are the seconds that the paper's took."""
+    cells: list[Cell] = [figures.get(STATISTIC)] if statistics else []
     cells += [figures.get(key) for key in keys]
     if "seconds" in keys:
         cells.append(theirs / figures["seconds"] if theirs and figures.get("seconds") else None)

@@ -66,6 +66,8 @@ class Published(Section, tag_field="of", kw_only=True):
         Whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`.
     population : bool
         Whether ours are of solvers with a population alone.
+    further : {key of a figure: head of its column}
+        Columns after those of the paper, of our figures alone.
     """
 
     rows: Annotated[list[dict[str, Any]], Meta(min_length=1, description="a list of tables")]
@@ -76,6 +78,7 @@ class Published(Section, tag_field="of", kw_only=True):
     statistics: ClassVar[bool] = False
     statistic_head: ClassVar[str] = STATISTIC
     population: ClassVar[bool] = False
+    further: ClassVar[Mapping[str, Column]] = {}
 
     def theirs(self, row: Mapping[str, Any]) -> Figures:
         """The figures of a row of the paper."""
@@ -415,9 +418,6 @@ class Degrees(Published, tag="degrees", kw_only=True):
             with errors_begin_with("by"):
                 from_dict(self.by)
         super().__post_init__()
-
-
-KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable | Degrees
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:

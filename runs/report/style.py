@@ -32,12 +32,14 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
-    """The legend of the axes: inside them at `place` if it has few entries, else above them."""
+    """The legend of the axes: inside them at `place` if it has few entries and no line is behind it, else above them."""
     handles, names = ax.get_legend_handles_labels()
     look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
-    if place and len(names) <= 4:
-        ax.legend(handles, names, loc=place, **look)
-    else:
+    within = ax.legend(handles, names, loc=place, **look) if place and len(names) <= 4 else None
+    if within is not None and _covers(figure, ax, within):
+        within.remove()
+        within = None
+    if within is None:
         for columns in range(min(len(names), 6), 0, -1):
             above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
             if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
@@ -45,3 +47,15 @@ def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
             above.remove()
         rows = -(-len(names) // columns) + bool(title)
         figure.set_figheight(figure.get_figheight() + 0.16 * rows)
+
+
+def _covers(figure: Any, ax: Any, within: Any) -> bool:
+    """Whether lines or markers of the axes are behind their legend."""
+    figure.draw_without_rendering()
+    box = within.get_window_extent()
+    for line in ax.get_lines():
+        path = line.get_path().transformed(line.get_transform())
+        joined = line.get_linestyle() != "None"
+        if path.intersects_bbox(box, filled=False) if joined else box.count_contains(path.vertices):
+            return True
+    return False

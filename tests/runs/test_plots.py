@@ -142,6 +142,15 @@ def test_medians_over_what_was_spent(log, tmp_path):
     figure.savefig(tmp_path / "convergence.png")
 
 
+@pytest.mark.parametrize(("values", "inside"), [([0.2, 0.9, 0.95, 1.0], True), ([0.2, 0.25, 0.27, 1.0], False)])
+def test_no_legend_on_a_line(values, inside):
+    """The second curve jumps at its end, as after a polish, and is low where the legend would be."""
+    run = (np.array([100.0, 400.0, 900.0, 1000.0]), np.array(values))
+    figure = convergence_figure({"ours": [run]}, xlabel="evaluations", ylabel="hypervolume", larger=True, log=False)
+    (ax,) = figure.axes
+    assert (ax.get_legend() is not None) == inside and len(figure.legends) == (not inside)
+
+
 def test_flights_side_by_side_and_the_law(tmp_path):
     front = flights(5)
     chosen = representatives(front, 3)

@@ -133,6 +133,26 @@ def test_solvers_without_a_point_are_named_where_they_have_no_statistics(folder)
     assert "divisor n - 1. No run of lost, worse has a point that counts." in text
 
 
+def test_the_point_that_dominates_a_design_and_by_how_much(folder, tmp_path):
+    (comparison,) = comparisons(Store.open(folder), {})
+    file = tmp_path / "theirs.csv"
+    file.write_text("time [s],distance [km]\n1,3\n2,6\n4,12\n")
+    fronts = {"theirs": [comparison.reference(str(file)).front], "lost": [comparison.known[:0]]}
+    rows = [
+        {"problem": "glide", "by": "slow", "time": 2.5, "distance": 5.0},
+        {"problem": "glide", "by": "far", "time": 4.0, "distance": 16.0},
+        {"problem": "dive", "by": "another", "time": 1.0, "distance": 1.0},
+    ]
+    (found,) = published_tables([replace(comparison, fronts=fronts, failures={})], papers([{"of": "designs", "rows": rows}])).values()
+    assert [column.title for column in found.columns] == ["problem", "by", "runs", "beside", "time", "distance", "better by"]
+    cells = {(row[1], row[3]): row for row in found.rows}
+    assert cells["slow", None][-3:] == (2.5, 5.0, None)
+    # 2 s are a fifth less than 2.5 s, and 6 km a fifth more than 5 km; 12 km are a quarter less than 16 km, at the same time.
+    ours = [cells["theirs, dfet:2x2", name][-3:] for name in ("slow", "far")]
+    np.testing.assert_allclose(np.array(ours, dtype=float), [[2.0, 6.0, 20.0], [4.0, 12.0, -25.0]], rtol=1e-12)
+    assert "dominated are 1 of 2 designs by theirs" in found.text()
+
+
 def staircase(points: np.ndarray) -> float:
     """The area that times and distances (n, 2) dominate, up to 10 s and 0 km."""
     times, distances = points[np.argsort(points[:, 0])].T
@@ -200,6 +220,8 @@ def test_nothing_to_report_on(tmp_path, capsys):
         ([{"of": "indicators", "rows": [{**ROW, "gd_mean": 3, "statistic": "mean"}]}], "statistic: this kind of table has none"),
         ([{"of": "objectives", "rows": [{**ROW, "distance": 3}]}], "statistic must be one of greatest"),
         ([{"of": "objectives", "rows": [{**ROW, "distance": 3, "statistic": []}]}], "statistic must be one of greatest"),
+        ([{"of": "designs", "rows": [{**ROW, "distance": 3, "statistic": "mean"}]}], "statistic: this kind of table has none"),
+        ([{"of": "designs", "rows": [{**ROW, "distance": 3, "time": 0}]}], "row 1: time must not be 0: gains are shares of it"),
     ],
 )
 def test_a_paper_section_that_makes_no_sense_is_refused_at_once(paper, message):
@@ -231,6 +253,8 @@ MEAN = {**ROW, "statistic": "mean"}
             {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 1}], "rows": [MEAN | {"miss": 1}]},
             "'miss': unknown state 'y'; there are x",
         ),
+        ({"of": "designs", "rows": [{**ROW, "time": 3}]}, "problem 'glide': the design 'the paper' has no distance"),
+        ({"of": "designs", "rows": [{**ROW, "time": 3, "distance": 3, "better by": 3}]}, "row 1: unknown objective 'better by'"),
         ({"of": "feasibility", "rows": [{**ROW, "points": 3}]}, "none of the study's has one: one, other, broken"),
     ],
 )

@@ -105,7 +105,15 @@ def problem(
 
 
 def flight(
-    problem: Problem, lift: Any, drag: Any, nose: Any, *, most: float, declination: float, bank_rate: float
+    problem: Problem,
+    lift: Any,
+    drag: Any,
+    nose: Any,
+    *,
+    most: float,
+    declination: float,
+    bank_rate: float,
+    steepest: float = STEEPEST,
 ) -> tuple[dict[str, ca.MX], ca.MX]:
     """Add the phase from the hyperbola to the polar orbit to a problem: its states at the end by name, and the heat load, kJ/cm2.
 
@@ -120,13 +128,15 @@ def flight(
         Greatest heat load, kJ/cm2.
     declination, bank_rate : float
         As in `problem`, deg and deg/s.
+    steepest : float
+        Greatest path angle at the exit, rad.
     """
     checks.positive(bank_rate, f"{problem.name}: the bank rate")
     direction = checks.number(declination, f"{problem.name}: the declination")
     checks.within((direction, direction), DECLINATIONS, f"{problem.name}: the declination")
     phase = problem.phase(PHASE, t0=0.0, tf=DURATION)
     initial = {"altitude": MARS.interface, "speed": ENTRY_SPEED, "flight-path angle": (-0.4, -0.05)}
-    final = {"altitude": MARS.interface, "flight-path angle": (0.0, STEEPEST), "heading": pi}
+    final = {"altitude": MARS.interface, "flight-path angle": (0.0, steepest), "heading": pi}
     states = {
         name: phase.state(name, bounds=BOUNDS[name], initial=initial.get(name), final=final.get(name), unit=UNITS.get(name, "rad"))
         for name in STATES

@@ -90,6 +90,21 @@ def circularisation(speed: Any, mars: Mars = MARS) -> Any:
     return (mars.mu / mars.target_radius) ** 0.5 - energy**0.5
 
 
+def exit_speed(delta_v: float, mars: Mars = MARS) -> float:
+    """Speed at the interface, m/s, after which the burn at the target orbit takes a delta v, m/s: `circularisation` solved for it.
+
+    Raises
+    ------
+    ValueError
+        No exit to the target orbit has this delta v.
+    """
+    vertical, level = exit_speeds(mars)
+    least, most = float(circularisation(level, mars)), float(np.sqrt(mars.mu / mars.target_radius))
+    if not least <= delta_v <= most:
+        raise ValueError(f"no exit to the target orbit has a delta v of {delta_v:g} m/s; {least:.1f} to {most:.1f} m/s are possible")
+    return float(np.hypot(most - delta_v, vertical))
+
+
 def capture_by_burn(arrival_speed: float = ARRIVAL_SPEED, mars: Mars = MARS) -> float:
     """Delta v, m/s, of a burn at the periapsis of the hyperbola, on the target orbit, that ends on it: what aerocapture spares.
 

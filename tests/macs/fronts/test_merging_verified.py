@@ -65,6 +65,14 @@ def test_what_is_not_verified_displaces_nothing_and_is_displaced():
     assert Front.merge([front(claims, actual, [False] * 5)]).decision.ravel().tolist() == [0.0]
 
 
+def test_what_is_not_verified_and_better_by_no_more_than_points_may_miss_is_left_out():
+    """Of three such points, the second is better than the verified one by more."""
+    claims = [[1.9, 2.0], [1.7, 3.0], [1.95, 5.0], [2.0, 2.5]]
+    found = front(claims, claims, [False, False, False, True])[[0, 1, 3]], front(claims, claims, [False, False, False, True])[[2, 3]]
+    assert [best_rows(one).tolist() for one in found] == [[0, 1, 2], [0, 1]]
+    assert [best_rows(one, np.array([0.2, 0.6])).tolist() for one in found] == [[1, 2], [1]]
+
+
 def test_two_fronts_of_different_tolerances_are_judged_by_the_looser():
     one, two = ([[0.0, 1.0]], [[0.0, 1.0]]), ([[1.0, 0.0]], [[1.0, 0.0]])
     loose = front(*two, [True], stats={"verify": 1e-2})

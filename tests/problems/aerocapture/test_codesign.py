@@ -206,11 +206,24 @@ def test_slender_shapes_are_mirror_images():
         ({"corridor": 1}, "True or False"),
         ({"bank_rate": 0.0}, "bank rate"),
         ({"declination": 20.0}, "declin"),
+        ({"delta_v": 20.0}, "24.5 to"),
+        ({"delta_v": 101.0}, "at most 0.05 rad"),
+        ({"delta_v": "small"}, "must be a number"),
     ],
 )
 def test_data_that_make_no_sense(data, words):
     with pytest.raises(ValueError, match=f"aerocapture_codesign.*{words}"):
         load("aerocapture_codesign", **data)
+
+
+def test_the_steepest_exit_for_a_limit_of_the_burn():
+    """From conservation of energy and angular momentum up to the apoapsis."""
+    (phase,) = load("aerocapture_codesign", delta_v=45.0).compile().phases
+    angle = phase.final[[state.name for state in phase.states].index("flight-path angle")][1]
+    # v^2 / 2 - mu / r = w^2 / 2 - mu / r_a and v r cos(angle) = w r_a, where w is the speed that the burn raises to the circular one.
+    w = CIRCULAR - 45.0
+    v = np.sqrt(w**2 + 2 * MU * (1 / TOP - 1 / TARGET))
+    assert v * TOP * np.cos(angle) == pytest.approx(w * TARGET, rel=1e-9)
 
 
 def test_the_corridor_is_a_fourth_objective():

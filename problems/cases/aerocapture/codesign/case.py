@@ -17,14 +17,15 @@ from math import radians
 
 import numpy as np
 
+from .... import checks
 from ....problem import Problem
 from ..aerodynamics import ballistic_coefficient, lift_and_drag
-from ..bank import BANK_RATE, DECLINATION, TRANSCRIPTION, flight, guess
+from ..bank import BANK_RATE, DECLINATION, STEEPEST, TRANSCRIPTION, flight, guess
 from ..coupled import PACKING, SHIELD, VARIABLES
 from ..designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged
 from ..figures import plot, track
 from ..heating import shield_fraction
-from ..mars import circularisation
+from ..mars import circularisation, exit_angle, exit_speed
 from ..printed import TABLE_2
 from ..shape import VOLUME, sized
 from .corridor import BALLISTIC, width
@@ -40,7 +41,14 @@ STATED = 2
 """Solution of Table 2 whose passage is the guess of the flight where no shape is."""
 
 
-def problem(*, corridor: bool = False, shape: int | None = None, declination: float = DECLINATION, bank_rate: float = BANK_RATE) -> Problem:
+def problem(
+    *,
+    corridor: bool = False,
+    shape: int | None = None,
+    delta_v: float | None = None,
+    declination: float = DECLINATION,
+    bank_rate: float = BANK_RATE,
+) -> Problem:
     """The case.
 
     Parameters
@@ -50,6 +58,9 @@ def problem(*, corridor: bool = False, shape: int | None = None, declination: fl
     shape : int, optional
         Number of the solution of Table 2, or the mirror image of it, from which to start. Without one the flight begins with the passage of
         the second, and the shape has no guess: searches draw it from the whole range.
+    delta_v : float, optional
+        Largest delta v, m/s, up to that of the steepest exit, 100 m/s, which is the default: with a lower one, fronts are denser where the
+        burn is small.
     declination, bank_rate : float
         As in `bank.problem`.
     """
@@ -57,6 +68,7 @@ def problem(*, corridor: bool = False, shape: int | None = None, declination: fl
         raise ValueError(f"aerocapture_codesign: there is no solution {shape!r} of Table 2; there are {', '.join(map(str, TABLE_2))}")
     if not isinstance(corridor, bool):
         raise ValueError(f"aerocapture_codesign: corridor is True or False, not {corridor!r}")
+    steepest = STEEPEST if delta_v is None else _steepest(delta_v)
     problem = Problem("aerocapture_codesign")
     ratios = [problem.parameter(name, bounds=bounds, unit=unit) for (name, unit), bounds in zip(VARIABLES, BOUNDS, strict=True)]
     front, rear, attack = (radians(1.0) * angle for angle in ratios[2:])
@@ -67,9 +79,8 @@ def problem(*, corridor: bool = False, shape: int | None = None, declination: fl
     problem.constraint("whole length", size - capsule.length, lower=0.0)
     problem.constraint("lift over drag", lift / drag, lower=LIFT_TO_DRAG)
     problem.constraint("length", capsule.length, lower=LENGTH)
-    ends, load = flight(
-        problem, lift * capsule.area, drag * capsule.area, capsule.nose, most=LOAD, declination=declination, bank_rate=bank_rate
-    )
+    limits = {"most": LOAD, "declination": declination, "bank_rate": bank_rate, "steepest": steepest}
+    ends, load = flight(problem, lift * capsule.area, drag * capsule.area, capsule.nose, **limits)
     problem.minimize(PACKING, size / VOLUME, unit="1/m2")
     problem.minimize(SHIELD, shield_fraction(1e3 * load), unit="%")
     problem.minimize(DELTA_V, circularisation(ends["speed"]), unit="m/s")
@@ -87,3 +98,15 @@ def problem(*, corridor: bool = False, shape: int | None = None, declination: fl
     problem.default_transcription = TRANSCRIPTION
     problem.default_evaluations, problem.default_inner, problem.default_start = 1_000, "propagate", "smooth"
     return problem
+
+
+def _steepest(delta_v: float) -> float:
+    """The path angle at the exit, rad, after which the burn takes a delta v, m/s."""
+    what = "aerocapture_codesign: delta_v"
+    try:
+        angle = exit_angle(exit_speed(checks.number(delta_v, "the limit")))
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from error
+    if angle > STEEPEST:
+        raise ValueError(f"{what}: after an exit of at most {STEEPEST:g} rad no burn takes {delta_v:g} m/s")
+    return angle
