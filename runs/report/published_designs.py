@@ -12,6 +12,7 @@ from .published_kinds import STATISTIC, Figures, Published, figures_of
 from .tables import Column
 
 if TYPE_CHECKING:
+    from macs.fronts.points import Points
     from problems.compiled import CompiledProblem
     from problems.vector import CompiledVectorProblem
 
@@ -20,8 +21,8 @@ GAIN = "better by"
 
 
 class Designs(Published, tag="designs"):
-    """Designs with a figure for every objective; for each, of all runs, the point of the greatest least gain in all objectives, each a
-    share of the design's figure. Where that is not positive, no point dominates the design."""
+    """Designs with a figure for every objective; for each, of all runs, the verified point of the greatest least gain in all objectives,
+    each a share of the design's figure. Where that is not positive, no point dominates the design."""
 
     statistics: ClassVar[bool] = True
     statistic_head: ClassVar[str] = "beside"
@@ -29,9 +30,9 @@ class Designs(Published, tag="designs"):
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         return {
-            solver: [{STATISTIC: row["by"], **_nearest(row, comparison, np.vstack([front.objectives for front in found]))} for row in rows]
+            solver: [{STATISTIC: row["by"], **_nearest(row, comparison, np.vstack(found))} for row in rows]
             for solver, fronts in comparison.fronts.items()
-            if (found := [front for front in fronts if len(front)]) and (rows := self._rows(comparison))
+            if sum(map(len, found := [_flyable(front) for front in fronts])) and (rows := self._rows(comparison))
         }
 
     def remark(self, comparison: Comparison) -> str:
@@ -63,6 +64,11 @@ class Designs(Published, tag="designs"):
         for key in figures_of(row):
             if row[key] == 0:
                 raise ValueError(f"{key} must not be 0: gains are shares of it")
+
+
+def _flyable(front: Points) -> np.ndarray:
+    """Objectives (k, m) of the points of a front that a simulation confirms; of all, where they were not simulated."""
+    return front.objectives[front.verified | ~front.was_simulated]
 
 
 def _nearest(design: Mapping[str, Any], comparison: Comparison, objectives: np.ndarray) -> Figures:
