@@ -38,11 +38,11 @@ class Designs(Published, tag="designs"):
     def remark(self, comparison: Comparison) -> str:
         rows = self._rows(comparison)
         counts = [
-            f"{sum(float(str(one[GAIN])) > 0.0 for one in found)} of {len(rows)} designs by {solver}"
+            f"{solver} dominates {sum(float(str(one[GAIN])) > 0.0 for one in found)} of {len(rows)} designs"
             for solver, found in self.ours(comparison).items()
         ]
         return (
-            f"dominated are {', '.join(counts) or 'none'}. Beside each design, the point that is better in all objectives by the largest "
+            f"{', '.join(counts) or 'no point that counts'}. Beside each design, the point that is better in all objectives by the largest "
             "share of its figures; a share that is negative: no point dominates it, and this one comes nearest."
         )
 

@@ -150,7 +150,7 @@ def test_the_point_that_dominates_a_design_and_by_how_much(folder, tmp_path):
     # 2 s are a fifth less than 2.5 s, and 6 km a fifth more than 5 km; 12 km are a quarter less than 16 km, at the same time.
     ours = [cells["theirs, dfet:2x2", name][-3:] for name in ("slow", "far")]
     np.testing.assert_allclose(np.array(ours, dtype=float), [[2.0, 6.0, 20.0], [4.0, 12.0, -25.0]], rtol=1e-12)
-    assert "dominated are 1 of 2 designs by theirs" in found.text()
+    assert "theirs dominates 1 of 2 designs" in found.text()
 
 
 def staircase(points: np.ndarray) -> float:
