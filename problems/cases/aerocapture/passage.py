@@ -116,7 +116,7 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
         One is outside `RANGE`.
     RuntimeError
         Newton's method did not converge for one: it is named. It does for all with the paper's data; the nearer the exit is to level, the
-        more lift heavy capsules would need to stay in the air, far more than there is.
+        more lift heavy capsules would need to stay within the atmosphere, far more than they have.
     """
     bc = np.atleast_1d(np.asarray(ballistic, float))
     return _measured(bc, *_solved(bc, passage), passage)
