@@ -1,13 +1,13 @@
 """Gradient tools: single optima, the ends of a front, and sweeps along it, by exact derivatives on one mesh.
 
-Results are local optima: they depend on the start.
+Results are local optima, the best of those that were found from several starts.
 """
 
 from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -33,7 +33,9 @@ from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
-from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver
+from .gradients.along import ROUNDS, along
+from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver, single_task
+from .gradients.starts import Census
 from .gradients.targets import METHODS, check_points, targets
 from .io.console import working
 from .pareto.ranges import BETTER, distinct
@@ -49,8 +51,6 @@ PART, MESHES, MOST_WORK = 0.1, 8, 1.5e6
 after which no other mesh is begun: some half a minute, more where programs are large."""
 AUTO = "auto"
 """As many starts as pay."""
-ROUNDS = 3
-"""Largest number of times that points or ends of a sweep are solved again from a better start that another point gave."""
 
 
 NO_RANGE, NOTHING = 1e-8, 1e-10
@@ -71,7 +71,7 @@ def optimize(
     time_limit: float | None = None,
     progress: bool | None = None,
 ) -> Point:
-    """The local optimum of one objective; the others are ignored.
+    """The optimum of one objective; the others are ignored.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def optimize(
     start : Front, Points or array (k, n), optional
         Decisions to begin with, all variables or the free ones only; the best of them is used.
     starts : int or "auto"
-        Number of starts: the first is `start` or the problem's guess, the others are random. The best result is returned. "auto": one where
-        a transcription or `start` is given; else one, and when its optimum is found, others on its coarse mesh as long as they take little
-        beside that: `stats` has the `starts` that converged there, how many different `optima` they found, and how often that which is
-        returned was `found`.
+        Number of starts: the first is `start` or the problem's guess, the others are drawn: from everywhere in the bounds, and near the
+        best that is known. The best result is returned. "auto": as many as pay; some twenty where each finds the same, fewer where a solve
+        takes long. `stats` has the number of `starts`, how many different `optima` they found, and how often that which is returned was
+        `found`; if only once, `message` says so: there may be better ones.
     seed : int, optional
-        Seed of the random starts. None draws one, which is recorded in `stats`.
+        Seed of the starts that are drawn. None draws one, which is recorded in `stats`.
     tolerance : float
         Largest scaled residual of a feasible point.
     verify : float, optional
@@ -117,8 +117,7 @@ def optimize(
     if objective is not None and objective not in names:
         raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
     i = 0 if objective is None else names.index(objective)
-    reference = np.where(np.arange(len(names)) == i, 0.0, np.inf)
-    return job.optimum(reference, np.eye(len(names))[i])[0]
+    return job.optimum(i)[0]
 
 
 def payoff(
@@ -126,7 +125,7 @@ def payoff(
     transcription: Transcription | None = None,
     *,
     start: Any = None,
-    starts: int = 1,
+    starts: int | str = "auto",
     seed: int | None = 0,
     tolerance: float = 1e-6,
     verify: float | None = VERIFY,
@@ -139,7 +138,7 @@ def payoff(
     Parameters
     ----------
     problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
-        As for `optimize`.
+        As for `optimize`; with "auto", the `starts`, `optima` and `found` of `stats` are by the names of objectives.
 
     Returns
     -------
@@ -168,7 +167,7 @@ def sweep(
     points: int,
     method: str = "pascoletti-serafini",
     start: Any = None,
-    starts: int = 1,
+    starts: int | str = "auto",
     seed: int | None = 0,
     tolerance: float = 1e-6,
     verify: float | None = VERIFY,
@@ -181,7 +180,8 @@ def sweep(
     Parameters
     ----------
     problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
-        As for `optimize`; each point is solved from so many `starts`.
+        As for `optimize`; each point is solved from so many `starts`. "auto": the optimum of each objective from as many as pay, see
+        `payoff`; the points between, each from the one before, then from others as long as these find better ones.
     points : int
         Number of points, the ends included; with three or more objectives, the largest number.
     method : "pascoletti-serafini" or "epsilon"
@@ -239,9 +239,9 @@ class Terms:
         check_verify(self.verify)
 
     @property
-    def count(self) -> int:
-        """Number of starts on a mesh that is given."""
-        return 1 if self.starts == AUTO else int(self.starts)
+    def count(self) -> int | None:
+        """Number of starts; None for as many as pay."""
+        return None if self.starts == AUTO else int(self.starts)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -264,16 +264,21 @@ class _Job:
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self._sole: np.ndarray | None = None
+        self._census: dict[int, Census] = {}
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
         if transcription is not None:
             self.begin(transcription)
 
-    def begin(self, transcription: Transcription) -> None:
-        """Work on this transcription from now on."""
+    def begin(self, transcription: Transcription, ends: Points | None = None, census: Mapping[int, Census] | None = None) -> None:
+        """Work on this transcription from now on, with what is known of the ends on another mesh."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)
-        self.solver = MultistartSolver(self.nlp, beginning(self._terms.start, self.nlp), self._terms.count, self._rng, self.solves)
+        known = [beginning(self._terms.start, self.nlp), beginning(ends, self.nlp, guess=False)]
+        given = [Z for Z in known if Z is not None]
+        self.solver = MultistartSolver(self.nlp, np.vstack(given) if given else None, self._terms.count, self._rng, self.solves)
+        self.solver.census.update(census or {})
+        self._census = self.solver.census
 
     def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
         """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
@@ -288,21 +293,22 @@ class _Job:
                 if not self.fixed:
                     chosen = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
                     self.solves.counts = chosen.counts
-                    self.begin(chosen.fine or chosen.search)
+                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.census)
                 front = work()
             except Stopped as reason:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             self._stopped = interrupts.reason
-            front = front.replace(stats=front.stats | self._stats())
+            words = "; ".join(filter(None, [front.message, self._found_once()]))
+            front = front.replace(stats=front.stats | self._stats(), message=words)
             return front.verify(verify) if self.fixed or verify is None else Front.of(again(front, verify))
 
-    def optimum(self, reference: np.ndarray, weights: np.ndarray) -> Front:
-        """The optimum of a scalarised problem as a front of one point, simulated: on the transcription that was given, or on a mesh that is
-        found for it."""
+    def optimum(self, i: int) -> Front:
+        """The optimum of objective i as a front of one point, simulated: on the given transcription, or on a mesh that is found for it."""
+        reference, weights = single_task(i, len(self.problem.goals))
         self._sole = reference < np.inf
         if self.fixed:
-            return self.run(lambda: self.front([self.solver.solve(reference, weights)], None), solved_again)
+            return self.run(lambda: self.front([self.solver.single(i)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
         limits = PART * (verify or VERIFY)
         coarse = meshes_to_begin_on(self._statement, self.problem)
@@ -311,8 +317,7 @@ class _Job:
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
             loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, MOST_WORK)
             try:
-                starts = None if terms.starts == AUTO and terms.start is None else terms.count
-                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), starts, self._rng, coarse)
+                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), terms.count, self._rng, coarse)
             except Stopped as reason:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
@@ -334,7 +339,7 @@ class _Job:
             ends = self.ends()
             if any(end.status != CONVERGED for end in ends):
                 return self.sifted(ends)
-            found = self.along(targets(np.array([end.F for end in ends]), self.ranges(ends), points, method))
+            found = along(self.solver, targets(np.array([end.F for end in ends]), self.ranges(ends), points, method))
             if not self.surpassed(ends, found):
                 break
         return self.sifted([*ends, *found], self.ranges(ends))
@@ -342,30 +347,6 @@ class _Job:
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
         return self.solver.ends()
-
-    def along(self, tasks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Solved]:
-        """The results of all tasks (reference, weights), in their order.
-
-        A result that is better for another task than that task's own result becomes a start for it. With several `starts`, each task is
-        also solved from the result of the next one.
-        """
-        solver = self.solver
-        found = [solver.solve(*task) for task in tasks]
-
-        def again(k: int, start: np.ndarray) -> None:
-            found[k] = solver.better([found[k], solver.from_vector(start, *tasks[k])], *tasks[k])
-
-        if solver.starts > 1:
-            for k in range(len(tasks) - 2, -1, -1):
-                again(k, found[k + 1].z)
-        for _ in range(ROUNDS):
-            rivals = [solver.rival(solved, *task) for solved, task in zip(found, tasks, strict=True)]
-            for k, rival in enumerate(rivals):
-                if rival is not None:
-                    again(k, rival)
-            if all(rival is None for rival in rivals):
-                break
-        return found
 
     def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other."""
@@ -405,6 +386,12 @@ class _Job:
             vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
         )
 
+    def _found_once(self) -> str:
+        """Words on optima of single objectives that one start alone has found."""
+        once = [i for i, census in self._census.items() if census.times() == 1 < census.starts]
+        names = [f"that of '{self.problem.goals[i].name}' in {self._census[i].starts}" for i in once]
+        return f"optima that one start alone found, so that there may be better ones: {', '.join(names)}" if names else ""
+
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts
         return costs(
@@ -414,4 +401,15 @@ class _Job:
             tolerance=self.solves.tolerance,
             reproducible=not (counts.clocked or self._stopped),
             **({"stopped": self._stopped} if self._stopped else {}),
+            **self._starts(),
         )
+
+    def _starts(self) -> dict[str, Any]:
+        """Starts that were made, different optima and how often the best was found: of the only objective that was sought, or by name."""
+        told = {
+            self.problem.goals[i].name: {"starts": one.starts, "optima": one.optima(), "found": one.times()}
+            for i, one in self._census.items()
+        }
+        if self._sole is not None:
+            return next(iter(told.values()), {})
+        return {key: {name: numbers[key] for name, numbers in told.items()} for key in ("starts", "optima", "found") if told}

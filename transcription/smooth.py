@@ -64,9 +64,11 @@ class Smooth:
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         return self.shaped(nlp, lower + span * rng.random((count, len(nlp.free))))
 
-    def shaped(self, nlp: NLP, candidates: np.ndarray) -> np.ndarray:
-        """The candidates (k, d) that others (k, d) become, which were drawn evenly from their bounds, each variable by itself."""
-        lower, upper, span, guess = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free], nlp.guess
+    def shaped(self, nlp: NLP, candidates: np.ndarray, about: np.ndarray | None = None) -> np.ndarray:
+        """The candidates (k, d) that others (k, d) become, which were drawn evenly from their bounds, each variable by itself; `about` (d,)
+        stands in for the problem's guess."""
+        lower, upper, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
+        guess = nlp.guess if about is None else about
         noise = np.sqrt(12.0) * ((candidates - lower) / span - 0.5)
         X = np.where(np.isfinite(guess), guess + self.spread * span * noise, candidates)
         for profile in nlp.profiles:

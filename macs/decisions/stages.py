@@ -215,7 +215,7 @@ class StageSolver:
         found: list[Solved] = []
         for k in range(starts):
             try:
-                found.append(solver.from_vector(Z[k], REFERENCE, WEIGHTS) if k < len(Z) else solver.from_random(REFERENCE, WEIGHTS))
+                found.append(solver.from_vector(Z[k], REFERENCE, WEIGHTS) if k < len(Z) else solver.from_drawn(REFERENCE, WEIGHTS))
             except Stopped:
                 if not found:
                     raise

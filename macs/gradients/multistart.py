@@ -12,20 +12,13 @@ import numpy as np
 from transcription.base import NLP
 from transcription.nlp.scalarized import Solved, scalarize
 from transcription.nlp.scaling import nlp_scales
-from transcription.smooth import Smooth
+from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, Counts
-
-HOPELESS = 100.0
-"""If propagated states violate bounds or constraints by more scales than this, a straight line is the better start."""
-
+from .starts import Census, Starts
 
 LIMIT, BETTER = 1e-8, 1e-7
 """Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
-
-
-WIDE = 0.3
-"""Spread of smooth random controls, in spans of their bounds: they are to lead to other optima."""
 
 
 LOOSE = 1e-2
@@ -44,6 +37,11 @@ ROUNDS, MORE = 5, 1e-6
 
 MOST_ITERATIONS = 500
 """Iterations of IPOPT after which a strategy of a solve is given up by default."""
+
+
+SHORT, LITTLE, SHARE = 200, 6e5, 4.0
+"""Most iterations of each further start; work, see `Counts`, that they may always take, a matter of a second or two; and what they may
+take beside the first one."""
 
 
 class GradientSolves:
@@ -100,37 +98,40 @@ class GradientSolves:
 
 
 class MultistartSolver:
-    """Solver of scalarised problems of one NLP, each from the best vector known for it and from random candidates.
+    """Solver of scalarised problems of one NLP, each from the best vector known for it and from other starts, see `starts`.
 
     Parameters
     ----------
     nlp : NLP
     given : array (k, n), optional
         Vectors that are known at the beginning.
-    starts : int
-        Number of starts for each problem.
+    starts : int or None
+        Number of starts for each problem. None: one, and for the optimum of a single objective as many as pay, see `seek`.
     rng : numpy.random.Generator
-        Generator of the random candidates.
+        Generator of the starts that are drawn.
     solves : GradientSolves
         Makes and counts the solves.
 
     Attributes
     ----------
+    solves : GradientSolves
     counts : Counts
         Gradient solves, iterations, failures by status.
+    census : dict of int to Census
+        What the starts for each single objective have found; those in it are not sought again.
     """
 
     def __init__(
         self,
         nlp: NLP,
         given: np.ndarray | None,
-        starts: int,
+        starts: int | None,
         rng: np.random.Generator,
         solves: GradientSolves,
     ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
-        self._solves = solves
-        self.rng = rng
+        self.solves, self._starts = solves, Starts(nlp, rng)
+        self.rng, self.census = rng, dict[int, Census]()
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -141,7 +142,7 @@ class MultistartSolver:
     @property
     def counts(self) -> Counts:
         """Gradient solves, iterations, failures by status."""
-        return self._solves.counts
+        return self.solves.counts
 
     def solve(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
@@ -152,13 +153,35 @@ class MultistartSolver:
         """
         first = start if start is not None else self._nearest(reference, weights)
         found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
-        for _ in range(self.starts - len(found)):
-            found.append(self.from_random(reference, weights, ceiling))
+        for _ in range((self.starts or 1) - len(found)):
+            found.append(self.from_drawn(reference, weights, ceiling))
         return self.better(found, reference, weights)
+
+    def seek(self, reference: np.ndarray, weights: np.ndarray, census: Census, most: float = np.inf) -> Solved:
+        """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or several times what
+        the first one took, or `most` work."""
+        before = self.counts.work
+        best = self.solve(reference, weights)
+        limit = self.counts.work + min(max(LITTLE, SHARE * (self.counts.work - before)), most)
+        census.add(self.loss(best, reference, weights))
+        while not (census.enough or self.counts.work >= limit or stopping()):
+            # Where none has converged yet, they may all take long.
+            with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
+                found = self.from_drawn(reference, weights, best=best if census.converged else None)
+            census.add(self.loss(found, reference, weights))
+            best = self.better([best, found], reference, weights)
+        return best
+
+    def loss(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> float | None:
+        """What a scalarised problem minimises, at a result that converged."""
+        if solved.status != CONVERGED:
+            return None
+        moving = (reference < np.inf) & (weights > 0)
+        return float(np.max((solved.F - reference)[moving] / weights[moving]))
 
     def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
         """The result of one solve from a vector (n,); if it converged, later solves may begin at it."""
-        solved = self._solves(self.nlp, start, reference, weights, ceiling)
+        solved = self.solves(self.nlp, start, reference, weights, ceiling)
         if solved.status == CONVERGED:
             self._known = np.vstack([self._known, solved.z])
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
@@ -167,8 +190,14 @@ class MultistartSolver:
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
         objective within tight limits, also from what was given."""
-        task = _alone(i, len(self.nlp.problem.goals))
-        solved = self.solve(*task)
+        task = single_task(i, len(self.nlp.problem.goals))
+        if self.starts is None and i not in self.census:
+            self.census[i] = Census()
+            solved = self.seek(*task, self.census[i])
+        else:
+            solved = self.solve(*task)
+        if (rival := self.rival(solved, *task)) is not None:
+            solved = self.from_rival(rival, solved, *task)
         for start in self._known[: self._given] if solved.status != CONVERGED else ():
             solved = self.better([solved, self.from_vector(start, *task)], *task)
         return solved
@@ -181,7 +210,7 @@ class MultistartSolver:
         m = len(self.nlp.problem.goals)
         optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
         while (i := len(optima)) < m:
-            begun = self._nearest(*_alone(i, m))
+            begun = self._nearest(*single_task(i, m))
             optima.append(self.single(i))
             tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
         ends: list[Solved | None] = [None] * m
@@ -211,8 +240,8 @@ class MultistartSolver:
                 if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= LOOSE * spans).all():
                     continue
                 tried[i, k] = optima[k].F
-                with self._solves.at_most(TIES):
-                    found = self.from_vector(optima[k].z, *_alone(i, m))
+                with self.solves.at_most(TIES):
+                    found = self.from_vector(optima[k].z, *single_task(i, m))
                 # What an end has lost to the others is none.
                 gain = max(MORE * scales[i], 2 * SLACK * spans[i])
                 if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
@@ -234,8 +263,8 @@ class MultistartSolver:
         if best.F[i] - least > LIMIT * max(spans[i], nlp_scales(self.nlp)[i]):
             # What was lost for the others is worth a little of what they gained.
             near = np.where(np.arange(m) == i, np.inf, best.F + SLACK * spans)
-            with self._solves.at_most(TIES):
-                again = self.from_vector(best.z, *_alone(i, m), near)
+            with self.solves.at_most(TIES):
+                again = self.from_vector(best.z, *single_task(i, m), near)
             best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
         return best
 
@@ -245,9 +274,9 @@ class MultistartSolver:
 
         Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
         """
-        alone = _alone(j, len(spans))
+        alone = single_task(j, len(spans))
         large = LOOSE * abs(best.F[j] - optimum.F[j])
-        with self._solves.at_most(TIES):
+        with self.solves.at_most(TIES):
             # No slack: where the front is steep, a small loss in one objective changes another by its square root.
             solved = self.solve(*alone, ceiling, best.z)
             for _ in range(ROUNDS):
@@ -301,31 +330,31 @@ class MultistartSolver:
         own = self.merits(reference, weights, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
         return self._known[np.argmin(merits)] if merits.min() < own - BETTER else None
 
+    def from_rival(self, rival: np.ndarray, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> Solved:
+        """The better of a result and a solve from a known vector (n,) that is better; where that goes elsewhere, one that stays near it."""
+        found = self.better([solved, self.from_vector(rival, reference, weights)], reference, weights)
+        if self.rival(found, reference, weights) is not None:
+            with self.solves.nearby():
+                found = self.better([found, self.from_vector(rival, reference, weights)], reference, weights)
+        return found
+
+    def clearly_better(self, one: Solved, other: Solved, reference: np.ndarray, weights: np.ndarray) -> bool:
+        """Whether a result is better than another one of the same problem by more than the accuracy of solves."""
+        alpha, known = self.loss(one, reference, weights), self.loss(other, reference, weights)
+        return alpha is not None and (known is None or alpha < known - BETTER)
+
     def _nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
         """The known vector (n,) with the best merit; None if none is known."""
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
 
-    def from_random(self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, smooth: bool = False) -> Solved:
-        """The result of a solve from a random candidate: from its propagated states, and if that fails from guessed states.
-
-        Its values are drawn evenly from their bounds, each by itself; with `smooth` they are profiles about the problem's guess.
-        """
-        nlp = self.nlp
-        lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
-        drawn = (lower + self.rng.random(len(lower)) * span)[None]
-        guessed = nlp.first_guess(Smooth(spread=WIDE).shaped(nlp, drawn) if smooth else drawn)
-        propagated = nlp.propagate(guessed)
-        usable = np.isfinite(propagated).all() and nlp.evaluate(propagated)[1][0] <= HOPELESS
-        attempts = [propagated[0], guessed[0]] if usable else [guessed[0]]
-        found: list[Solved] = []
-        for start in attempts:
-            found.append(self.from_vector(start, reference, weights, ceiling))
-            if found[-1].status == CONVERGED:
-                break
-        return self.better(found, reference, weights)
+    def from_drawn(
+        self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, best: Solved | None = None
+    ) -> Solved:
+        """The result of a solve from a start that is drawn; `best` is the best result so far."""
+        return self.from_vector(self._starts.draw(None if best is None else best.z), reference, weights, ceiling)
 
 
-def _alone(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
+def single_task(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
     """Reference and weights (m,) of objective i alone; see `scalarize`."""
     return np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i]
 

@@ -1,4 +1,4 @@
-"""One optimum on a mesh that is found: from a coarse mesh on, refined by what simulation shows, and from several starts."""
+"""One optimum on a mesh that is found: from several starts on a coarse mesh, refined by what simulation shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.multistart import MultistartSolver
+from ..gradients.multistart import SHORT, MultistartSolver
+from ..gradients.starts import Census
 from ..gradients.tasks import Along
 from .mesh_loop import MeshLoop, Refinement
 
@@ -29,9 +30,8 @@ COARSE: tuple[Meshed, ...] = (
 """Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
 SECOND: Meshed = DFET(16, 3)
 """A mesh for other starts, beside that from which the optimum came: what one basis hides another may show."""
-OTHERS, SHORT, SHARE, AGAIN = 6, 200, 0.5, 0.5
-"""Other starts on each of the two; most iterations of each; what they may take together, and what refining what they find may take, as
-shares of the work before."""
+SHARE, AGAIN = 0.5, 0.5
+"""What other starts on each of the two may take together, and what refining what they find may take, as shares of the work before."""
 LITTLE, MUCH = 6e5, 2e6
 """Work, see `MeshLoop`, that is a matter of a second or two, so that other starts may always take it; and that after which no other mesh is
 tried, if there is a result."""
@@ -56,7 +56,7 @@ class Found:
     behind : float
         By how much it is worse, in units, than what another one achieved when simulated; 0 if it is not.
     starts, optima, times : int
-        Solves on coarse meshes that converged, how many different optima these found, and how often that which it came from.
+        Solves on its coarse mesh that converged, how many different optima these found, and how often that which it came from.
     """
 
     nlp: NLP
@@ -112,10 +112,10 @@ def found_optimum(
     given : callable
         Vectors (k, n) of an NLP that are known at the beginning; None if there are none.
     starts : int or None
-        Number of starts on a coarse mesh: the best known vector, the others random. None: one, and when its optimum is found, others as
-        long as they take little beside that; better optima are refined, too.
+        Number of starts on a coarse mesh: the best known vector, then others, see `gradients.starts`. None: as many as pay, as long as they
+        take little, on the first coarse mesh on which a solve converges; on another one, too, where not all led to the same good point.
     rng : numpy.random.Generator
-        Of the random starts.
+        Of the starts that are drawn.
     coarse : sequence of Meshed
         The meshes to begin on. The next one is tried only where the one before leads to no good point.
 
@@ -133,11 +133,12 @@ def found_optimum(
                 raise
             break
         solver = MultistartSolver(nlp, given(nlp), starts or 1, rng, loop.solves)
-        search.begin(method, solver)
+        search.begin(method, solver, starts is None)
         search.exhausted = loop.most_work is not None and loop.work >= loop.most_work
         if search.enough:
             break
-    if starts is None:
+    best = search.best
+    if starts is None and not (best.good and best.times == best.starts > 1):
         search.elsewhere((SECOND,))
     return search.best
 
@@ -152,9 +153,15 @@ class _Attempt:
     solved: Solved
     alpha: float
     found: Found
+    census: Census
     unit: float = 1.0
     loss: float = np.inf
     achieved: float = np.inf
+
+
+_Other = tuple[float, Meshed, MultistartSolver, Solved, Census]
+"""Another optimum on a coarse mesh: by how much it is better there than the best attempt, in its units, negative; the mesh, its solver, the
+result, and what the starts there have found."""
 
 
 class _Search:
@@ -164,20 +171,44 @@ class _Search:
         self.loop, self.reference, self.weights = loop, reference, weights
         self._task = Along(reference, weights, np.ones(len(weights)))
         self.all: list[_Attempt] = []
-        self._alphas: list[float] = []
         self._units = np.full(len(weights), np.inf)
         self.exhausted = False
+        self._searched: set[Meshed] = set()
 
-    def begin(self, method: Meshed, solver: MultistartSolver) -> None:
-        """Solve on a coarse mesh, and refine."""
-        solved = solver.solve(self.reference, self.weights)
-        self._alphas = [] if solved.status != CONVERGED else [self._task.loss(solved.F)]
-        self.add(method, solver, solved)
+    def begin(self, method: Meshed, solver: MultistartSolver, elsewhere: bool) -> None:
+        """Solve on a coarse mesh, also `elsewhere` if other starts were not made yet, and refine what is best; where that leads to no good
+        point, also what the first start gave: an optimum that is better on a coarse mesh may be none."""
+        solved = best = solver.solve(self.reference, self.weights)
+        census = Census()
+        census.add(self._loss(solved))
+        if elsewhere and not self._searched and solved.status == CONVERGED:
+            self._searched.add(method)
+            others = self._drawn(solver, solved, census, self.loop.work + LITTLE)
+            best = min([solved, *others], key=lambda one: self._task.loss(one.F))
+        self.add(method, solver, best, census)
+        if best is not solved and not self.best.good and not self.loop.ended:
+            self.add(method, solver, solved, census)
 
-    def add(self, method: Meshed, solver: MultistartSolver, solved: Solved) -> None:
-        """Refine the result of a solve on a coarse mesh, if it converged."""
+    def _loss(self, solved: Solved) -> float | None:
+        return self._task.loss(solved.F) if solved.status == CONVERGED else None
+
+    def _drawn(self, solver: MultistartSolver, known: Solved, census: Census, most: float) -> list[Solved]:
+        """Optima that starts that are drawn lead to on a coarse mesh, of which one is known, until there are enough, or `most` work is
+        done."""
+        found: list[Solved] = []
+        nearby = known if known.status == CONVERGED else None
+        with suppress(Stopped), self.loop.solves.at_most(SHORT):
+            while not (census.enough or self.loop.ended or self.loop.work >= most):
+                solved = solver.from_drawn(self.reference, self.weights, best=nearby)
+                loss = self._loss(solved)
+                nearby = solved if census.add(loss) else nearby
+                found += [solved] if loss is not None else []
+        return found
+
+    def add(self, method: Meshed, solver: MultistartSolver, solved: Solved, census: Census) -> None:
+        """Refine the result of a solve on a coarse mesh, of whose starts there is a census, if it converged."""
         loop, nlp = self.loop, solver.nlp
-        attempt = _Attempt(method, solver, solved, self._task.loss(solved.F), Found(nlp, solved, None))
+        attempt = _Attempt(method, solver, solved, self._task.loss(solved.F), Found(nlp, solved, None), census)
         if solved.status == CONVERGED:
             # Objectives that are large only where an attempt is poor are not to be judged by that.
             self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
@@ -222,69 +253,55 @@ class _Search:
         behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
         behind = [amount if amount > self.loop.wanted.settled else 0.0 for amount in behind]
         i = min(range(len(self.all)), key=lambda k: _rank(self.all[k].found, behind[k] / self.loop.wanted.settled))
-        same = [abs(alpha - self.all[i].alpha) <= CLEARLY * self.all[i].unit for alpha in self._alphas]
+        census, same = self.all[i].census, CLEARLY * self.all[i].unit
         return replace(
             self.all[i].found,
             behind=behind[i],
             exhausted=self.exhausted,
-            starts=len(self._alphas),
-            optima=len(_distinct(self._alphas, self.all[i].unit)),
-            times=sum(same),
+            starts=census.converged,
+            optima=census.optima(same),
+            times=census.times(self.all[i].alpha, same),
         )
 
     def elsewhere(self, coarse: Sequence[Meshed]) -> None:
-        """Begin anew from random starts on coarse meshes, as long as that takes little; refine what is better there than the best attempt,
-        or, where that is not good, what is different."""
+        """Begin anew from other starts on coarse meshes where that was not done yet, as long as it takes little; refine what is better
+        there than the best attempt, or, where that is not good, what is different."""
         loop, best = self.loop, self.best
         first = next(attempt for attempt in self.all if attempt.solved is best.solved)
-        before, others = loop.work, []
+        before, others = loop.work, list[_Other]()
         for method in dict.fromkeys((first.method, *coarse)):
-            with suppress(Stopped), loop.solves.at_most(SHORT):
-                others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), LITTLE))
+            if method not in self._searched:
+                with suppress(Stopped):
+                    others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), LITTLE))
         usual, most = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), LITTLE)
         loop.most_work = most if usual is None else min(most, usual)
-        for _, method, solver, solved in sorted(others, key=lambda other: other[0])[:REFINED]:
+        for _, method, solver, solved, census in sorted(others, key=lambda other: other[0])[:REFINED]:
             if not loop.ended:
-                self.add(method, solver, solved)
+                self.add(method, solver, solved, census)
         loop.most_work = usual
 
-    def _others(self, method: Meshed, first: _Attempt, best: Found, most: float) -> list[tuple[float, Meshed, MultistartSolver, Solved]]:
-        """Other optima on a coarse mesh that are worth refining: by how much they are better there than the best attempt, in its units, the
-        mesh, its solver, and the results."""
+    def _others(self, method: Meshed, first: _Attempt, best: Found, most: float) -> list[_Other]:
+        """Other optima on a coarse mesh that are worth refining."""
         loop, unit = self.loop, first.unit
         if loop.ended or loop.work >= most or best.refinement is None:
             return []
         if method == first.method:
-            solver, alpha = first.solver, first.alpha
+            solver, known, census = first.solver, first.solved, first.census
         else:
-            nlp = loop.programs(method)
+            nlp, census = loop.programs(method), Census()
             solver = MultistartSolver(nlp, None, 1, first.solver.rng, loop.solves)
-            same = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), self.reference, self.weights)
-            alpha = self._task.loss(same.F) if same.status == CONVERGED else np.inf
-        seen, found = [alpha], []
-        for k in range(OTHERS):
-            if loop.ended or loop.work >= most:
-                break
-            solved = solver.from_random(self.reference, self.weights, smooth=k % 2 == 0)
-            if solved.status != CONVERGED:
-                continue
+            with loop.solves.at_most(SHORT):
+                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), self.reference, self.weights)
+            census.add(self._loss(known))
+        alpha = self._task.loss(known.F) if known.status == CONVERGED else np.inf
+        seen, found = [alpha], list[_Other]()
+        for solved in self._drawn(solver, known, census, most):
             loss = self._task.loss(solved.F)
-            if method == first.method:
-                self._alphas.append(loss)
             if all(abs(loss - other) > CLEARLY * unit for other in seen):
                 seen.append(loss)
                 if loss < alpha or not best.good:
-                    found.append(((loss - alpha) / unit, method, solver, solved))
+                    found.append(((loss - alpha) / unit, method, solver, solved, census))
         return found
-
-
-def _distinct(values: Sequence[float], unit: float) -> list[float]:
-    """Values of which no two are nearer to each other than optima that are the same."""
-    kept: list[float] = []
-    for value in sorted(values):
-        if not kept or value - kept[-1] > CLEARLY * unit:
-            kept.append(value)
-    return kept
 
 
 def _rank(one: Found, behind: float) -> tuple[bool, float]:

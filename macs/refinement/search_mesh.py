@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
+from ..gradients.starts import Census
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
 
@@ -28,8 +29,6 @@ COARSE = DFET(8, 3, basis="bernstein")
 """The first mesh of a problem that names none."""
 PART = 1.0
 """What the ends of a front may miss on the mesh of a search, as a multiple of what points may: these get meshes of their own."""
-STARTS = 4
-"""Number of starts for each end on the coarse mesh."""
 MESHES = 8
 """Most meshes of one end, beside the coarse one."""
 MOST = 40
@@ -60,6 +59,8 @@ class Chosen:
         The optima of single objectives on the coarse mesh, from which that was found out.
     refined : Points or None
         The same on meshes of their own.
+    census : dict of int to Census
+        What the starts for each single objective have found on the coarse mesh.
     """
 
     search: Transcription
@@ -67,6 +68,7 @@ class Chosen:
     counts: Counts
     ends: Points | None = None
     refined: Points | None = None
+    census: Mapping[int, Census] = field(default_factory=dict)
 
 
 def search_transcription(
@@ -100,11 +102,11 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     """
     if not differentiable(problem):
         return Chosen(COARSE, None, Counts())
-    nlp, m = COARSE.nlp(problem), len(problem.goals)
+    nlp = COARSE.nlp(problem)
     solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
-    first, solver = (MultistartSolver(nlp, guessed_start(nlp), starts, rng, solves) for starts in (STARTS, 1))
+    solver = MultistartSolver(nlp, guessed_start(nlp), None, rng, solves)
     show("ends of the front on a coarse mesh")
-    solved = solver.ends([first.single(k) for k in range(m)])
+    solved = solver.ends()
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))
@@ -116,7 +118,8 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE
     if not len(ends):
         return Chosen(COARSE, None, counts)
-    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, job.points(0.0, "").replace(notes=[""] * len(ends)))
+    refined = job.points(0.0, "").replace(notes=[""] * len(ends))
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, refined, solver.census)
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

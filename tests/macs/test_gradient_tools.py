@@ -175,7 +175,7 @@ def two_valleys() -> Problem:
 
 def test_several_starts_find_the_deeper_valley() -> None:
     assert optimize(two_valleys(), MESH, starts=12).parameters["p"] == pytest.approx(-1, abs=1e-2)
-    near = optimize(two_valleys(), MESH, start=np.array([[0.9]]))
+    near = optimize(two_valleys(), MESH, start=np.array([[0.9]]), starts=1)
     assert near.parameters["p"] == pytest.approx(1, abs=1e-2)
     assert optimize(two_valleys(), MESH, start=np.array([[0.9], [-0.95]])).parameters["p"] == pytest.approx(-1, abs=1e-2)
 

@@ -1,0 +1,126 @@
+"""Starts of gradient solves: from everywhere in the box and near the best that is known, in turn, until new ones stop paying.
+
+A solve ends in the valley in which it begins. Trajectories of most controls drawn at random are much alike, so that starts are of several
+kinds; near the best that is known other valleys are often better ones. That is monotonic basin hopping: Leary, "Global optimization on
+funneling landscapes", J. Global Optimization 18, 2000; for trajectories Englander and Conway, "Automated solution of the low-thrust
+interplanetary trajectory problem", J. Guidance 40(1), 2017. When to end: after k solves that found w different
+optima, the probability that the next one finds another is w (w + 1) / (k (k - 1)), if before the first all numbers of optima, and all sizes
+of their valleys, were alike: Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical
+Programming 37, 1987.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from transcription.base import NLP
+from transcription.smooth import Smooth
+
+KINDS: tuple[tuple[Smooth | None, bool], ...] = (
+    (Smooth(spread=0.4, length=3.0), True),
+    (Smooth(spread=0.3), True),
+    (None, True),
+    (Smooth(spread=0.3), False),
+)
+"""How controls are drawn, None evenly and each value by itself, and whether states are propagated from them: almost constant, smooth,
+noise; and smooth with the states of the guess, from which a solve also finds what nothing that is propagated comes near to."""
+SPREADS, LENGTHS = (0.02, 0.5), (0.05, 2.0)
+"""Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known; see `Smooth`."""
+HOPELESS = 100.0
+"""If propagated states violate bounds or constraints by more scales than this, the states of the guess are the better start."""
+
+FIRST = 8
+"""Starts from everywhere before every second one is near the best that is known."""
+UNSEEN = 0.005
+"""Probability that another start would find another optimum below which there are enough."""
+FEWEST, MANY, LAST, MOST = 8, 60, 2, 200
+"""Solves after which none has converged that are enough; where optima are many: solves that are enough, if there are also this many times
+as many as it took to find the best; and the most."""
+SAME, ROUNDING = 1e-3, 1e-5
+"""Differences that are none: as a part of those between all optima, and of their size."""
+
+
+class Starts:
+    """Starts of gradient solves of one NLP, later every second one near the best vector that is known.
+
+    Parameters
+    ----------
+    nlp : NLP
+    rng : numpy.random.Generator
+    """
+
+    def __init__(self, nlp: NLP, rng: np.random.Generator) -> None:
+        self._nlp, self._rng, self._drawn = nlp, rng, 0
+
+    def draw(self, best: np.ndarray | None = None) -> np.ndarray:
+        """The next start, a full vector (n,); `best` (n,) is the best that is known."""
+        nlp, rng = self._nlp, self._rng
+        drawn, self._drawn = self._drawn, self._drawn + 1
+        near = drawn >= FIRST and drawn % 2
+        lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
+        candidates = (lower + rng.random(len(lower)) * span)[None]
+        if near and best is not None:
+            spread, length = (float(np.exp(rng.uniform(*np.log(limits)))) for limits in (SPREADS, LENGTHS))
+            moved = best.copy()
+            moved[nlp.free] = Smooth(spread, length).shaped(nlp, candidates, best[nlp.free])[0]
+            return self._propagated(moved)
+        shape, propagate = KINDS[(drawn if drawn < FIRST else drawn // 2) % len(KINDS)]
+        guessed = nlp.first_guess(candidates if shape is None else shape.shaped(nlp, candidates))[0]
+        return self._propagated(guessed) if propagate else guessed
+
+    def _propagated(self, z: np.ndarray) -> np.ndarray:
+        """The vector with propagated states, or as it is where these are absurd."""
+        states = self._nlp.propagate(z[None])
+        usable = np.isfinite(states).all() and self._nlp.evaluate(states)[1][0] <= HOPELESS
+        return states[0] if usable else z
+
+
+class Census:
+    """What solves of one problem from different starts have found: how many optima, and how often the best."""
+
+    def __init__(self) -> None:
+        self._losses: list[float] = []
+        self.starts = 0
+        self._last = 0
+
+    def add(self, loss: float | None) -> bool:
+        """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
+        self.starts += 1
+        if loss is None:
+            return False
+        better = not self._losses or loss < min(self._losses) - ROUNDING * abs(loss)
+        self._losses.append(loss)
+        self._last = self.starts if better else self._last
+        return better
+
+    @property
+    def converged(self) -> int:
+        """Solves that ended at an optimum."""
+        return len(self._losses)
+
+    def optima(self, same: float | None = None) -> int:
+        """Optima that differ by more than `same`; by default, by more than a small part of the differences between all."""
+        apart = np.diff(np.sort(self._losses)) > (self._same if same is None else same)
+        return int(np.count_nonzero(apart)) + bool(self._losses)
+
+    def times(self, loss: float | None = None, same: float | None = None) -> int:
+        """How often an optimum with this loss was found, by default the best."""
+        if not self._losses:
+            return 0
+        differences = np.abs(np.array(self._losses) - (min(self._losses) if loss is None else loss))
+        return int(np.count_nonzero(differences <= (self._same if same is None else same)))
+
+    @property
+    def enough(self) -> bool:
+        """Whether more starts are not expected to find anything else, or have found nothing better for long."""
+        found, optima = self.converged, self.optima()
+        if not found:
+            return self.starts >= FEWEST
+        if found > optima and optima * (optima + 1) < UNSEEN * found * (found - 1):
+            return True
+        return self.starts >= min(max(MANY, LAST * self._last), MOST)
+
+    @property
+    def _same(self) -> float:
+        losses = np.array(self._losses)
+        return max(SAME * float(np.ptp(losses)), ROUNDING * float(np.abs(losses).max())) if len(losses) else 0.0

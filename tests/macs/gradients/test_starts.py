@@ -1,0 +1,115 @@
+"""Starts of gradient solves: of what kinds they are, when there are enough, and that the best of many valleys is found."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs import optimize, payoff, sweep
+from macs.gradients.starts import FEWEST, FIRST, MANY, MOST, Census, Starts
+from problems import Problem, load
+from transcription import DFET
+
+
+def wells(depths: list[float], width: float = 0.02) -> Problem:
+    """A parameter with a valley at each of the places between 0 and 1, as deep as stated, and a shallow bowl for a gradient elsewhere;
+    the second objective has its only optimum at 0."""
+    problem = Problem("wells")
+    p = problem.parameter("p", bounds=(0, 1))
+    places = (np.arange(len(depths)) + 0.5) / len(depths)
+    problem.minimize("height", -sum(d * ca.exp(-(((p - c) / width) ** 2)) for d, c in zip(depths, places, strict=True)) + (p - 0.5) ** 2)
+    problem.minimize("place", p)
+    phase = problem.phase("phase", t0=0.0, tf=1.0)
+    x = phase.state("x", bounds=(-1, 1), initial=0)
+    phase.dynamics(x=0 * x)
+    return problem
+
+
+def census_of(losses: list[float | None]) -> Census:
+    census = Census()
+    for loss in losses:
+        census.add(loss)
+    return census
+
+
+def test_the_same_again_and_again_is_enough():
+    """Boender and Rinnooy Kan: with w = 1 the next start finds another optimum with probability 2 / (k (k - 1)), 0.0048 for k = 21."""
+    assert not census_of([1.0] * 20).enough and census_of([1.0] * 21).enough
+    assert not census_of([1.0, 2.0] * 17).enough and census_of([1.0, 2.0] * 18).enough, "6 / (k (k - 1)) falls below it at 36"
+
+
+def test_many_optima_need_twice_as_many_starts_as_the_best():
+    improving = census_of([float(-k) for k in range(MOST - 1)])
+    assert not improving.enough and census_of([float(-k) for k in range(MOST)]).enough
+    early = census_of([-1e9, *map(float, range(MANY - 2))])
+    assert not early.enough
+    early.add(-3.0)
+    assert early.enough and early.optima() == MANY
+
+
+def test_nothing_that_converges_is_soon_enough():
+    assert not census_of([None] * (FEWEST - 1)).enough and census_of([None] * FEWEST).enough
+    empty = census_of([None])
+    assert (empty.starts, empty.converged, empty.optima(), empty.times()) == (1, 0, 0, 0)
+
+
+@given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
+def test_counts_of_a_census(losses, noise):
+    census = census_of([None if loss is None else loss * (1.0 + noise * (k % 2)) for k, loss in enumerate(losses)])
+    known = [loss for loss in losses if loss is not None]
+    assert census.starts == len(losses) and census.converged == len(known)
+    assert census.optima() == len(set(known))
+    assert census.times() == (known.count(min(known)) if known else 0)
+
+
+def test_starts_are_near_the_best_or_anywhere():
+    nlp = load("goddard").default_transcription.transcribe(load("goddard").compile())
+    starts, best = Starts(nlp, np.random.default_rng(0)), nlp.first_guess(nlp.lower[nlp.free][None] + 0.5 * nlp.span[nlp.free])[0]
+    drawn = np.array([starts.draw(best) for _ in range(FIRST + 40)])
+    free = (drawn - best)[:, nlp.free] / nlp.span[nlp.free]
+    assert (drawn[:, nlp.free] >= nlp.lower[nlp.free]).all() and (drawn[:, nlp.free] <= nlp.upper[nlp.free]).all()
+    deviation = np.sqrt((free**2).mean(axis=1))
+    near, anywhere = deviation[FIRST + 1 :: 2], deviation[FIRST::2]
+    assert np.median(near) < 0.5 * np.median(anywhere) and near.min() < 0.05
+    again = Starts(nlp, np.random.default_rng(0))
+    assert np.array_equal([again.draw(best) for _ in range(FIRST + 40)], drawn)
+
+
+@pytest.mark.parametrize("deepest", range(0, 8, 3))
+def test_the_deepest_of_eight_wells_is_found(deepest):
+    depths = [1.0 + (2.0 if k == deepest else 0.1 * (k % 3)) for k in range(8)]
+    point = optimize(wells(depths), DFET(1, 1))
+    assert point.parameters["p"] == pytest.approx((deepest + 0.5) / 8, abs=1e-2)
+    stats = point.alone().stats
+    assert stats["starts"] > stats["optima"] >= 3 and stats["found"] >= 1
+
+
+def test_what_only_one_start_found_is_said():
+    """A narrow deep well beside a wide one: how often it was found is in the message, exactly where it was once."""
+    seen = set()
+    for seed in range(6):
+        front = payoff(wells([1.0, 3.0, 1.0, 1.0], width=0.004), DFET(1, 1), seed=seed)
+        once = front.stats["found"]["height"] == 1
+        assert once == ("one start alone found" in front.message and "'height'" in front.message)
+        assert front.stats["starts"]["height"] >= front.stats["optima"]["height"] >= 1
+        seen.add(once)
+    assert True in seen
+
+
+def test_a_front_to_start_from_is_never_made_worse():
+    """A first solve from a good point may leave its well; the point itself then counts."""
+    depths = [1.0, 1.1, 3.0, 1.2, 1.0, 1.3, 1.1, 1.0]
+    problem = wells(depths)
+    best = payoff(problem, DFET(1, 1))
+    again = payoff(problem, DFET(1, 1), start=best, starts=1)
+    assert again.F[0, 0] <= best.F[0, 0] + 1e-9 and again.F[1, 1] <= best.F[1, 1] + 1e-9
+
+
+def test_a_sweep_with_one_start_and_with_as_many_as_pay_agree_where_there_is_one_valley():
+    goddard = load("goddard")
+    one, many = (sweep(goddard, points=5, starts=starts) for starts in (1, "auto"))
+    assert many.F == pytest.approx(one.F, rel=1e-6, abs=1e-6)
+    assert set(many.stats["optima"].values()) == {1} and "starts" in one.solver["settings"]
