@@ -21,7 +21,7 @@ from .front import Front
 from .fronts.points import Points
 from .fronts.provenance import more_costs, versions
 from .gradient_solvers import GradientSolver
-from .gradient_tools import AUTO, Terms, sweep
+from .gradient_tools import AUTO, Terms, check_starts, sweep
 from .gradients.multistart import MOST_ITERATIONS
 from .preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
 
@@ -61,7 +61,7 @@ class Decide(GradientSolver):
         For no choice, a preference that is stated wrongly, and settings out of their ranges.
     """
 
-    starts: int | str = AUTO  # type: ignore[assignment]
+    starts: int | str = AUTO
     choices: Mapping[str, Any] = field(default_factory=dict)
     sweep: int = 0
     known: str | None = None
@@ -70,8 +70,7 @@ class Decide(GradientSolver):
     MESHES: ClassVar[tuple[str, ...]] = ("fixed", "mended")
 
     def __post_init__(self) -> None:
-        if self.starts != AUTO:
-            check_count("Decide: starts", self.starts, 1)
+        check_starts("Decide: starts", self.starts)
         check_choice("Decide: mesh", self.mesh, self.MESHES)
         if self.sweep != 0:
             check_count("Decide: sweep", self.sweep, 2)

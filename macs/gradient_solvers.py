@@ -19,7 +19,7 @@ from .evaluation.evaluator import CONVERGED, Evaluator
 from .front import Front
 from .fronts.builders import nearest_violation
 from .fronts.verified import VERIFY
-from .gradient_tools import optimize, payoff, sweep
+from .gradient_tools import AUTO, check_starts, optimize, payoff, sweep
 from .gradients.targets import METHODS, check_points
 from .solvers.solver import Solver
 from .solvers.start import check_run, drawing
@@ -36,8 +36,8 @@ class GradientSolver(Solver):
 
     Parameters
     ----------
-    starts : int
-        Number of starts of each solve.
+    starts : int or "auto"
+        Number of starts of each solve; "auto": as many as pay, see `macs.optimize`.
     mesh : "fixed", "mended", "adaptive" or "density"
         What follows on a transcription that is given: nothing; points that a simulation does not confirm are solved again
         (`Front.mended`); each point gets a mesh of its own (`Front.refine_mesh`); or as many elements, where trajectories need them
@@ -49,12 +49,12 @@ class GradientSolver(Solver):
         Where a setting is out of its range.
     """
 
-    starts: int = 1
+    starts: int | str = AUTO
     mesh: str = "fixed"
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        check_count(f"{name}: starts", self.starts, 1)
+        check_starts(f"{name}: starts", self.starts)
         check_choice(f"{name}: mesh", self.mesh, MESHES)
 
     def check_vector(self, problem: CompiledVectorProblem) -> None:

@@ -218,6 +218,14 @@ def meshes_to_begin_on(problem: Problem | CompiledProblem, compiled: CompiledPro
     return coarse
 
 
+def check_starts(name: str, starts: int | str) -> None:
+    """Raise ValueError unless it is a number of starts or "auto"."""
+    if isinstance(starts, str) and starts != AUTO:
+        raise ValueError(f"{name} must be a whole number or {AUTO!r}, not {starts!r}")
+    if starts != AUTO:
+        check_count(name, starts, 1)
+
+
 @dataclass(frozen=True)
 class Terms:
     """The arguments that all gradient tools have; see `optimize`."""
@@ -233,8 +241,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
-        if self.starts != AUTO:
-            check_count("starts", self.starts, 1)
+        check_starts("starts", self.starts)
         check_count("max_iterations", self.max_iterations, 1)
         check_verify(self.verify)
 

@@ -44,7 +44,7 @@ def test_the_same_again_and_again_is_enough():
 def test_many_optima_need_twice_as_many_starts_as_the_best():
     improving = census_of([float(-k) for k in range(MOST - 1)])
     assert not improving.enough and census_of([float(-k) for k in range(MOST)]).enough
-    early = census_of([-1e9, *map(float, range(MANY - 2))])
+    early = census_of([-100.0, *map(float, range(MANY - 2))])
     assert not early.enough
     early.add(-3.0)
     assert early.enough and early.optima() == MANY
@@ -66,7 +66,7 @@ def test_counts_of_a_census(losses, noise):
 
 
 def test_starts_are_near_the_best_or_anywhere():
-    nlp = load("goddard").default_transcription.transcribe(load("goddard").compile())
+    nlp = DFET(6, 4).transcribe(load("goddard"))
     starts, best = Starts(nlp, np.random.default_rng(0)), nlp.first_guess(nlp.lower[nlp.free][None] + 0.5 * nlp.span[nlp.free])[0]
     drawn = np.array([starts.draw(best) for _ in range(FIRST + 40)])
     free = (drawn - best)[:, nlp.free] / nlp.span[nlp.free]
@@ -111,5 +111,5 @@ def test_a_front_to_start_from_is_never_made_worse():
 def test_a_sweep_with_one_start_and_with_as_many_as_pay_agree_where_there_is_one_valley():
     goddard = load("goddard")
     one, many = (sweep(goddard, points=5, starts=starts) for starts in (1, "auto"))
-    assert many.F == pytest.approx(one.F, rel=1e-6, abs=1e-6)
+    assert np.abs(many.F - one.F).max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6 * np.ptp(one.F[:, 0]))
     assert set(many.stats["optima"].values()) == {1} and "starts" in one.solver["settings"]
