@@ -168,8 +168,9 @@ class MultistartSolver:
             # Where none has converged yet, they may all take long.
             with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
                 found = self.from_drawn(reference, weights, best=best if census.converged else None)
-            census.add(self.loss(found, reference, weights))
-            best = self.better([best, found], reference, weights)
+            # One that is hardly better is the same optimum: that of the first start is as good.
+            if census.add(self.loss(found, reference, weights)) or (not census.converged and found.violation < best.violation):
+                best = found
         return best
 
     def loss(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> float | None:
@@ -339,7 +340,7 @@ class MultistartSolver:
         return found
 
     def clearly_better(self, one: Solved, other: Solved, reference: np.ndarray, weights: np.ndarray) -> bool:
-        """Whether a result is better than another one of the same problem by more than the accuracy of solves."""
+        """Whether a result of a problem whose weights are ranges is better than another one by more than the accuracy of solves."""
         alpha, known = self.loss(one, reference, weights), self.loss(other, reference, weights)
         return alpha is not None and (known is None or alpha < known - BETTER)
 

@@ -17,13 +17,13 @@ from transcription.base import NLP
 from transcription.smooth import Smooth
 
 KINDS: tuple[tuple[Smooth | None, bool], ...] = (
+    (None, True),
     (Smooth(spread=0.4, length=3.0), True),
     (Smooth(spread=0.3), True),
-    (None, True),
     (Smooth(spread=0.3), False),
 )
-"""How controls are drawn, None evenly and each value by itself, and whether states are propagated from them: almost constant, smooth,
-noise; and smooth with the states of the guess, from which a solve also finds what nothing that is propagated comes near to."""
+"""How controls are drawn, None evenly and each value by itself, and whether states are propagated from them: noise, almost constant,
+smooth; and smooth with the states of the guess, from which a solve also finds what nothing that is propagated comes near to."""
 SPREADS, LENGTHS = (0.02, 0.5), (0.05, 2.0)
 """Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known; see `Smooth`."""
 HOPELESS = 100.0
