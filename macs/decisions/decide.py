@@ -55,7 +55,7 @@ def decide(
         Points of the problem to begin at. Default: those of the payoff table.
     starts : int or "auto"
         Number of starts: the best-ranked points of `start`, the problem's guess, then random ones. "auto": the three best points of a
-        `start` that is given; else all of the payoff table, and the guess if there is one.
+        `start` that is given; else all of the payoff table, and the guess if there is one. That table is found from as many starts.
     seed, tolerance, verify, max_iterations, time_limit, progress
         As for `optimize`.
 

@@ -121,6 +121,7 @@ class Desk:
         ends = payoff(
             self._statement,
             self._transcription,
+            starts=terms.starts,
             seed=self._seed,
             tolerance=terms.tolerance,
             verify=terms.verify,

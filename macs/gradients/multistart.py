@@ -351,8 +351,14 @@ class MultistartSolver:
     def from_drawn(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, best: Solved | None = None
     ) -> Solved:
-        """The result of a solve from a start that is drawn; `best` is the best result so far."""
-        return self.from_vector(self._starts.draw(None if best is None else best.z), reference, weights, ceiling)
+        """The result of a solve from a start that is drawn; `best` is the best result so far. Where there is none, and propagated states
+        lead to no optimum, also from the states of the guess."""
+        found: list[Solved] = []
+        for start in self._starts.draw(None if best is None else best.z):
+            found.append(self.from_vector(start, reference, weights, ceiling))
+            if found[-1].status == CONVERGED or best is not None:
+                break
+        return self.better(found, reference, weights)
 
 
 def single_task(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:

@@ -53,7 +53,13 @@ class Starts:
         self._nlp, self._rng, self._drawn = nlp, rng, 0
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
-        """The next start, a full vector (n,); `best` (n,) is the best that is known."""
+        """The next start, a full vector; `best` (n,) is the best that is known.
+
+        Returns
+        -------
+        array (1 or 2, n)
+            The start and, if its states were propagated, the same controls with the states of the guess.
+        """
         nlp, rng = self._nlp, self._rng
         drawn, self._drawn = self._drawn, self._drawn + 1
         near = drawn >= FIRST and drawn % 2
@@ -63,16 +69,16 @@ class Starts:
             spread, length = (float(np.exp(rng.uniform(*np.log(limits)))) for limits in (SPREADS, LENGTHS))
             moved = best.copy()
             moved[nlp.free] = Smooth(spread, length).shaped(nlp, candidates, best[nlp.free])[0]
-            return self._propagated(moved)
+            return self._propagated(moved)[:1]
         shape, propagate = KINDS[(drawn if drawn < FIRST else drawn // 2) % len(KINDS)]
         guessed = nlp.first_guess(candidates if shape is None else shape.shaped(nlp, candidates))[0]
-        return self._propagated(guessed) if propagate else guessed
+        return self._propagated(guessed) if propagate else guessed[None]
 
     def _propagated(self, z: np.ndarray) -> np.ndarray:
-        """The vector with propagated states, or as it is where these are absurd."""
+        """The vector with propagated states, unless these are absurd, and as it is."""
         states = self._nlp.propagate(z[None])
         usable = np.isfinite(states).all() and self._nlp.evaluate(states)[1][0] <= HOPELESS
-        return states[0] if usable else z
+        return np.vstack([states, z]) if usable else z[None]
 
 
 class Census:
