@@ -31,7 +31,7 @@ def along(solver: MultistartSolver, tasks: Sequence[Task]) -> list[Solved]:
             found[k] = solver.better([found[k], solver.from_vector(found[k + 1].z, *tasks[k])], *tasks[k])
     _from_rivals(solver, tasks, found)
     if solver.starts is None:
-        limit = solver.counts.work + max(LITTLE, solver.counts.work - before)
+        limit = min(solver.counts.work + max(LITTLE, solver.counts.work - before), solver.most_work)
         while _elsewhere(solver, tasks, found, limit):
             _from_rivals(solver, tasks, found)
     return found

@@ -117,6 +117,8 @@ class MultistartSolver:
     solves : GradientSolves
     counts : Counts
         Gradient solves, iterations, failures by status.
+    most_work : float
+        Work, see `Counts`, after which no more starts are drawn than each problem needs; at first, there is no such limit.
     census : dict of int to Census
         What the starts for each single objective have found; those in it are not sought again.
     """
@@ -131,7 +133,7 @@ class MultistartSolver:
     ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
         self.solves, self._starts = solves, Starts(nlp, rng)
-        self.rng, self.census = rng, dict[int, Census]()
+        self.rng, self.census, self.most_work = rng, dict[int, Census](), np.inf
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -157,12 +159,12 @@ class MultistartSolver:
             found.append(self.from_drawn(reference, weights, ceiling))
         return self.better(found, reference, weights)
 
-    def seek(self, reference: np.ndarray, weights: np.ndarray, census: Census, most: float = np.inf) -> Solved:
+    def seek(self, reference: np.ndarray, weights: np.ndarray, census: Census) -> Solved:
         """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or several times what
-        the first one took, or `most` work."""
+        the first one took."""
         before = self.counts.work
         best = self.solve(reference, weights)
-        limit = self.counts.work + min(max(LITTLE, SHARE * (self.counts.work - before)), most)
+        limit = min(self.counts.work + max(LITTLE, SHARE * (self.counts.work - before)), self.most_work)
         census.add(self.loss(best, reference, weights))
         while not (census.enough or self.counts.work >= limit or stopping()):
             # Where none has converged yet, they may all take long.

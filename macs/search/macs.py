@@ -45,6 +45,8 @@ log = logging.getLogger(__name__)
 
 HOPELESS = 30
 """Candidates without a feasible point nearby after which a search that has none at all ends."""
+FIRST = 10
+"""Most points of the front that gradient solves find before the search begins."""
 ITERATIONS = 50
 """Of a gradient solve, about: they are measured once it was made."""
 
@@ -105,7 +107,7 @@ class MACS(Settings, Solver):
         remember(state, [seen], self, evaluator)
         wanted = self.refines and (evaluator.ways or not len(state.archive))
         if wanted and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
-            optima = gradient_action.first_optima(seen, start, evaluator, rng)
+            optima = gradient_action.first_optima(seen, start, evaluator, rng, min(self.archive, FIRST), budget)
             remember(state, [optima], self, evaluator)
             state.optima = optima.F[optima.status == CONVERGED]
             seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
