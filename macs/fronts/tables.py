@@ -140,7 +140,7 @@ def _footer(front: Points) -> list[str]:
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
-    if front.stats["fallbacks"]:
+    if front.stats["fallbacks"] and not front.stats.get("ways"):
         lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
     if ways := front.stats.get("ways"):
         shown = ", ".join(f"{counted(one['evaluations'], 'candidate')} by {name}" for name, one in ways.items() if one["evaluations"])

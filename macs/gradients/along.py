@@ -31,7 +31,7 @@ def along(solver: MultistartSolver, tasks: Sequence[Task]) -> list[Solved]:
             found[k] = solver.better([found[k], solver.from_vector(found[k + 1].z, *tasks[k])], *tasks[k])
     _from_rivals(solver, tasks, found)
     if solver.starts is None:
-        limit = min(solver.counts.work + max(LITTLE, solver.counts.work - before), solver.most_work)
+        limit = solver.counts.work + max(LITTLE, solver.counts.work - before)
         while _elsewhere(solver, tasks, found, limit):
             _from_rivals(solver, tasks, found)
     return found
@@ -52,7 +52,7 @@ def _elsewhere(solver: MultistartSolver, tasks: Sequence[Task], found: list[Solv
     """Solve each task from another start; returns whether that replaced a result."""
     replaced = False
     for k, task in enumerate(tasks):
-        if solver.counts.work >= limit or stopping():
+        if solver.drawn_enough or solver.counts.work >= limit or stopping():
             return False
         with solver.solves.at_most(SHORT):
             other = solver.from_drawn(*task, best=found[k] if found[k].status == CONVERGED else None)

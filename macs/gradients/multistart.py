@@ -15,7 +15,7 @@ from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from .starts import Census, Starts
+from .starts import UNSEEN, Census, Starts
 
 LIMIT, BETTER = 1e-8, 1e-7
 """Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
@@ -117,8 +117,10 @@ class MultistartSolver:
     solves : GradientSolves
     counts : Counts
         Gradient solves, iterations, failures by status.
-    most_work : float
-        Work, see `Counts`, after which no more starts are drawn than each problem needs; at first, there is no such limit.
+    most : float
+        Number of starts that may be drawn in all before each problem gets no more than it needs; at first, there is no such limit.
+    unseen : float
+        Probability that another start would find another optimum below which there are enough, see `Census`.
     census : dict of int to Census
         What the starts for each single objective have found; those in it are not sought again.
     """
@@ -133,7 +135,7 @@ class MultistartSolver:
     ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
         self.solves, self._starts = solves, Starts(nlp, rng)
-        self.rng, self.census, self.most_work = rng, dict[int, Census](), np.inf
+        self.rng, self.census, self.most, self.unseen = rng, dict[int, Census](), np.inf, UNSEEN
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -145,6 +147,11 @@ class MultistartSolver:
     def counts(self) -> Counts:
         """Gradient solves, iterations, failures by status."""
         return self.solves.counts
+
+    @property
+    def drawn_enough(self) -> bool:
+        """Whether as many starts were drawn as may be."""
+        return self._starts.drawn >= self.most
 
     def solve(
         self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
@@ -164,9 +171,9 @@ class MultistartSolver:
         the first one took."""
         before = self.counts.work
         best = self.solve(reference, weights)
-        limit = min(self.counts.work + max(LITTLE, SHARE * (self.counts.work - before)), self.most_work)
+        limit = self.counts.work + max(LITTLE, SHARE * (self.counts.work - before))
         census.add(self.loss(best, reference, weights))
-        while not (census.enough or self.counts.work >= limit or stopping()):
+        while not (census.enough or self.drawn_enough or self.counts.work >= limit or stopping()):
             # Where none has converged yet, they may all take long.
             with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
                 found = self.from_drawn(reference, weights, best=best if census.converged else None)
@@ -195,7 +202,7 @@ class MultistartSolver:
         objective within tight limits, also from what was given."""
         task = single_task(i, len(self.nlp.problem.goals))
         if self.starts is None and i not in self.census:
-            self.census[i] = Census()
+            self.census[i] = Census(self.unseen)
             solved = self.seek(*task, self.census[i])
         else:
             solved = self.solve(*task)

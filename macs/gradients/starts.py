@@ -47,10 +47,15 @@ class Starts:
     ----------
     nlp : NLP
     rng : numpy.random.Generator
+
+    Attributes
+    ----------
+    drawn : int
+        Number of starts so far.
     """
 
     def __init__(self, nlp: NLP, rng: np.random.Generator) -> None:
-        self._nlp, self._rng, self._drawn = nlp, rng, 0
+        self._nlp, self._rng, self.drawn = nlp, rng, 0
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
         """The next start, a full vector; `best` (n,) is the best that is known.
@@ -61,7 +66,7 @@ class Starts:
             The start and, if its states were propagated, the same controls with the states of the guess.
         """
         nlp, rng = self._nlp, self._rng
-        drawn, self._drawn = self._drawn, self._drawn + 1
+        drawn, self.drawn = self.drawn, self.drawn + 1
         near = drawn >= FIRST and drawn % 2
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         candidates = (lower + rng.random(len(lower)) * span)[None]
@@ -82,12 +87,23 @@ class Starts:
 
 
 class Census:
-    """What solves of one problem from different starts have found: how many optima, and how often the best."""
+    """What solves of one problem from different starts have found: how many optima, and how often the best.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    unseen : float
+        Probability that another start would find another optimum below which there are enough.
+
+    Attributes
+    ----------
+    starts : int
+        Number of solves.
+    """
+
+    def __init__(self, unseen: float = UNSEEN) -> None:
         self._losses: list[float] = []
         self.starts = 0
-        self._last = 0
+        self._last, self._unseen = 0, unseen
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
@@ -122,7 +138,7 @@ class Census:
         found, optima = self.converged, self.optima()
         if not found:
             return self.starts >= FEWEST
-        if found > optima and optima * (optima + 1) < UNSEEN * found * (found - 1):
+        if found > optima and optima * (optima + 1) < self._unseen * found * (found - 1):
             return True
         return self.starts >= min(max(MANY, LAST * self._last), MOST)
 

@@ -17,12 +17,12 @@ from .state import SearchState
 
 FORGET = 0.1
 """Part of what was brought, and of the work for it, that is forgotten with each batch."""
-FIRST = 1
-"""The way of the first population."""
 CHEAP = 0.1
 """Least share of all evaluations of a way that takes less work than that which most proposals go to."""
 DEAR, LEAST = 0.15, 0.03
 """Share of all work, with the gradient solves to come, of the ways that take more; least share of each."""
+MAKING = 300
+"""Iterations of IPOPT that take about as long as to build the functions of a way: it is first tried when its share is worth as much."""
 BROUGHT, FOR, WORK, EVALUATIONS = range(4)
 """Columns of the effort of each way, the last of which are the gradient solves: what it brought, for which work, older ones count less;
 all work; all evaluations, or solves."""
@@ -43,7 +43,7 @@ def begun(effort: np.ndarray) -> np.ndarray:
     return effort
 
 
-def ways_of(effort: np.ndarray, count: int, every: int | None) -> np.ndarray:
+def ways_of(effort: np.ndarray, count: int, every: int | None, making: float = 0.0) -> np.ndarray:
     """The way (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient solves
     do, one of which is made for `every` evaluations in the end; or ways that have not had their shares."""
     ways, rate = effort[:-1], effort[:, BROUGHT] / np.maximum(effort[:, FOR], 1.0)
@@ -62,7 +62,7 @@ def ways_of(effort: np.ndarray, count: int, every: int | None) -> np.ndarray:
     for way, share in zip(dear.tolist(), shares.tolist(), strict=True):
         left = share * (effort[:, WORK].sum() + ahead) - ways[way, WORK]
         each = ways[way, WORK] / max(ways[way, EVALUATIONS], 1.0)
-        some = min(free, max(int(left / each), 0) if each else 1)
+        some = min(free, max(int(left / each), 0) if each else int(left >= making))
         chosen[free - some : free] = way
         free -= some
     return chosen
@@ -104,7 +104,7 @@ def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Ga
     """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought."""
     if not evaluator.ways:
         return evaluator.evaluate(Z)
-    chosen, parts = ways_of(state.effort, len(Z), every), []
+    chosen, parts = ways_of(state.effort, len(Z), every, MAKING * Z.shape[1]), []
     for way in np.unique(chosen).tolist():
         before = evaluator.counts.work
         parts.append(evaluator.evaluate(Z[chosen == way], way))
@@ -115,22 +115,6 @@ def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Ga
     for part in parts[1:]:
         whole = whole.joined(part)
     return whole if len(parts) == 1 else whole.take(order)
-
-
-def opened(evaluator: Evaluator, Z: np.ndarray, budget: int) -> Evaluation:
-    """The first population, of full vectors (k, D). Where there are several ways, it is made feasible with more effort than what follows,
-    since which valleys are searched begins here: by Newton's method, and what that leaves infeasible by the last way, as far as the budget
-    goes."""
-    if not evaluator.ways:
-        return evaluator.evaluate(Z)
-    seen = evaluator.evaluate(Z, FIRST)
-    rest = np.flatnonzero(~(seen.violation <= evaluator.tolerance))[: max(0, budget - evaluator.counts.evaluations)]
-    if not len(rest):
-        return seen
-    better = evaluator.evaluate(Z[rest], len(evaluator.ways) - 1)
-    rows = np.arange(len(seen.F))
-    rows[rest] = len(seen.F) + np.arange(len(better.F))
-    return seen.joined(better).take(rows)
 
 
 def spent(effort: np.ndarray, ways: Sequence[str]) -> dict[str, dict[str, int]]:

@@ -9,11 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..evaluation.bilevel import Bilevel
-from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
-from ..gradients.along import along
-from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
-from ..gradients.targets import METHODS, targets
+from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.archive import Guide
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
@@ -23,53 +19,9 @@ FLAT = 0.05
 """Least component of a direction in the weights: a smaller one would leave its objective without control."""
 
 
-OPENING = 0.5
-"""Most work of the starts with which a search begins, as a part of what its budget would take if all were made feasible as the first
-candidates were."""
-
-
 def allowed(evaluations: int, every: int, solves: int) -> int:
     """Number of gradient solves that a search may make now: one for every `every` evaluations, less the `solves` already made."""
     return max(evaluations // every - solves, 0)
-
-
-def first_optima(
-    seen: Evaluation, given: np.ndarray | None, evaluator: Bilevel, rng: np.random.Generator, points: int, budget: int
-) -> Evaluation:
-    """The ends of the front, and a compromise of them, for a search that begins with nothing feasible; where the search chooses the way of
-    its proposals, so many points along the front, each from as many starts as pay. Fewer if asked to end early, or where none was found.
-
-    They are sought from the best of the vectors (k, D) that were given, with which `seen` begins; where none were, from the problem's
-    guess, as gradient tools seek them; without one, from the candidate that misses least.
-    """
-    known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
-    violation = np.where(known, seen.violation, np.inf)
-    start = guessed_start(evaluator.nlp)
-    if given is not None and known[: len(given)].any():
-        start = given[[np.argmin(violation[: len(given)])]]
-    elif start is None and known.any():
-        start = seen.Z[[np.argmin(violation)]]
-    if start is None:
-        return seen.take(np.flatnonzero(known))
-    solves = GradientSolves(evaluator.tolerance)
-    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
-    solver = MultistartSolver(evaluator.nlp, start, None if evaluator.ways else 1, rng, solves)
-    spent, done = evaluator.counts.work, max(evaluator.counts.evaluations, 1)
-    solver.most_work = spent + OPENING * spent * budget / done
-    found = solver.ends()
-    if 1 < len(found) == sum(one.status == CONVERGED for one in found):
-        F = np.array([one.F for one in found])
-        if evaluator.ways:
-            found += along(solver, targets(F, ranges(F), max(points, len(F) + 1), METHODS[0]))
-        else:
-            found.append(solver.solve(F.min(axis=0), ranges(F)))
-    good = [one for one in found if one.violation <= evaluator.tolerance]
-    return Evaluation(
-        Z=np.array([one.z for one in good]).reshape(-1, seen.Z.shape[1]),
-        F=np.array([one.F for one in good]).reshape(-1, seen.F.shape[1]),
-        violation=np.array([one.violation for one in good]),
-        status=np.array([one.status for one in good], dtype="<U10"),
-    )
 
 
 def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:

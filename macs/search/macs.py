@@ -15,9 +15,7 @@ from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.base import Transcription
 from transcription.catalogue import parse
 from transcription.meshed import Meshed
-from transcription.stopping import stopping
 
-from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
@@ -33,9 +31,10 @@ from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
-from .effort import Gains, begun, credited, no_effort, opened, spent
+from .effort import Gains, begun, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
+from .opening import Opening
 from .settings import Settings
 from .social import assign, social_actions
 from .state import SearchState, agents_at, remember
@@ -45,8 +44,6 @@ log = logging.getLogger(__name__)
 
 HOPELESS = 30
 """Candidates without a feasible point nearby after which a search that has none at all ends."""
-FIRST = 10
-"""Most points of the front that gradient solves find before the search begins."""
 ITERATIONS = 50
 """Of a gradient solve, about: they are measured once it was made."""
 
@@ -85,7 +82,9 @@ class MACS(Settings, Solver):
             batches.append(evaluator.first_guess(evaluator.opening(box.to_values(box.sample(missing, rng)))))
         Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
         Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
-        seen = opened(evaluator, Z, budget)
+        gradients = self.refines and evaluator.has_gradients
+        opening = Opening(evaluator, Z, 0 if start is None else len(start), gradients, self.archive, budget, rng)
+        seen = opening.population.joined(opening.optima)
         m = seen.F.shape[1]
         self.check_objectives(m)
         guide = self._checked_guide(evaluator)
@@ -98,19 +97,14 @@ class MACS(Settings, Solver):
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
             credit=no_credit(),
-            effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1] if self.refines and evaluator.has_gradients else 0),
+            effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1] if gradients else 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
-            optima=np.empty((0, m)),
+            optima=opening.optima.F[opening.optima.status == CONVERGED],
             rng=rng,
         )
-        remember(state, [seen], self, evaluator)
-        wanted = self.refines and (evaluator.ways or not len(state.archive))
-        if wanted and not stopping() and isinstance(evaluator, Bilevel) and evaluator.has_gradients:
-            optima = gradient_action.first_optima(seen, start, evaluator, rng, min(self.archive, FIRST), budget)
-            remember(state, [optima], self, evaluator)
-            state.optima = optima.F[optima.status == CONVERGED]
-            seen, Z = seen.joined(optima), np.vstack([Z, optima.Z])
+        remember(state, [*opening.evaluations, opening.optima], self, evaluator)
+        Z = np.vstack([Z, opening.optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
         assign(state, self, guide)

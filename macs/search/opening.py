@@ -1,0 +1,130 @@
+"""How a search begins: its first population and, with gradients, the ends of the front and points between them.
+
+Where the search chooses the way of its proposals, the first population is only propagated: gradient solves from as many starts as pay find
+more for their work. If neither finds anything feasible, the population is projected, as far as the budget goes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from transcription.stopping import stopping
+
+from ..evaluation.bilevel import Bilevel
+from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
+from ..gradients.along import along
+from ..gradients.multistart import SHORT, GradientSolves, MultistartSolver, guessed_start, single_task
+from ..gradients.targets import METHODS, targets
+from ..pareto.ranges import ranges
+
+QUICK = 1
+"""The way that projects a first population; what it leaves infeasible goes to the last one."""
+FIRST = 10
+"""Most points of the front that gradient solves find before the search begins."""
+UNSEEN, EVERY = 0.05, 20
+"""Probability that another start would find another optimum below which there are enough; and the number of evaluations of the budget for
+each of which one start may be drawn."""
+
+
+class Opening:
+    """The points with which a search begins.
+
+    Parameters
+    ----------
+    evaluator : Evaluator
+    Z : array (k, D)
+        The first population.
+    given : int
+        How many of these, the first ones, the user gave.
+    gradients : bool
+        Whether to find points of the front by gradient solves.
+    points : int
+        Most points in the archive.
+    budget : int
+        Evaluations, those of the first population included.
+    rng : numpy.random.Generator
+
+    Attributes
+    ----------
+    population : Evaluation
+        Of the first population, each point by what made it feasible, or came last.
+    evaluations : list of Evaluation
+        All evaluations of that population, one after the other.
+    optima : Evaluation
+        What gradient solves found.
+    """
+
+    def __init__(
+        self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: np.random.Generator
+    ) -> None:
+        self._evaluator, self._given, self._budget, self._rng = evaluator, given, budget, rng
+        self._points = min(points, FIRST)
+        self.population = evaluator.evaluate(Z, 0 if evaluator.ways else None)
+        self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
+        solver = self._solver() if gradients and (evaluator.ways or not self._feasible.any()) else None
+        if evaluator.ways and not (gradients and (self._feasible.any() or self._solvable(solver))):
+            self._project(Z)
+            solver = self._solver() if gradients else None
+        if solver is not None and not stopping():
+            self.optima = self._found(solver)
+
+    @property
+    def _feasible(self) -> np.ndarray:
+        return self.population.violation <= self._evaluator.tolerance
+
+    def _project(self, Z: np.ndarray) -> None:
+        """Make the population feasible by projections: quick ones, and for what these leave, as far as the budget goes, those by IPOPT."""
+        for way in (QUICK, len(self._evaluator.ways) - 1):
+            rest = np.flatnonzero(~self._feasible)[: max(0, self._budget - self._evaluator.counts.evaluations)]
+            if not len(rest):
+                return
+            found = self._evaluator.evaluate(Z[rest], way)
+            rows = np.arange(len(Z))
+            rows[rest] = len(Z) + np.arange(len(found.F))
+            self.population = self.population.joined(found).take(rows)
+            self.evaluations.append(found)
+
+    def _solver(self) -> MultistartSolver | None:
+        """Solver that begins at the best of the vectors that were given; where none were, at the problem's guess, as gradient tools do;
+        without one, at the candidate that misses least. None if that is no number."""
+        assert isinstance(self._evaluator, Bilevel)
+        seen, given = self.population, slice(self._given)
+        known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
+        violation = np.where(known, seen.violation, np.inf)
+        start = guessed_start(self._evaluator.nlp)
+        if known[given].any():
+            start = seen.Z[[np.argmin(violation[given])]]
+        elif start is None and known.any():
+            start = seen.Z[[np.argmin(violation)]]
+        if start is None:
+            return None
+        solves = GradientSolves(self._evaluator.tolerance)
+        solves.before, solves.counts = self._evaluator.before_batch, self._evaluator.counts
+        solver = MultistartSolver(self._evaluator.nlp, start, None if self._evaluator.ways else 1, self._rng, solves)
+        solver.unseen, solver.most = UNSEEN, self._budget // EVERY
+        return solver
+
+    def _solvable(self, solver: MultistartSolver | None) -> bool:
+        """Whether a gradient solve for the first objective ends at an optimum."""
+        if solver is None:
+            return False
+        with solver.solves.at_most(SHORT):
+            return solver.solve(*single_task(0, len(self._evaluator.goals))).status == CONVERGED
+
+    def _found(self, solver: MultistartSolver) -> Evaluation:
+        """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
+        many starts as pay. Fewer if asked to end early, or where none was found."""
+        found = solver.ends()
+        if 1 < len(found) == sum(one.status == CONVERGED for one in found):
+            F = np.array([one.F for one in found])
+            if self._evaluator.ways:
+                found += along(solver, targets(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
+            else:
+                found.append(solver.solve(F.min(axis=0), ranges(F)))
+        good = [one for one in found if one.violation <= self._evaluator.tolerance]
+        return Evaluation(
+            Z=np.array([one.z for one in good]).reshape(-1, self.population.Z.shape[1]),
+            F=np.array([one.F for one in good]).reshape(-1, self.population.F.shape[1]),
+            violation=np.array([one.violation for one in good]),
+            status=np.array([one.status for one in good], dtype="<U10"),
+        )
