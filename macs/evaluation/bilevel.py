@@ -75,7 +75,7 @@ class Bilevel(Evaluator):
             found.violation,
             found.status,
             clocked=found.clocked,
-            fallbacks=found.fallbacks + (len(Z) if way is not None and way == len(self.ways) - 1 else 0),
+            fallbacks=found.fallbacks,
             work=round((iterations if found.work is None else found.work) * Z.shape[1]),
             itemise=itemise,
         )

@@ -140,10 +140,11 @@ def _footer(front: Points) -> list[str]:
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
-    if front.stats["fallbacks"] and not front.stats.get("ways"):
+    if front.stats["fallbacks"]:
         lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
-    if ways := front.stats.get("ways"):
-        shown = ", ".join(f"{counted(one['evaluations'], 'candidate')} by {name}" for name, one in ways.items() if one["evaluations"])
+    tried = {name: one["evaluations"] for name, one in front.stats.get("ways", {}).items() if one["evaluations"]}
+    if tried:
+        shown = ", ".join(f"{counted(evaluations, 'candidate')} by {name}" for name, evaluations in tried.items())
         lines.append(f"Made feasible: {shown}.")
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")

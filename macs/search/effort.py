@@ -36,13 +36,6 @@ def no_effort(ways: int, gradients: int) -> np.ndarray:
     return effort
 
 
-def begun(effort: np.ndarray) -> np.ndarray:
-    """The effort when a front has been begun: what was brought before is of another kind."""
-    effort = effort.copy()
-    effort[:-1, [BROUGHT, FOR]] = 0.0
-    return effort
-
-
 def ways_of(effort: np.ndarray, count: int, every: int | None, making: float = 0.0) -> np.ndarray:
     """The way (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient solves
     do, one of which is made for `every` evaluations in the end; or ways that have not had their shares."""
@@ -79,7 +72,7 @@ def credited(effort: np.ndarray, way: int, brought: float, work: int, count: int
 
 class Gains:
     """What points bring to a front: by how much they improve the best values of its directions, on average, each of which counts one from
-    the ideal point to the nadir. As long as there is no front, each feasible point counts one."""
+    the ideal point to the nadir. As long as there is no front, none counts."""
 
     def __init__(self, state: SearchState, tolerance: float) -> None:
         self._directions, self._tolerance = state.directions, tolerance
@@ -90,7 +83,7 @@ class Gains:
         """What these points bring, which then count as known."""
         F = found.F[found.violation <= self._tolerance]
         if self._best is None or not len(F):
-            return float(len(F))
+            return 0.0
         values = np.minimum(self._values(F), self._best)
         brought = float(np.mean(np.minimum(self._best - values, 1.0)))
         self._best = values
@@ -101,8 +94,9 @@ class Gains:
 
 
 def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Gains, every: int | None) -> Evaluation:
-    """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought."""
-    if not evaluator.ways:
+    """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought. As long as
+    nothing is feasible, all are projected."""
+    if not evaluator.ways or not len(state.archive):
         return evaluator.evaluate(Z)
     chosen, parts = ways_of(state.effort, len(Z), every, MAKING * Z.shape[1]), []
     for way in np.unique(chosen).tolist():

@@ -31,7 +31,7 @@ from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
 from .breeding import breed_archive, no_credit
-from .effort import Gains, begun, credited, no_effort, spent
+from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .opening import Opening
@@ -44,6 +44,8 @@ log = logging.getLogger(__name__)
 
 HOPELESS = 30
 """Candidates without a feasible point nearby after which a search that has none at all ends."""
+FEWEST = 60
+"""Gradient solves that a polish may always make if proposals are only propagated where that is best: solves are then what finds points."""
 ITERATIONS = 50
 """Of a gradient solve, about: they are measured once it was made."""
 
@@ -83,7 +85,9 @@ class MACS(Settings, Solver):
         Z = np.vstack(batches)[: budget - evaluator.counts.evaluations]
         Z[:, evaluator.free] = box.confine(Z[:, evaluator.free])
         gradients = self.refines and evaluator.has_gradients
-        opening = Opening(evaluator, Z, 0 if start is None else len(start), gradients, self.archive, budget, rng)
+        opening = Opening(
+            evaluator, Z, 0 if start is None else len(start), gradients, self.archive if self.prefer is None else 0, budget, rng
+        )
         seen = opening.population.joined(opening.optima)
         m = seen.F.shape[1]
         self.check_objectives(m)
@@ -120,13 +124,10 @@ class MACS(Settings, Solver):
         """Do one iteration, of some tens of evaluations; changes `state`. Once the budget is spent it does nothing."""
         if state.evaluations >= budget:
             return
-        empty = not len(state.archive)
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
             remember(state, trials.seen, self, evaluator)
-        if empty and len(state.archive):
-            state.effort = begun(state.effort)
         guide = guide_of(self.prefer, evaluator)
         breed_archive(Trials(self, state, evaluator, budget))
         if self.refines and evaluator.has_gradients:
@@ -152,7 +153,8 @@ class MACS(Settings, Solver):
             return
         if state.polishing is None:
             state.polishing = PolishLog.of(state.archive)
-        solves = CountedSolves(evaluator, state.evaluations // self.polish_every - state.refinements, state.polishing)
+        count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
+        solves = CountedSolves(evaluator, count, state.polishing)
         guide = guide_of(self.prefer, evaluator)
         state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide, state.optima)
         if not solves.stopped:

@@ -1,7 +1,7 @@
 """How a search begins: its first population and, with gradients, the ends of the front and points between them.
 
-Where the search chooses the way of its proposals, the first population is only propagated: gradient solves from as many starts as pay find
-more for their work. If neither finds anything feasible, the population is projected, as far as the budget goes.
+Where the search chooses the way of its proposals, and has gradients, the first population is only propagated: gradient solves from as many
+starts as pay find more for their work. If neither finds anything feasible, the population is projected.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from ..gradients.multistart import SHORT, GradientSolves, MultistartSolver, gues
 from ..gradients.targets import METHODS, targets
 from ..pareto.ranges import ranges
 
-QUICK = 1
-"""The way that projects a first population; what it leaves infeasible goes to the last one."""
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
 UNSEEN, EVERY = 0.05, 20
@@ -59,12 +57,13 @@ class Opening:
     ) -> None:
         self._evaluator, self._given, self._budget, self._rng = evaluator, given, budget, rng
         self._points = min(points, FIRST)
-        self.population = evaluator.evaluate(Z, 0 if evaluator.ways else None)
+        quick = gradients and bool(evaluator.ways)
+        self.population = evaluator.evaluate(Z, 0 if quick else None)
         self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
-        solver = self._solver() if gradients and (evaluator.ways or not self._feasible.any()) else None
-        if evaluator.ways and not (gradients and (self._feasible.any() or self._solvable(solver))):
+        solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
+        if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
             self._project(Z)
-            solver = self._solver() if gradients else None
+            solver = self._solver()
         if solver is not None and not stopping():
             self.optima = self._found(solver)
 
@@ -73,16 +72,12 @@ class Opening:
         return self.population.violation <= self._evaluator.tolerance
 
     def _project(self, Z: np.ndarray) -> None:
-        """Make the population feasible by projections: quick ones, and for what these leave, as far as the budget goes, those by IPOPT."""
-        for way in (QUICK, len(self._evaluator.ways) - 1):
-            rest = np.flatnonzero(~self._feasible)[: max(0, self._budget - self._evaluator.counts.evaluations)]
-            if not len(rest):
-                return
-            found = self._evaluator.evaluate(Z[rest], way)
-            rows = np.arange(len(Z))
-            rows[rest] = len(Z) + np.arange(len(found.F))
-            self.population = self.population.joined(found).take(rows)
-            self.evaluations.append(found)
+        """Make the population feasible by the fixed rule, as far as the budget goes."""
+        found = self._evaluator.evaluate(Z[: max(0, self._budget - self._evaluator.counts.evaluations)])
+        rows = np.arange(len(Z))
+        rows[: len(found.F)] += len(Z)
+        self.population = self.population.joined(found).take(rows)
+        self.evaluations.append(found)
 
     def _solver(self) -> MultistartSolver | None:
         """Solver that begins at the best of the vectors that were given; where none were, at the problem's guess, as gradient tools do;

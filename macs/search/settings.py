@@ -118,9 +118,10 @@ class Settings:
     refine_every : int, default 200
         During the search, one gradient solve of an agent for so many evaluations, at least 1.
     polish_every : int, default 20
-        At most one gradient solve, those during the search included, for so many evaluations, at least 1. A polish needs about six solves
-        for each point of the archive; with more than two objectives, one more for each point that the archive may contain. Not among these
-        are the solves for the ends of the front with which a search begins if none of its first candidates is feasible.
+        At most one gradient solve, those during the search included, for so many evaluations, at least 1; where the search chooses its
+        inner level, `inner="auto"`, a polish may always make 60. It needs about six for each point of the archive; with more than two
+        objectives, one more for each point that the archive may contain. Not among these are the solves for the ends of the front, and
+        points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
     breeding : float, default 0.15
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
         More offspring escape from more local fronts, and leave less of the budget for the agents. 0 in the paper.

@@ -12,7 +12,7 @@ import numpy as np
 from problems import Problem, load
 from transcription import DFET, NLP
 from transcription.base import CONVERGED
-from transcription.inner import Auto
+from transcription.inner import Projection
 
 BATCH = 10
 """Candidates in a batch, as the search sends them: one for each agent."""
@@ -60,7 +60,7 @@ class Case:
         cold = lower + rng.random((BATCH, len(span))) * span
         if not self.warm:
             return cold, None
-        found = Auto().solve(nlp, cold, tolerance=self.tolerance)
+        found = Projection().solve(nlp, cold, tolerance=self.tolerance)
         feasible = found.z[found.status == CONVERGED]
         if not len(feasible):
             raise RuntimeError(f"{self.name}: no feasible point to begin with")

@@ -17,13 +17,13 @@ from macs.io.console import Steps
 from macs.io.text import text_table
 from transcription import NLP
 from transcription.base import CONVERGED
-from transcription.inner import Auto, InnerResult, InnerSolver, Ipopt, Newton, Propagate
+from transcription.inner import InnerResult, InnerSolver, Ipopt, Newton, Projection, Propagate
 from transcription.numerics.compiling import compiler
 
 from .cases import BATCH, INNER, Batch, Case
 from .measured import Column, Row, short, table
 
-BASELINE, PROJECTION, DEFAULT = "ipopt, constant objective", "ipopt, projection", "auto"
+BASELINE, PROJECTION, DEFAULT = "ipopt, constant objective", "ipopt, projection", "projection"
 EXACT = Ipopt()
 EXACT_TOLERANCE = 1e-11
 AT_LEAST = 5e-3
@@ -110,11 +110,11 @@ def _contenders(case: Case, effort: Effort) -> list[Contender]:
     with compiling(when):
         nlp = case.mesh.transcribe(problem)
     solvers: dict[str, InnerSolver] = {BASELINE: Ipopt(objective="constant"), PROJECTION: Ipopt(), "newton": Newton()}
-    solvers |= {DEFAULT: Auto()} | ({"propagate": Propagate()} if case.propagates else {})
+    solvers |= {DEFAULT: Projection()} | ({"propagate": Propagate()} if case.propagates else {})
     contenders = [Contender(Row(case.name, name), solver, nlp, when) for name, solver in solvers.items()]
     if when != "0" and effort.interpreted:
         with compiling("0"):
-            contenders.append(Contender(Row(case.name, f"{DEFAULT}, interpreted"), Auto(), case.mesh.transcribe(problem), "0"))
+            contenders.append(Contender(Row(case.name, f"{DEFAULT}, interpreted"), Projection(), case.mesh.transcribe(problem), "0"))
     return contenders
 
 
@@ -136,7 +136,7 @@ def _ranges(nlp: NLP, tolerance: float) -> np.ndarray:
     """Ranges (m,) of the objectives over feasible points near random candidates."""
     span = nlp.span[nlp.free]
     candidates = nlp.lower[nlp.free] + np.random.default_rng(1).random((RANGES, len(span))) * span
-    found = Auto().solve(nlp, candidates, tolerance=tolerance)
+    found = Projection().solve(nlp, candidates, tolerance=tolerance)
     F = found.F[found.status == CONVERGED]
     ranges = np.ptp(F, axis=0) if len(F) else np.zeros(len(nlp.problem.goals))
     return np.where(ranges > 0, ranges, 1.0)

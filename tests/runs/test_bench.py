@@ -88,11 +88,11 @@ def test_inner_levels_side_by_side():
     assert {case for case, _ in found} == set(COARSE)
     for (case, who), row in found.items():
         assert len(row.values["speed"]) == 1 and row.of("speed") > 0
-        if who == "auto":
+        if who == "projection":
             assert row.of("converged") == 1.0
             assert row.of("fallbacks") == 1.0 if case == "needle, cold" else row.of("fallbacks") <= 0.2
     assert {who for case, who in found if case.startswith("orbit")} >= {"propagate"} and ("goddard, cold", "propagate") not in found
-    assert found["goddard, warm", "auto"].of("off, largest") < 1e-3 < found["goddard, warm", inner.BASELINE].of("off, largest")
+    assert found["goddard, warm", "projection"].of("off, largest") < 1e-3 < found["goddard, warm", inner.BASELINE].of("off, largest")
     text = inner.report(rows)
     for word in ("No function is compiled", "at least 15 times as fast", "moved by at most 0.07", "fall-", "needle, cold"):
         assert word in text

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from macs import MACS
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
-from transcription.inner import Auto, Ipopt, Propagate, inner_solver
+from transcription.inner import Auto, Ipopt, Projection, Propagate, inner_solver
 
 NAMES = ("auto", "propagate", "ipopt", "ipopt-feasibility")
 STATUSES = {"converged", "infeasible", "failed", "timeout"}
@@ -306,7 +306,11 @@ def test_dates_keep_their_digits():
 
 
 def test_inner_solvers_by_name():
-    assert isinstance(inner_solver("auto"), Auto) and isinstance(inner_solver("propagate"), Propagate)
+    assert (
+        isinstance(inner_solver("auto"), Auto)
+        and isinstance(inner_solver("projection"), Projection)
+        and isinstance(inner_solver("propagate"), Propagate)
+    )
     own = Ipopt(max_iterations=5)
     assert inner_solver(own) is own
     for wrong in ("newton", "", None, 3, Propagate, ["auto"]):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from problems import Problem, load
 from transcription import DFET
-from transcription.inner import Auto, Ipopt, Newton, Propagate
+from transcription.inner import Ipopt, Newton, Projection, Propagate
 from transcription.inner.least_distance import least_distance
 from transcription.numerics import batched
 
@@ -90,7 +90,7 @@ def test_warm_solves_agree_with_the_projection():
     assert set(fast.status) == {"converged"} and fast.iterations.mean() < 8
     assert np.abs((fast.F - exact.F) / np.ptp(exact.F, axis=0)).max() < 1e-5
     assert (fast.moved <= 1.001 * exact.moved + 1e-9).all() and fast.moved.mean() < 0.07
-    auto = Auto().solve(nlp, near, W)
+    auto = Projection().solve(nlp, near, W)
     assert auto.fallbacks == 0 and np.array_equal(auto.z, fast.z)
 
 
@@ -98,7 +98,7 @@ def test_cold_solves_agree_with_the_projection():
     """But for the few whose nearest point is not found in time, or has a rival as near."""
     nlp = DFET(4, 6).transcribe(load("goddard"))
     C = candidates(nlp, 30)
-    fast, exact = Auto().solve(nlp, C), Ipopt().solve(nlp, C, tolerance=1e-9)
+    fast, exact = Projection().solve(nlp, C), Ipopt().solve(nlp, C, tolerance=1e-9)
     assert set(fast.status) == {"converged"} and fast.fallbacks <= 3
     off = np.abs((fast.F - exact.F) / np.ptp(exact.F, axis=0)).max(axis=1)
     assert (off < 1e-5).mean() > 0.85 and np.median(off) < 2e-6
@@ -169,7 +169,7 @@ def test_nothing_infeasible_is_called_feasible():
     phase.dynamics(x=u)
     problem.minimize("end", phase.integral(u * x))
     nlp = DFET(2, 2).transcribe(problem)
-    found = Auto().solve(nlp, candidates(nlp, 3))
+    found = Projection().solve(nlp, candidates(nlp, 3))
     assert set(found.status) == {"infeasible"} and found.violation.min() > 0.1 and found.fallbacks == 3
 
 
@@ -181,7 +181,7 @@ def test_an_unstable_flight_falls_back_and_is_right():
     phase.dynamics(x=4 * x + u)
     problem.minimize("effort", phase.integral(u**2))
     nlp = DFET(8, 3).transcribe(problem)
-    found = Auto().solve(nlp, candidates(nlp, 4))
+    found = Projection().solve(nlp, candidates(nlp, 4))
     assert set(found.status) == {"converged"} and nlp.evaluate(found.z)[1].max() <= 1e-6
 
 

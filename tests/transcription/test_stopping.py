@@ -9,7 +9,7 @@ from cases import candidates
 from macs import sweep
 from problems import load
 from transcription import DFET
-from transcription.inner import Auto, Ipopt
+from transcription.inner import Ipopt, Projection
 from transcription.nlp.scalarized import scalarize
 from transcription.stopping import Stopped, check_stopping, stopped_by, stopping
 
@@ -47,13 +47,13 @@ def test_ipopt_leaves_the_rest_of_a_batch():
     assert (part.violation[2:] > 1e-6).all()
     near = np.clip(whole.z[:, nlp.free] + 1e-3, nlp.lower[nlp.free], nlp.upper[nlp.free])
     with stopped_by(lambda: True):
-        cut = Auto().solve(nlp, near, whole.z)
+        cut = Projection().solve(nlp, near, whole.z)
     assert set(cut.status) == {"timeout"} and cut.clocked and set(cut.iterations) == {1} and not cut.fallbacks
 
 
 def test_gradient_solves_end_with_what_they_have():
     nlp = DFET(3, 2).transcribe(load("goddard"))
-    start = Auto().solve(nlp, candidates(nlp, 1)).z[0]
+    start = Projection().solve(nlp, candidates(nlp, 1)).z[0]
     with stopped_by(lambda: True):
         solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
     assert solved.status == "timeout" and solved.clocked and not solved.begun and np.array_equal(solved.z, start)

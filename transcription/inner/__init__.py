@@ -2,7 +2,7 @@
 
 from .base import InnerResult, InnerSolver
 from .ipopt import Ipopt
-from .levels import NAMED, Auto, Divided, Propagate, Whole, inner_solver
+from .levels import NAMED, Auto, Projection, Propagate, Whole, inner_solver
 from .newton import Newton
 
-__all__ = ["NAMED", "Auto", "Divided", "InnerResult", "InnerSolver", "Ipopt", "Newton", "Propagate", "Whole", "inner_solver"]
+__all__ = ["NAMED", "Auto", "InnerResult", "InnerSolver", "Ipopt", "Newton", "Projection", "Propagate", "Whole", "inner_solver"]

@@ -23,7 +23,7 @@ feasible takes no more."""
 
 
 @dataclass(frozen=True)
-class Auto(InnerSolver):
+class Projection(InnerSolver):
     """Newton's method over propagated states, which needs one propagation where these are feasible already; a projection by IPOPT for what
     it leaves infeasible."""
 
@@ -42,10 +42,9 @@ class Auto(InnerSolver):
 
 
 @dataclass(frozen=True)
-class Divided(Auto):
+class Auto(Projection):
     """The same for those who do not choose. MACS divides its effort among propagation, some steps of Newton's method, and a projection by
-    IPOPT, by what each has brought for its work, see `macs.search.effort`: on problems with one valley that takes about half the
-    time, on problems with many valleys the fixed rule finds more of them."""
+    IPOPT, by what each has brought for its work, see `macs.search.effort`."""
 
     @property
     def ways(self) -> tuple[InnerSolver, ...]:
@@ -84,7 +83,7 @@ class Whole(InnerSolver):
 
 NAMED: dict[str, InnerSolver] = {
     "auto": Auto(),
-    "divided": Divided(),
+    "projection": Projection(),
     "propagate": Propagate(),
     "none": Whole(),
     "ipopt": Ipopt(),

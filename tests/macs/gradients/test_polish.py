@@ -23,7 +23,7 @@ from problems import Problem, load
 from problems.cases import goddard, orbit_rise
 from problems.compiled import Objective
 from transcription import DFET
-from transcription.inner import Auto, Newton
+from transcription.inner import Newton, Projection
 from transcription.nlp.optimality import optimality
 from transcription.stopping import stopped_by, stopping
 
@@ -251,7 +251,7 @@ def test_gradient_solves_that_are_stopped_within_a_batch_are_kept() -> None:
     nlp = DFET(3, 2).transcribe(load("goddard"))
 
     def solved(solves: int) -> tuple[Bilevel, Evaluation]:
-        evaluator = Bilevel(nlp, Auto(), 1e-6)
+        evaluator = Bilevel(nlp, Projection(), 1e-6)
         rng = np.random.default_rng(1)
         seen = evaluator.evaluate(evaluator.first_guess(evaluator.lower + rng.random((4, len(nlp.free))) * nlp.span[nlp.free]))
         with stopped_by(after(solves)):

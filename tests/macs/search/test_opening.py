@@ -1,0 +1,112 @@
+"""What a search begins with where none of its first candidates is feasible."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import MACS, payoff
+from macs.evaluation.bilevel import Bilevel
+from macs.gradients.multistart import MultistartSolver
+from macs.search import opening
+from macs.search.state import SearchState
+from problems import Problem, load
+from transcription import Collocation
+from transcription.inner import inner_solver
+from transcription.stopping import stopped_by
+
+METHOD = Collocation(2, 4)
+
+
+def evaluator_of_vectors() -> Bilevel:
+    """Candidates are whole vectors: random states do not obey the dynamics."""
+    inner = inner_solver("none")
+    return Bilevel(inner.program(METHOD.nlp(load("goddard").compile())), inner, 1e-6)
+
+
+def begun(evaluator: Bilevel, **settings) -> SearchState:
+    return MACS(agents=4, **settings).begin(evaluator, 200, np.random.default_rng(0))
+
+
+def test_the_ends_of_the_front_and_a_compromise() -> None:
+    evaluator = evaluator_of_vectors()
+    state = begun(evaluator)
+    ends = payoff(load("goddard"), METHOD, verify=None)
+    np.testing.assert_allclose(np.diag(state.optima[:2]), np.diag(ends.F), rtol=1e-6)
+    assert len(state.optima) == 3 and (state.optima[2] > state.optima[:2].min(axis=0)).all()
+    assert len(state.archive) == 3 and evaluator.counts.gradient_solves >= 5
+
+
+def test_without_gradients_or_time_there_are_none() -> None:
+    assert not len(begun(evaluator_of_vectors(), refine=False).optima)
+    evaluator = evaluator_of_vectors()
+    evaluator.evaluate(evaluator.first_guess(evaluator.lower[None]))  # builds what it needs, which is not begun either
+    with stopped_by(lambda: True):
+        state = begun(evaluator)
+    assert not len(state.optima) and evaluator.counts.gradient_solves == 0
+
+
+def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
+    starts = []
+
+    class Recorded(MultistartSolver):
+        def __init__(self, nlp, given, *rest):
+            starts.append(given)
+            super().__init__(nlp, given, *rest)
+
+    monkeypatch.setattr(opening, "MultistartSolver", Recorded)
+    evaluator = evaluator_of_vectors()
+    rng = np.random.default_rng(3)
+    worse, better = evaluator.box.to_values(rng.random((2, len(evaluator.free))))
+    given = evaluator.first_guess(np.array([worse, better]))
+    given = given[np.argsort(-evaluator.evaluate(given).violation)]
+    MACS(agents=4).begin(evaluator, 200, rng, given)
+    np.testing.assert_array_equal(starts[0], given[1:])
+    monkeypatch.setattr(opening, "guessed_start", lambda nlp: given[:1])
+    MACS(agents=4).begin(evaluator_of_vectors(), 200, rng)
+    np.testing.assert_array_equal(starts[1], given[:1])
+
+
+def projecting(problem: Problem, method) -> Bilevel:
+    """An evaluator whose inner level is chosen during the search."""
+    return Bilevel(method.nlp(problem.compile()), inner_solver("auto"), 1e-6)
+
+
+def walk(least: float = -9.0) -> Problem:
+    """From 0 to 1 and back to rest; propagated controls miss that. `least` is the lowest place, which the first one may violate."""
+    problem = Problem("walk")
+    phase = problem.phase("walk", t0=0.0, tf=(0.5, 3.0))
+    x, v = phase.state("x", bounds=(-10, 10), initial=0, final=1), phase.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = phase.control("u", bounds=(-5, 5))
+    phase.dynamics(x=v, v=u)
+    phase.path("place", x, lower=least)
+    problem.minimize("time", phase.tf)
+    problem.minimize("effort", phase.integral(u**2))
+    return problem
+
+
+def test_where_the_way_is_chosen_solves_find_points_along_the_front() -> None:
+    evaluator = projecting(walk(), METHOD)
+    state = begun(evaluator, archive=6)
+    assert evaluator.counts.evaluations == 6 and evaluator.counts.fallbacks == 0, "candidates were propagated"
+    assert len(state.archive) == 6 and (state.archive.violation <= 1e-6).all()
+    effort = 12 / 3.0**3  # of the way in 3 seconds, on which the control is a straight line
+    assert state.ideal[1] == pytest.approx(effort, rel=1e-4) and len(state.optima) >= 6
+    assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
+
+
+def test_starts_agree_soon_and_are_never_more_than_the_budget_allows() -> None:
+    few, many = (projecting(walk(), METHOD) for _ in range(2))
+    for evaluator, budget in ((few, 20), (many, 10_000)):
+        MACS(agents=4, archive=6).begin(evaluator, budget, np.random.default_rng(0))
+    assert few.counts.gradient_solves < many.counts.gradient_solves < 60
+
+
+def test_what_nothing_makes_feasible_is_projected() -> None:
+    evaluator = projecting(walk(least=0.5), METHOD)
+    state = begun(evaluator)
+    assert not len(state.archive) and not len(state.optima)
+    assert evaluator.counts.evaluations == 20 and evaluator.counts.fallbacks == 10 == state.hopeless
+    few = projecting(walk(least=0.5), METHOD)
+    MACS(agents=4, sample=10).begin(few, 13, np.random.default_rng(0))
+    assert few.counts.evaluations == 13, "as far as the budget goes"
