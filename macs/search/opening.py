@@ -1,7 +1,7 @@
 """How a search begins: its first population and, with gradients, the ends of the front and points between them.
 
-Where the search chooses the way of its proposals, and has gradients, the first population is only propagated: gradient solves from as many
-starts as pay find more for their work. If neither finds anything feasible, the population is projected.
+Where the search chooses the way of its proposals, and has gradients, the first population is only propagated, but for what the user gave:
+gradient solves from as many starts as pay find more for their work. If neither finds anything feasible, the population is projected.
 """
 
 from __future__ import annotations
@@ -57,8 +57,11 @@ class Opening:
     ) -> None:
         self._evaluator, self._given, self._budget, self._rng = evaluator, given, budget, rng
         self._points = min(points, FIRST)
+        gradients = gradients and isinstance(evaluator, Bilevel)
         quick = gradients and bool(evaluator.ways)
-        self.population = evaluator.evaluate(Z, 0 if quick else None)
+        self.population = evaluator.evaluate(Z, 0) if quick and not given else evaluator.evaluate(Z[:given] if quick else Z)
+        if quick and 0 < given < len(Z):
+            self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
         self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:

@@ -187,7 +187,7 @@ def test_a_search_on_shooting_is_polished_on_dfet(capsys):
 
 def test_points_are_simulated_and_those_that_miss_are_told(capsys):
     """That is no failure of `solve`, but `verify` says no."""
-    assert main(["solve", "glide.py:rough", "--mesh", "fixed", "--seed", "1", "--out", "rough.nc"]) == 0
+    assert main(["solve", "glide.py:rough", "--inner", "projection", "--mesh", "fixed", "--seed", "1", "--out", "rough.nc"]) == 0
     out = capsys.readouterr().out
     assert "Not verified: simulated, these differ by more than 0.001." in out and "simulated, its states differ by" in out
     assert "See `macs verify rough.nc --problem glide.py:rough`." in out

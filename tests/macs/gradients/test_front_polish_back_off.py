@@ -40,7 +40,7 @@ def gust() -> Problem:
 
 @pytest.fixture(scope="module")
 def rough() -> Front:
-    return MACS(refine=False).solve(bryson_denham(), SHOOTING, evaluations=400, seed=1)
+    return MACS(refine=False).solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, inner="projection")
 
 
 def share(front: Front) -> np.ndarray:

@@ -299,7 +299,7 @@ def test_what_is_worse_or_failed_is_not_taken() -> None:
     ],
 )
 def test_every_point_is_a_certified_optimum_of_the_mesh(name, mesh, reference, evaluations, worst) -> None:
-    front = MACS(mesh="fixed").solve(load(name), mesh, evaluations=evaluations, seed=3)
+    front = MACS(mesh="fixed").solve(load(name), mesh, evaluations=evaluations, seed=3, inner="projection")
     assert len(front) == 10 and max(point.optimality for point in front) < 1e-6
     assert distance_to_curve(front.objectives, reference()).max() < worst
     assert inverted_distance(front.objectives, reference()) < 0.044
