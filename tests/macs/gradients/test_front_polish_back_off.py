@@ -140,7 +140,7 @@ class TestOfASearch:
 
     def test_it_is_the_polished_front_of_the_search(self, rough):
         solver = MACS(polish_on="dfet:3x3", polish_every=20)
-        found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, verify=VERIFY)
+        found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, inner="projection", verify=VERIFY)
         expected = rough.polished(COARSE, solves=20, limit=10, verify=VERIFY)
         assert np.array_equal(found.F, expected.F) and found.stats["gradient_solves"] == expected.stats["gradient_solves"]
         assert np.array_equal(found.verified, expected.verified) and found.was_simulated.all()
