@@ -12,7 +12,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from .cases import standard
-from .problem import Problem
+from .problem import DEFAULT_EVALUATIONS, Problem
 from .vector_problem import VectorProblem
 
 STANDARD = "standard/"
@@ -111,6 +111,8 @@ def load(name: str, **data: Any) -> Any:
         raise
     if not isinstance(problem, Problem | VectorProblem):
         raise ValueError(f"'{name}' must return a Problem or a VectorProblem, not {type(problem).__name__}")
+    if problem.default_evaluations is None and is_catalogued(name):
+        problem.default_evaluations = DEFAULT_EVALUATIONS
     # A file is found again from another folder.
     problem.address, problem.data = f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name, data
     return problem

@@ -17,7 +17,7 @@ from .phase import Phase
 from .sanity import check_numbers
 
 DEFAULT_EVALUATIONS = 2_000
-"""Candidates that a search evaluates if neither the problem nor its user says how many."""
+"""Default number of evaluations of a case of the catalogue that does not set its own."""
 
 
 class Problem:
@@ -30,9 +30,10 @@ class Problem:
 
     Attributes
     ----------
-    default_transcription, default_evaluations, default_inner, default_start, default_verify : str or None, int, str, str or None, float
+    default_transcription, default_evaluations, default_inner, default_start, default_verify : str or None, int or None, str, str or None, float
         What is used by default; a transcription of None: DFET on a mesh that is found. A case may set its own; a transcription, too, as a
-        table of its method and settings, where phases have meshes of their own.
+        table of its method and settings, where phases have meshes of their own. The number of evaluations is for studies and for searches
+        that need one; MACS searches until it is done. None: it has to be stated there.
 
     Examples
     --------
@@ -50,7 +51,7 @@ class Problem:
         self.address = ""
         self.data: Mapping[str, Any] = {}
         self.default_transcription: str | Mapping[str, Any] | None = None
-        self.default_evaluations = DEFAULT_EVALUATIONS
+        self.default_evaluations: int | None = None
         self.default_inner = "auto"
         self.default_start: str | None = None
         self.default_verify = 1e-3

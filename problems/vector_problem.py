@@ -11,7 +11,6 @@ import numpy as np
 
 from . import checks
 from .compiled import Limit, Objective, Variable
-from .problem import DEFAULT_EVALUATIONS
 from .vector import CompiledVectorProblem
 
 Outputs = Callable[[np.ndarray], Mapping[str, Any]]
@@ -30,9 +29,10 @@ class VectorProblem:
 
     Attributes
     ----------
-    default_evaluations, default_verify : int, float
-        What the command line and studies use by default: rows that a search evaluates, and how much a point of a front may differ, in
-        ranges of the front and in the constraints' scales, when it is evaluated again.
+    default_evaluations, default_verify : int or None, float
+        What studies, and searches that need a number, use by default: rows that a search evaluates (None: it has to be stated there; MACS
+        searches until it is done); and how much a point of a front may differ, in ranges of the front and in the constraints' scales, when
+        it is evaluated again.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class VectorProblem:
         self.name = name
         self.address = ""
         self.data: Mapping[str, Any] = {}
-        self.default_evaluations = DEFAULT_EVALUATIONS
+        self.default_evaluations: int | None = None
         self.default_verify = 1e-6
         self._variables: dict[str, Variable] = {}
         self._objectives: dict[str, Objective] = {}

@@ -35,6 +35,7 @@ from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .opening import Opening
+from .rounds import PLANNED, SOLVES, Rounds, judged, least
 from .settings import Settings
 from .social import assign, social_actions
 from .state import SearchState, agents_at, remember
@@ -114,6 +115,29 @@ class MACS(Settings, Solver):
         assign(state, self, guide)
         return state
 
+    @property
+    def searches_until_done(self) -> bool:
+        """Whether a search needs no number of evaluations."""
+        return True
+
+    def begin_rounds(self, evaluator: Evaluator, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
+        """As `begin`, of a search that ends when it is done; see `rounds`."""
+        state = self.begin(evaluator, min(PLANNED, self.ceiling), rng, start)
+        state.rounds = Rounds.first(len(state.ideal), least(self._polishes(evaluator)), self.ceiling)
+        return state
+
+    def round_end(self, state: SearchState) -> int:
+        """Number of evaluations at which the current round ends."""
+        assert state.rounds is not None
+        return state.rounds.end
+
+    def ended(self, state: SearchState) -> str:
+        """Why a search in rounds is at its end: "done" or "ceiling"; empty as long as it goes on."""
+        return "" if state.rounds is None else state.rounds.stopped
+
+    def _polishes(self, evaluator: Evaluator) -> bool:
+        return self.refines and evaluator.has_gradients
+
     def _checked_guide(self, evaluator: Evaluator) -> Guide | None:
         """The guide by the preference, if there is one, for objectives that are known now."""
         if self.prefer is not None:
@@ -146,19 +170,41 @@ class MACS(Settings, Solver):
         return not len(state.archive) and state.hopeless >= HOPELESS
 
     def conclude(self, state: SearchState, evaluator: Evaluator) -> None:
-        """Polish the archive by gradients, if the problem has them. If asked to end early, the polish continues at the next call."""
+        """Polish the archive by gradients, if the problem has them; of a search in rounds, end the round. If asked to end early, the polish
+        continues at the next call."""
         if objection := self._objection(state, evaluator):
             log.warning("the preference did not guide the search: %s", objection)
-        if not (self.refines and evaluator.has_gradients):
+        if not self._polishes(evaluator):
+            self._end_round(state, evaluator, state.archive.F)
             return
         if state.polishing is None:
             state.polishing = PolishLog.of(state.archive)
+        polishing, optima = state.polishing, state.optima
         count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
-        solves = CountedSolves(evaluator, count, state.polishing)
-        guide = guide_of(self.prefer, evaluator)
-        state.archive = polish(state.polishing.archive, solves, self.archive, self.exponent, guide, state.optima)
+        if state.rounds is not None:
+            count, optima = SOLVES * self.archive, np.vstack([optima, state.rounds.solved])
+        solves = CountedSolves(evaluator, count, polishing)
+        state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator), optima)
         if not solves.stopped:
             state.polishing = None
+            solved = polishing.status == CONVERGED
+            good = solved | (polishing.violation <= evaluator.tolerance)
+            found = np.vstack([polishing.archive.F, polishing.F[good], state.archive.F])
+            self._end_round(state, evaluator, found, polishing.F[solved])
+
+    def _end_round(self, state: SearchState, evaluator: Evaluator, found: np.ndarray, solved: np.ndarray | None = None) -> None:
+        """Compare what a round has found with the front as it was, and begin the next round unless the search is at its end."""
+        if state.rounds is None:
+            return
+        agents, gradients = state.agents, self._polishes(evaluator)
+        feasible = agents.F[agents.violation <= evaluator.tolerance]
+        violation = float(state.closest.violation.min()) if len(state.closest) else np.inf
+        state.rounds = judged(state.rounds, found, feasible, violation, state.directions, state.evaluations, least(gradients), self.ceiling)
+        if solved is not None:
+            state.rounds.solved = np.vstack([state.rounds.solved, solved])
+        if len(state.archive):
+            state.ideal, state.nadir = np.fmin(state.ideal, state.archive.F.min(axis=0)), state.archive.F.max(axis=0)
+        assign(state, self, guide_of(self.prefer, evaluator))
 
     @property
     def mends(self) -> bool:
@@ -210,6 +256,7 @@ class MACS(Settings, Solver):
         archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
         objection = self._objection(state, evaluator)
         found: dict[str, Any] = {"ways": spent(state.effort, evaluator.ways)} if evaluator.ways else {}
+        found |= {} if state.rounds is None else {"rounds": state.rounds.finished}
         return found | ({"prefer": f"not followed: {objection}"} if objection else {})
 
     def _objection(self, state: SearchState, evaluator: Evaluator) -> str:

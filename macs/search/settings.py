@@ -17,7 +17,7 @@ from ..preferences.preference import Preference
 
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
-LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1}
+LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1, "ceiling": 1}
 """Least value of each whole number."""
 INTERVALS = {
     "rho": "(0, 1]",
@@ -132,6 +132,8 @@ class Settings:
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
         with more: on a surface, a low power drives the points to the edges.
 
+    ceiling : int, default 100 000
+        Largest number of evaluations of a search without one of its own (`evaluations=None`), which otherwise ends when it is done.
     prefer : Preference or dict, optional
         What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
         the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
@@ -173,6 +175,7 @@ class Settings:
     breeding: float = 0.15
     sample: int | None = None
     exponent: float | None = None
+    ceiling: int = 100_000
     prefer: Preference | None = None
 
     def __post_init__(self) -> None:

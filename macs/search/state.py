@@ -12,6 +12,7 @@ from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from .guide import guide_of
+from .rounds import Rounds
 from .settings import Settings
 
 NO_DIRECTION = -1
@@ -108,6 +109,8 @@ class SearchState:
         As long as no point was feasible: number of candidates that the inner level left where the violation can get no smaller nearby.
     polishing : PolishLog, optional
         Solves of a polish that has begun and is not finished.
+    rounds : Rounds, optional
+        Of a search without a number of evaluations.
     """
 
     agents: Agents
@@ -126,6 +129,7 @@ class SearchState:
     refinements: int = 0
     hopeless: int = 0
     polishing: PolishLog | None = None
+    rounds: Rounds | None = None
 
     def __repr__(self) -> str:
         counts = {"iteration": self.iteration, "evaluation": self.evaluations, "gradient solve": self.refinements}

@@ -8,6 +8,7 @@ from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
 from .effort import Gains, evaluated
+from .rounds import PLANNED
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
 
@@ -30,6 +31,8 @@ class Trials:
     ----------
     box : Box
         Of the evaluator.
+    planned : int
+        Number of evaluations that settings follow from: the budget, unless this is only that of a round.
     seen : list of Evaluation
         All results.
     credited : array (n,) of bool
@@ -39,6 +42,7 @@ class Trials:
     def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, budget: int) -> None:
         self.settings, self.state, self.evaluator, self.budget = settings, state, evaluator, budget
         self.box = evaluator.box
+        self.planned = budget if state.rounds is None else PLANNED
         self.seen: list[Evaluation] = []
         self._gains = Gains(state, evaluator.tolerance)
         self._every = settings.polish_every if settings.refines and evaluator.has_gradients else None

@@ -56,8 +56,30 @@ class SearchMethod(ABC):
         """Whether the search is to end before its budget is spent, by the state alone; most solvers go on."""
         return False
 
+    @property
+    def searches_until_done(self) -> bool:
+        """Whether a search needs no number of evaluations: it goes on in rounds, and ends when more work no longer changes the front.
+
+        For that: `begin_rounds` instead of `begin`; `round_end`, up to which `advance` is called; `conclude` at the end of each round,
+        which begins the next one in the state, unless `ended` then says why there is none.
+        """
+        return False
+
+    def begin_rounds(self, evaluator: Evaluator, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """As `begin`, of a search without a number of evaluations."""
+        raise NotImplementedError(f"{type(self).__name__} needs a number of evaluations")
+
+    def round_end(self, state: Any) -> int:
+        """Number of evaluations at which the current round ends."""
+        raise NotImplementedError(f"{type(self).__name__} needs a number of evaluations")
+
+    def ended(self, state: Any) -> str:
+        """Why a search in rounds is at its end, a word of `run.ENDED`; empty as long as it goes on."""
+        return ""
+
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
-        """Do what follows the last evaluation of a search that was not stopped, such as a polish; most solvers do nothing.
+        """Do what follows the last evaluation of a search that was not stopped, or of one of its rounds, such as a polish; most solvers do
+        nothing.
 
         If asked to end early (`transcription.stopping`), the state keeps the results so far. A checkpoint may keep the state before each
         batch of this work: called with that state, it continues to the same bits.

@@ -20,8 +20,10 @@ class Progress:
 
     Attributes
     ----------
-    evaluations, budget : int
-        Evaluations so far, and their largest number.
+    evaluations : int
+        So far.
+    budget : int or None
+        Their largest number; None for a search that goes on until it is done.
     elapsed : float
         Seconds.
     archive : int
@@ -36,7 +38,7 @@ class Progress:
     """
 
     evaluations: int
-    budget: int
+    budget: int | None
     elapsed: float
     archive: int
     ideal: Mapping[str, float]
@@ -102,13 +104,15 @@ class SearchDisplay(Display):
 
 
 def count(progress: Progress) -> str:
-    """Evaluations and budget, such as 1 200 / 10 000 evaluations."""
+    """Evaluations and budget, such as 1 200 / 10 000 evaluations; 1 200 evaluations without a budget."""
+    if progress.budget is None:
+        return counted(progress.evaluations, "evaluation")
     return f"{progress.evaluations:,} / {counted(progress.budget, 'evaluation')}".replace(",", " ")
 
 
 def clock(progress: Progress) -> str:
     """Elapsed and estimated remaining time, such as 0:12, 1:03 left."""
-    if not 0 < progress.evaluations < progress.budget:
+    if progress.budget is None or not 0 < progress.evaluations < progress.budget:
         return minutes(progress.elapsed)
     left = progress.elapsed * (progress.budget - progress.evaluations) / progress.evaluations
     return f"{minutes(progress.elapsed)}, {minutes(left)} left"

@@ -25,7 +25,7 @@ from .progress import Progress, SearchDisplay
 
 IDLE_ITERATIONS = 100
 """Number of successive iterations without any evaluation after which a search ends."""
-ENDED = ("budget", "idle", "settled")
+ENDED = ("budget", "idle", "settled", "done", "ceiling")
 """Values of `stats["stopped"]` for a run that ended without being stopped."""
 
 
@@ -41,8 +41,8 @@ class SearchRun:
         Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
     make_front : callable
         (state, stats) -> Front; the state is None if the search was ended before its first population was evaluated.
-    budget : int
-        Largest number of evaluations.
+    budget : int or None
+        Largest number of evaluations. None: the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`.
     seed : int or None
         None draws one.
     start : array (k, D) or None
@@ -55,7 +55,7 @@ class SearchRun:
     evaluator: Evaluator
     goals: Callable[[], Sequence[Objective]]
     make_front: Callable[[Any, dict[str, Any]], Front]
-    budget: int
+    budget: int | None
     seed: int | None
     start: np.ndarray | None
     what: Mapping[str, Any]
@@ -73,7 +73,8 @@ class SearchRun:
         -------
         Front
             Its `stats["stopped"]` is the reason for the end of the run: "budget", "interrupted", "time limit", "callback", "settled" if the
-            method says so, or "idle" if nothing was left to evaluate.
+            method says so, or "idle" if nothing was left to evaluate. Without a budget it is "done" instead of "budget", or "ceiling" if
+            the largest number of evaluations came first.
         """
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs())
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
@@ -83,7 +84,7 @@ class SearchRun:
         if self._state is not None:
             self.evaluator.resume(kept.counts, self._state.archive.F.shape[1])
         self._uncut = kept.counts.clocked
-        self._callback = callback
+        self._callback, self._called_off = callback, ""
         with (
             self._checkpoint or nullcontext(),
             SearchDisplay(progress) as self._display,
@@ -106,32 +107,56 @@ class SearchRun:
         if self._state is None:
             self.evaluator.before_batch = self._show
             try:
-                self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
+                self._state = self._begun()
             except Stopped as reason:  # while something was built that even the first evaluations need
                 return str(reason)
             self._keep()
             self._write_in_time()
         # From here on there is a state to return, so a stop may come before any batch. The first population is not stopped by an exception.
-        self.evaluator.before_batch = self._show_and_check
-        counts = self.evaluator.counts
         try:
-            while counts.evaluations < self.budget and self._idle < IDLE_ITERATIONS and not self.solver.has_settled(self._state):
-                spent = counts.evaluations
-                self.solver.advance(self._state, self.evaluator, self.budget)
-                self._idle = self._idle + 1 if counts.evaluations == spent else 0
+            while True:  # once, or round by round
+                self._search_round()
+                # This work is not stopped by an exception: asked to end, it keeps its results so far.
+                self.evaluator.before_batch = self._keep_and_write if self.budget is not None else self._keep_and_ask
+                self.solver.conclude(self._state, self.evaluator)
+                if self._cut_short():
+                    reason_given, self._called_off = self._reason, ""  # what follows the search is not to be cut short by it
+                    return reason_given
+                if ended := self._ended():
+                    return ended
                 self._keep()
                 self._call_back(self._show())
-                self._write_in_time()  # after the callback: it has seen every state that is in the file
-            # This work is not stopped by an exception: asked to end, it keeps its results so far.
-            self.evaluator.before_batch = self._keep_and_write
-            self.solver.conclude(self._state, self.evaluator)
+                self._write_in_time()
         except Stopped as reason:
             return str(reason)
-        if self._cut_short():
-            return self._interrupts.reason
-        if counts.evaluations >= self.budget:
+
+    def _begun(self) -> Any:
+        """The state after the first population."""
+        rng = np.random.default_rng(self.seed)
+        if self.budget is None:
+            return self.solver.begin_rounds(self.evaluator, rng, self.start)
+        return self.solver.begin(self.evaluator, self.budget, rng, self.start)
+
+    def _ended(self) -> str:
+        """Why the run has ended, after its last round; empty if another follows."""
+        if self.budget is not None and self.evaluator.counts.evaluations >= self.budget:
             return "budget"
-        return "settled" if self.solver.has_settled(self._state) else "idle"
+        if self.solver.has_settled(self._state):
+            return "settled"
+        return (self.budget is None and self.solver.ended(self._state)) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
+
+    def _search_round(self) -> None:
+        """Search up to the budget, or to the end of the current round."""
+        self.evaluator.before_batch = self._show_and_check
+        counts = self.evaluator.counts
+        limit = self.solver.round_end(self._state) if self.budget is None else self.budget
+        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not self.solver.has_settled(self._state):
+            spent = counts.evaluations
+            self.solver.advance(self._state, self.evaluator, limit)
+            self._idle = self._idle + 1 if counts.evaluations == spent else 0
+            self._keep()
+            self._call_back(self._show())
+            self._write_in_time()  # after the callback: it has seen every state that is in the file
 
     def _show(self) -> Progress:
         progress = self._progress()
@@ -159,12 +184,25 @@ class SearchRun:
             self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
     def _cut_short(self) -> bool:
-        """Whether a time limit or Ctrl-C has cut work short since the state was last kept."""
-        return bool(self._interrupts.reason) and self.evaluator.counts.clocked > self._uncut
+        """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last kept."""
+        return bool(self._reason) and self.evaluator.counts.clocked > self._uncut
+
+    @property
+    def _reason(self) -> str:
+        """Why the work is asked to end; empty as long as it is not."""
+        return self._interrupts.reason or self._called_off
 
     def _keep_and_write(self) -> None:
         self._keep()
         self._write_in_time()
+
+    def _keep_and_ask(self) -> None:
+        """As `_keep_and_write`, between the solves of a polish after which a search may go on: the callback may end it there, too."""
+        self._keep_and_write()
+        try:
+            self._call_back(self._show())
+        except Stopped as reason:
+            self._called_off = str(reason)
 
     def _write_in_time(self) -> None:
         if self._checkpoint:
@@ -178,7 +216,7 @@ class SearchRun:
     def _asked_to_stop(self) -> bool:
         """Whether the work is asked to end; also refreshes the display between long solves."""
         self._show()
-        return bool(self._interrupts.reason)
+        return bool(self._reason)
 
     def _stats(self, stopped: str) -> dict[str, Any]:
         counts, state, checkpoint = self.evaluator.counts, self._state, self._checkpoint

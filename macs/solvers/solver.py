@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem
-from problems.problem import DEFAULT_EVALUATIONS, Problem
+from problems.problem import Problem
 from problems.vector import CompiledVectorProblem, without_dynamics
 from problems.vector_problem import VectorProblem
 from transcription.base import Transcription, check_freedom, check_problem
@@ -68,8 +68,9 @@ class Solver(SearchMethod):
         transcription : Transcription, optional
             Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.search_mesh`.
         evaluations : int, optional
-            Largest number of candidates that are sent to the inner level, or of rows that a vector problem evaluates. Default: the
-            problem's own number. MACS ends before where no candidate is feasible and projections find nothing feasible near them.
+            Number of candidates that are sent to the inner level, or of rows that a vector problem evaluates. Default: MACS searches until
+            more work no longer changes the front, see Notes; other searches take the problem's own number. MACS ends before where no
+            candidate is feasible and projections find nothing feasible near them.
         seed : int, optional
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver, optional
@@ -93,7 +94,8 @@ class Solver(SearchMethod):
         progress : bool, optional
             Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
-            Function that is called with a `Progress` after every iteration; the search ends if it returns True.
+            Function that is called with a `Progress` after every iteration, and between the gradient solves of a polish after which the
+            search may go on; the search ends if it returns True.
         checkpoint : path, optional
             File that keeps the state of the run. The same call continues a run that was killed, interrupted, out of time or stopped by the
             callback, and gives the same front as without the interruption, to the last bit. See Notes.
@@ -107,13 +109,19 @@ class Solver(SearchMethod):
         Raises
         ------
         ValueError
-            If the problem is not stated correctly, an argument is not valid, or the checkpoint is damaged or of another run; before any
-            work.
+            If the problem is not stated correctly, an argument is not valid, a search that needs a number of evaluations has none, or the
+            checkpoint is damaged or of another run; before any work.
         OSError
             If the checkpoint cannot be written; before any work.
 
         Notes
         -----
+        Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients, and ends when the front was not
+        improved by as much work again as it took to find it, at least 250 evaluations (2000 without gradients), or at its `ceiling`;
+        `stats["stopped"]` is then "done" or "ceiling". Improved means: points that lie beyond the front by more than 0.001 of its ranges
+        add 0.1 % to its hypervolume, or to the best values of all directions on average, or one objective gets better by 0.5 % of its
+        range. That is no proof that nothing better exists: what no round has come near is not found.
+
         If what follows the search fails, the front is returned as the search left it, not simulated: `message` says why.
 
         A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
@@ -130,11 +138,11 @@ class Solver(SearchMethod):
                     raise ValueError(f"{without_dynamics(problem.name)}: it takes no {name}")
             return self._solve_vector(problem, evaluations, seed, tolerance, start, verify, time_limit, progress, callback, checkpoint)
         check_problem(problem, transcription)
+        evaluations = self._budget(problem, evaluations)
         if isinstance(problem, Problem):
-            evaluations = problem.default_evaluations if evaluations is None else evaluations
             inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
         else:
-            evaluations, inner = DEFAULT_EVALUATIONS if evaluations is None else evaluations, "auto" if inner is None else inner
+            inner = "auto" if inner is None else inner
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_verify(verify)
         solver = inner_solver(inner)
@@ -172,7 +180,7 @@ class Solver(SearchMethod):
         transcription: Transcription,
         inner: InnerSolver,
         level: dict[str, str],
-        evaluations: int,
+        evaluations: int | None,
         seed: int | None,
         tolerance: float,
         start: Any,
@@ -213,7 +221,7 @@ class Solver(SearchMethod):
         function: Any,
         bounds: Any = None,
         *,
-        evaluations: int,
+        evaluations: int | None = None,
         seed: int | None = None,
         constraints: Callable[[np.ndarray], np.ndarray] | None = None,
         names: Sequence[str] | None = None,
@@ -234,8 +242,9 @@ class Solver(SearchMethod):
             `function(X: (n, d)) -> F: (n, m)`, or `(F, G)`; a row with all G <= 0 is feasible, a row with NaN is a failed evaluation.
         bounds : pairs, pair of arrays, or mapping
             d pairs (lower, upper); two arrays (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
-        evaluations : int
-            Largest number of rows of X that are evaluated.
+        evaluations : int, optional
+            Number of rows of X that are evaluated. Default: until more work no longer changes the front, as for `solve`, by MACS; other
+            searches need a number.
         constraints : callable, optional
             `constraints(X) -> G`; a row with all G <= 0 is feasible.
         names, units, senses : sequences of str, optional
@@ -254,6 +263,7 @@ class Solver(SearchMethod):
         OSError
             If the checkpoint cannot be written; before any work.
         """
+        evaluations = self._budget(None, evaluations)
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses)
         what = {
@@ -267,6 +277,19 @@ class Solver(SearchMethod):
             "constraints": constraints is not None,
         }
         return self._vector_run(problem, evaluations, seed, float(tolerance), start, what).go(time_limit, progress, callback, checkpoint)
+
+    def _budget(self, problem: Any, evaluations: int | None) -> int | None:
+        """The number of evaluations that is given, or the problem's own; None if the search needs none. Raises ValueError if it does."""
+        if evaluations is not None or self.searches_until_done:
+            return evaluations
+        own = problem.default_evaluations if isinstance(problem, Problem | VectorProblem) else None
+        if own is None:
+            named = f"problem '{problem.name}' has no number of its own" if getattr(problem, "name", "") else "there is no number"
+            raise ValueError(
+                f"evaluations: {named}, and {type(self).__name__} needs one: pass evaluations=N, or set problem.default_evaluations; "
+                "only MACS searches until it is done"
+            )
+        return own
 
     def _solve_vector(
         self,
@@ -282,8 +305,7 @@ class Solver(SearchMethod):
         checkpoint: str | PathLike[str] | None,
     ) -> Front:
         """`solve` of a vector problem, each point of whose front is evaluated again in the end."""
-        if evaluations is None:
-            evaluations = problem.default_evaluations if isinstance(problem, VectorProblem) else DEFAULT_EVALUATIONS
+        evaluations = self._budget(problem, evaluations)
         check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
         check_verify(verify)
         drawn, compiled = drawing(start), problem.compile()
@@ -299,7 +321,7 @@ class Solver(SearchMethod):
             return _not_simulated(front, error)
 
     def _vector_run(
-        self, problem: CompiledVectorProblem, evaluations: int, seed: int | None, tolerance: float, start: Any, what: dict[str, Any]
+        self, problem: CompiledVectorProblem, evaluations: int | None, seed: int | None, tolerance: float, start: Any, what: dict[str, Any]
     ) -> SearchRun:
         """The run of a search on a vector problem, ready to go; `what` says for its checkpoint which problem that is."""
         box, about = BlackBox(problem, tolerance), self.about()

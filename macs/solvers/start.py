@@ -27,7 +27,8 @@ OTHER = "start: the points have other variables; a start belongs to one problem"
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
     """Raise ValueError for arguments of `solve` or `minimize` that are not valid, OSError for a checkpoint that cannot be written."""
-    check_count("evaluations", evaluations, 1)
+    if evaluations is not None:
+        check_count("evaluations", evaluations, 1)
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
     check_positive("tolerance", tolerance)

@@ -1,0 +1,201 @@
+"""Rounds of a search without a number of evaluations, and the rule by which it ends: more work no longer changes the front.
+
+A round is a search of some evaluations and, with gradients, a polish. At its end the points that were found are compared with the front as
+it was when it was last improved. That the archive's points were spread anew is no progress: a point counts only if it lies beyond the known
+front, with straight lines between its points, by more than a tolerance. All decisions depend on counts, so the same seed ends alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from moocore import hypervolume
+
+from ..pareto.directions import tchebycheff
+from ..pareto.dominance import nondominated
+from ..pareto.ranges import distinct, ranges
+
+PLANNED = 2_000
+"""Settings that follow from a number of evaluations are those of this one."""
+FIRST, FIRST_WITHOUT = 250, 2_000
+"""Evaluations of the first round, and least number of a later one, with gradients; without."""
+GROWTH = 4
+"""A later round has at least this part, one fourth, of all evaluations before it."""
+SOLVES = 8
+"""Largest number of gradient solves in the polish of a round, for each point that the archive may have."""
+BEYOND = 1e-3
+"""Distance, in ranges of the front, that a point must lie beyond the front to count."""
+PROGRESS = 1e-3
+"""Part by which the hypervolume must grow, or the best values of the directions on average, to be progress."""
+ENDS = 5e-3
+"""Part of its range by which the best value of an objective must fall to be progress."""
+CLOSER = 0.9
+"""As long as nothing is feasible: factor by which the least violation must fall to be progress."""
+JOINED = 0.3
+"""Points of the front that are farther from a point, in ranges, are not joined by lines beside it: there may be a gap."""
+FLAT = 1e-3
+"""Least range of an objective on the front, in that of all feasible agents and points of archives: a front may be one point."""
+CORNER = 1.1
+"""Corner of the hypervolume in each objective, in ranges of the front from its ideal point."""
+DONE, CEILING = "done", "ceiling"
+"""Reasons for the end: further work did not improve the front; the largest number of evaluations."""
+
+
+@dataclass
+class Rounds:
+    """State of the rounds of a search.
+
+    Attributes
+    ----------
+    finished : int
+        Number of rounds that have ended.
+    end : int
+        Number of evaluations at which the current round ends.
+    improved : int
+        Number of evaluations at the end of the round that last improved the front.
+    front : array (k, m)
+        Objectives of all points known then, non-dominated.
+    extent : array (m,)
+        Largest range of each objective over feasible agents and points of the archive so far.
+    violation : float
+        The least violation then, as long as nothing was feasible.
+    solved : array (s, m)
+        Objectives of the optima that polishes found: they need no solve to become optima.
+    stopped : str
+        Why the search is at its end; empty as long as it goes on.
+    """
+
+    finished: int
+    end: int
+    improved: int
+    front: np.ndarray
+    extent: np.ndarray
+    violation: float
+    solved: np.ndarray
+    stopped: str = ""
+
+    @classmethod
+    def first(cls, m: int, shortest: int, ceiling: int) -> Rounds:
+        """The first round of a search for m objectives."""
+        none = np.empty((0, m))
+        return cls(finished=0, end=min(shortest, ceiling), improved=0, front=none, extent=np.zeros(m), violation=np.inf, solved=none)
+
+
+def least(gradients: bool) -> int:
+    """Least number of evaluations of a round, and of further work without progress before the search ends."""
+    return FIRST if gradients else FIRST_WITHOUT
+
+
+def judged(
+    rounds: Rounds,
+    found: np.ndarray,
+    feasible: np.ndarray,
+    violation: float,
+    directions: np.ndarray,
+    evaluations: int,
+    shortest: int,
+    ceiling: int,
+) -> Rounds:
+    """The rounds after one has ended: with the next one, or the reason why there is none.
+
+    Parameters
+    ----------
+    rounds : Rounds
+    found : array (k, m)
+        Objectives of the feasible points of this round that may belong to the front.
+    feasible : array (a, m)
+        Objectives of other feasible points, which only say what range is large.
+    violation : float
+        The least violation of all points; it counts as long as nothing is feasible.
+    directions : array (d, m)
+    evaluations : int
+        So far.
+    shortest : int
+        See `least`.
+    ceiling : int
+        Largest number of evaluations.
+    """
+    seen = np.vstack([found, feasible])
+    extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
+    rounds = replace(rounds, finished=rounds.finished + 1, extent=extent)
+    if len(rounds.front):
+        better = improves(found, rounds.front, extent, directions)
+    else:
+        better = len(found) > 0 or violation < CLOSER * rounds.violation
+    if better:
+        known = np.vstack([rounds.front, found])
+        known = known[distinct(known, ranges(known))] if len(known) else known
+        rounds = replace(rounds, improved=evaluations, front=known, violation=violation)
+    if evaluations - rounds.improved >= max(rounds.improved, shortest):
+        return replace(rounds, stopped=DONE)
+    if evaluations >= ceiling:
+        return replace(rounds, stopped=CEILING)
+    return replace(rounds, end=min(evaluations + max(shortest, evaluations // GROWTH), ceiling))
+
+
+def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:
+    """Whether points with F (k, m) improve a front (n, m): the gains of those that lie beyond it are more than little."""
+    hypervolume, mean, end = gains(found, front, extent, directions)
+    return hypervolume > PROGRESS or mean > PROGRESS or end > ENDS
+
+
+def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]:
+    """The gains by points with F (k, m) that lie beyond a front (n, m).
+
+    Returns
+    -------
+    float
+        The part of the hypervolume, of the front with them, that they add.
+    float
+        The improvement of the best values of the directions (d, m), on average, each of which counts one from the ideal point to the nadir.
+    float
+        The largest part of its range by which an objective gets a better best value.
+    """
+    both = np.vstack([front, found])
+    both = both[nondominated(both)]
+    ideal = both.min(axis=0)
+    span = np.maximum(np.ptp(both, axis=0), FLAT * extent)
+    span = np.where(span > 0.0, span, ranges(both))
+    new = found[beyond((found - ideal) / span, (front - ideal) / span) > BEYOND]
+    if not len(new):
+        return 0.0, 0.0, 0.0
+    both = np.vstack([front, new])
+    before, after = (tchebycheff(F[:, None], directions, ideal, ideal + span).min(axis=0) for F in (front, both))
+    volumes = [_hypervolume((F - ideal) / span) for F in (front, both)]
+    end = float(((front.min(axis=0) - both.min(axis=0)) / span).max())
+    return 1.0 - volumes[0] / volumes[1], float(np.mean(np.minimum(before - after, 1.0))), end
+
+
+def beyond(F: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """Distances (k,) that points F (k, m) lie beyond a front (n, m): by how much all objectives of a point have to be worse for the front
+    to dominate it. Points of the front that are near are joined by straight lines, or planes. All are normalised."""
+    alone = np.array([(front - point).max(axis=1).min() for point in F])
+    return np.array([_joined(point, front, far) if far > BEYOND else far for point, far in zip(F, alone.tolist(), strict=True)])
+
+
+def _joined(point: np.ndarray, front: np.ndarray, alone: float) -> float:
+    """The distance of a point (m,) beyond the points of a front that are near it, and what lies between these."""
+    from scipy.optimize import linprog
+
+    m, apart = len(point), np.linalg.norm(front - point, axis=1)
+    rows = np.argsort(apart, kind="stable")[: 4 * m]
+    near = front[rows[apart[rows] <= JOINED]]
+    if len(near) <= 1:
+        return alone
+    # The least t such that a mean of the near points, with weights w, is no worse than the point by more than t.
+    k = len(near)
+    found = linprog(
+        np.r_[np.zeros(k), 1.0],
+        A_ub=np.c_[(near - point).T, -np.ones(m)],
+        b_ub=np.zeros(m),
+        A_eq=[[*np.ones(k), 0.0]],
+        b_eq=[1.0],
+        bounds=[(0.0, None)] * k + [(None, None)],
+    )
+    return min(alone, float(found.fun)) if found.status == 0 else alone
+
+
+def _hypervolume(F: np.ndarray) -> float:
+    """The volume that points F (k, m), normalised, dominate up to the corner."""
+    return float(hypervolume(np.ascontiguousarray(F), ref=np.full(F.shape[1], CORNER)))
