@@ -160,7 +160,7 @@ class MultistartSolver:
 
         The first solve begins at `start` (n,), or at the best known vector for this problem.
         """
-        first = start if start is not None else self._nearest(reference, weights)
+        first = start if start is not None else self.nearest(reference, weights)
         found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
         for _ in range((self.starts or 1) - len(found)):
             found.append(self.from_drawn(reference, weights, ceiling))
@@ -220,7 +220,7 @@ class MultistartSolver:
         m = len(self.nlp.problem.goals)
         optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
         while (i := len(optima)) < m:
-            begun = self._nearest(*single_task(i, m))
+            begun = self.nearest(*single_task(i, m))
             optima.append(self.single(i))
             tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
         ends: list[Solved | None] = [None] * m
@@ -353,7 +353,7 @@ class MultistartSolver:
         alpha, known = self.loss(one, reference, weights), self.loss(other, reference, weights)
         return alpha is not None and (known is None or alpha < known - BETTER)
 
-    def _nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
+    def nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
         """The known vector (n,) with the best merit; None if none is known."""
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
 

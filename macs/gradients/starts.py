@@ -47,6 +47,8 @@ class Starts:
     ----------
     nlp : NLP
     rng : numpy.random.Generator
+    drawn : int
+        How many were drawn before.
 
     Attributes
     ----------
@@ -54,8 +56,8 @@ class Starts:
         Number of starts so far.
     """
 
-    def __init__(self, nlp: NLP, rng: np.random.Generator) -> None:
-        self._nlp, self._rng, self.drawn = nlp, rng, 0
+    def __init__(self, nlp: NLP, rng: np.random.Generator, drawn: int = 0) -> None:
+        self._nlp, self._rng, self.drawn = nlp, rng, drawn
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
         """The next start, a full vector; `best` (n,) is the best that is known.

@@ -16,6 +16,7 @@ from transcription.base import Transcription
 from transcription.catalogue import parse
 from transcription.meshed import Meshed
 
+from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.merging import best_rows
@@ -34,7 +35,7 @@ from .breeding import breed_archive, no_credit
 from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
-from .opening import Opening
+from .opening import Opening, anew
 from .rounds import PLANNED, SOLVES, Rounds, judged, least
 from .settings import Settings
 from .social import assign, social_actions
@@ -148,6 +149,8 @@ class MACS(Settings, Solver):
         """Do one iteration, of some tens of evaluations; changes `state`. Once the budget is spent it does nothing."""
         if state.evaluations >= budget:
             return
+        self._begin_anew(state, evaluator)
+        self._begin_anew(state, evaluator)
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
@@ -164,6 +167,17 @@ class MACS(Settings, Solver):
         assign(state, self, guide)
         state.iteration += 1
 
+    def _begin_anew(self, state: SearchState, evaluator: Evaluator) -> None:
+        """Make the gradient solves from other starts with which a round begins, where the search chooses its ways."""
+        rounds, chooses = state.rounds, evaluator.ways and self._polishes(evaluator)
+        if rounds is None or not (chooses and len(state.archive) and isinstance(evaluator, Bilevel)):
+            return
+        if (count := rounds.due - rounds.anew) > 0:
+            found = anew(state.archive, evaluator, self.archive, count, rounds.anew, state.rng)
+            rounds.anew = rounds.due
+            rounds.solved = np.vstack([rounds.solved, found.F[found.status == CONVERGED]])
+            remember(state, [found], self, evaluator)
+
     def has_settled(self, state: SearchState) -> bool:
         """See `SearchMethod.has_settled`: where solves for feasibility from many places end at violations that can get no smaller, more of
         them would take long and find nothing."""
@@ -178,6 +192,10 @@ class MACS(Settings, Solver):
             self._end_round(state, evaluator, state.archive.F)
             return
         if state.polishing is None:
+            if state.rounds is not None and state.polished is not None and not state.rounds.news(state.archive.F):
+                state.archive = state.polished
+                self._end_round(state, evaluator, state.archive.F)
+                return
             state.polishing = PolishLog.of(state.archive)
         polishing, optima = state.polishing, state.optima
         count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
@@ -186,7 +204,7 @@ class MACS(Settings, Solver):
         solves = CountedSolves(evaluator, count, polishing)
         state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator), optima)
         if not solves.stopped:
-            state.polishing = None
+            state.polishing, state.polished = None, state.archive
             solved = polishing.status == CONVERGED
             good = solved | (polishing.violation <= evaluator.tolerance)
             found = np.vstack([polishing.archive.F, polishing.F[good], state.archive.F])

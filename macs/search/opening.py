@@ -1,4 +1,4 @@
-"""How a search begins: its first population and, with gradients, the ends of the front and points between them.
+"""How a search begins, and begins anew: its first population and, with gradients, the ends of the front and points between them.
 
 Where the search chooses the way of its proposals, and has gradients, the first population is only propagated, but for what the user gave:
 gradient solves from as many starts as pay find more for their work. If neither finds anything feasible, the population is projected.
@@ -8,20 +8,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
+from ..gradients import starts
 from ..gradients.along import along
 from ..gradients.multistart import SHORT, GradientSolves, MultistartSolver, guessed_start, single_task
+from ..gradients.starts import Starts
 from ..gradients.targets import METHODS, targets
+from ..pareto.archive import Archive
+from ..pareto.dominance import extremes
 from ..pareto.ranges import ranges
 
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
 UNSEEN, EVERY = 0.05, 20
-"""Probability that another start would find another optimum below which there are enough; and the number of evaluations of the budget for
-each of which one start may be drawn."""
+"""Probability that another start would find another optimum below which there are enough; and the number of evaluations for each of which
+one start may be drawn."""
 
 
 class Opening:
@@ -119,10 +124,51 @@ class Opening:
                 found += along(solver, targets(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
             else:
                 found.append(solver.solve(F.min(axis=0), ranges(F)))
-        good = [one for one in found if one.violation <= self._evaluator.tolerance]
-        return Evaluation(
-            Z=np.array([one.z for one in good]).reshape(-1, self.population.Z.shape[1]),
-            F=np.array([one.F for one in good]).reshape(-1, self.population.F.shape[1]),
-            violation=np.array([one.violation for one in good]),
-            status=np.array([one.status for one in good], dtype="<U10"),
-        )
+        assert isinstance(self._evaluator, Bilevel)
+        return _feasible_of(found, self._evaluator)
+
+
+def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, rng: np.random.Generator) -> Evaluation:
+    """What `count` gradient solves from other starts find, for the ends of the front and points along it in turn; fewer if asked to end
+    early.
+
+    Parameters
+    ----------
+    archive : Archive
+        The front so far; every second start is near one of its points.
+    evaluator : Bilevel
+    points : int
+        Most points in the archive.
+    count : int
+    drawn : int
+        How many such starts there have been before.
+    rng : numpy.random.Generator
+    """
+    solves = GradientSolves(evaluator.tolerance)
+    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
+    solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, solves)
+    m = archive.F.shape[1]
+    ends = archive.F[extremes(archive.F)]
+    singles = [single_task(i, m) for i in range(m)]
+    between = targets(ends, np.ptp(ends, axis=0), max(min(points, FIRST), m + 1), METHODS[0]) if m > 1 else []
+    found = []
+    with solves.at_most(SHORT):
+        for k in range(drawn, drawn + count):
+            if stopping():
+                break
+            tasks, number = (between, k // 2) if between and k % 2 else (singles, k // 2 if between else k)
+            task = tasks[number % len(tasks)]
+            # A task has one start near the best, and one from everywhere, in turn.
+            start = Starts(evaluator.nlp, rng, starts.FIRST + number + number // len(tasks)).draw(solver.nearest(*task))
+            found.append(solver.from_vector(start, *task))
+    return _feasible_of(found, evaluator)
+
+
+def _feasible_of(found: list[Solved], evaluator: Bilevel) -> Evaluation:
+    good = [one for one in found if one.violation <= evaluator.tolerance]
+    return Evaluation(
+        Z=np.array([one.z for one in good]).reshape(-1, len(evaluator.nlp.variables)),
+        F=np.array([one.F for one in good]).reshape(-1, len(evaluator.goals)),
+        violation=np.array([one.violation for one in good]),
+        status=np.array([one.status for one in good], dtype="<U10"),
+    )

@@ -20,6 +20,8 @@ PLANNED = 2_000
 """Settings that follow from a number of evaluations are those of this one."""
 FIRST, FIRST_WITHOUT = 250, 2_000
 """Evaluations of the first round, and least number of a later one, with gradients; without."""
+STARTS = 10
+"""A later round begins with one gradient solve from another start for so many of its evaluations."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8
@@ -62,6 +64,8 @@ class Rounds:
         The least violation then, as long as nothing was feasible.
     solved : array (s, m)
         Objectives of the optima that polishes found: they need no solve to become optima.
+    due, anew : int
+        Number of gradient solves from other starts with which rounds begin, up to the current one; number of those that were made.
     stopped : str
         Why the search is at its end; empty as long as it goes on.
     """
@@ -73,6 +77,8 @@ class Rounds:
     extent: np.ndarray
     violation: float
     solved: np.ndarray
+    due: int = 0
+    anew: int = 0
     stopped: str = ""
 
     @classmethod
@@ -80,6 +86,13 @@ class Rounds:
         """The first round of a search for m objectives."""
         none = np.empty((0, m))
         return cls(finished=0, end=min(shortest, ceiling), improved=0, front=none, extent=np.zeros(m), violation=np.inf, solved=none)
+
+    def news(self, found: np.ndarray) -> bool:
+        """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""
+        if not (len(found) and len(self.front)):
+            return len(found) > 0
+        ideal, span = _frame(np.vstack([self.front, found]), self.extent)
+        return bool((beyond((found - ideal) / span, (self.front - ideal) / span) > BEYOND).any())
 
 
 def least(gradients: bool) -> int:
@@ -131,7 +144,8 @@ def judged(
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling:
         return replace(rounds, stopped=CEILING)
-    return replace(rounds, end=min(evaluations + max(shortest, evaluations // GROWTH), ceiling))
+    end = min(evaluations + max(shortest, evaluations // GROWTH), ceiling)
+    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // STARTS)
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:
@@ -152,11 +166,7 @@ def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: 
     float
         The largest part of its range by which an objective gets a better best value.
     """
-    both = np.vstack([front, found])
-    both = both[nondominated(both)]
-    ideal = both.min(axis=0)
-    span = np.maximum(np.ptp(both, axis=0), FLAT * extent)
-    span = np.where(span > 0.0, span, ranges(both))
+    ideal, span = _frame(np.vstack([front, found]), extent)
     new = found[beyond((found - ideal) / span, (front - ideal) / span) > BEYOND]
     if not len(new):
         return 0.0, 0.0, 0.0
@@ -165,6 +175,13 @@ def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: 
     volumes = [_hypervolume((F - ideal) / span) for F in (front, both)]
     end = float(((front.min(axis=0) - both.min(axis=0)) / span).max())
     return 1.0 - volumes[0] / volumes[1], float(np.mean(np.minimum(before - after, 1.0))), end
+
+
+def _frame(F: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal point and ranges (m,) of the best of points with F (k, m), by which a front is normalised."""
+    best = F[nondominated(F)]
+    span = np.maximum(np.ptp(best, axis=0), FLAT * extent)
+    return best.min(axis=0), np.where(span > 0.0, span, ranges(best))
 
 
 def beyond(F: np.ndarray, front: np.ndarray) -> np.ndarray:
