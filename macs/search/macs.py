@@ -107,6 +107,7 @@ class MACS(Settings, Solver):
             iteration=0,
             evaluations=evaluator.counts.evaluations,
             optima=opening.optima.F[opening.optima.status == CONVERGED],
+            several=opening.several,
             rng=rng,
         )
         remember(state, [*opening.evaluations, opening.optima], self, evaluator)
@@ -217,7 +218,8 @@ class MACS(Settings, Solver):
         agents, gradients = state.agents, self._polishes(evaluator)
         feasible = agents.F[agents.violation <= evaluator.tolerance]
         violation = float(state.closest.violation.min()) if len(state.closest) else np.inf
-        state.rounds = judged(state.rounds, found, feasible, violation, state.directions, state.evaluations, least(gradients), self.ceiling)
+        spent, shortest = state.evaluations, least(gradients)
+        state.rounds = judged(state.rounds, found, feasible, violation, state.directions, spent, shortest, self.ceiling, state.several)
         if solved is not None:
             state.rounds.solved = np.vstack([state.rounds.solved, solved])
         if len(state.archive):

@@ -24,7 +24,7 @@ from ..pareto.ranges import ranges
 
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
-UNSEEN, EVERY = 0.05, 20
+UNSEEN, EVERY = 0.02, 20
 """Probability that another start would find another optimum below which there are enough; and the number of evaluations for each of which
 one start may be drawn."""
 
@@ -55,6 +55,8 @@ class Opening:
         All evaluations of that population, one after the other.
     optima : Evaluation
         What gradient solves found.
+    several : bool
+        Whether solves from different starts ended in different optima.
     """
 
     def __init__(
@@ -67,13 +69,14 @@ class Opening:
         self.population = evaluator.evaluate(Z, 0) if quick and not given else evaluator.evaluate(Z[:given] if quick else Z)
         if quick and 0 < given < len(Z):
             self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
-        self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
+        self.evaluations, self.optima, self.several = [self.population], self.population.take(np.arange(0)), False
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
             self._project(Z)
             solver = self._solver()
         if solver is not None and not stopping():
             self.optima = self._found(solver)
+            self.several = any(census.optima() > 1 for census in solver.census.values())
 
     @property
     def _feasible(self) -> np.ndarray:
@@ -159,7 +162,7 @@ def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: i
             tasks, number = (between, k // 2) if between and k % 2 else (singles, k // 2 if between else k)
             task = tasks[number % len(tasks)]
             # A task has one start near the best, and one from everywhere, in turn.
-            start = Starts(evaluator.nlp, rng, starts.FIRST + number + number // len(tasks)).draw(solver.nearest(*task))
+            start = Starts(evaluator.nlp, rng, starts.FIRST + number + number // len(tasks)).draw(solver.nearest(*task))[0]
             found.append(solver.from_vector(start, *task))
     return _feasible_of(found, evaluator)
 

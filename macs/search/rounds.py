@@ -20,8 +20,10 @@ PLANNED = 2_000
 """Settings that follow from a number of evaluations are those of this one."""
 FIRST, FIRST_WITHOUT = 250, 2_000
 """Evaluations of the first round, and least number of a later one, with gradients; without."""
-STARTS = 10
-"""A later round begins with one gradient solve from another start for so many of its evaluations."""
+STARTS, FEW_STARTS = 10, 20
+"""A later round begins with one gradient solve from another start for so many of its evaluations; where all starts led to one optimum."""
+PATIENCE, AGAIN = 3, 0.5
+"""Where optima are several: work without progress before the search ends, in least rounds, and as a part of what the last progress took."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8
@@ -56,6 +58,8 @@ class Rounds:
         Number of evaluations at which the current round ends.
     improved : int
         Number of evaluations at the end of the round that last improved the front.
+    opened : int
+        Number of evaluations at the end of the first round that found anything feasible; 0 before.
     front : array (k, m)
         Objectives of all points known then, non-dominated.
     extent : array (m,)
@@ -73,6 +77,7 @@ class Rounds:
     finished: int
     end: int
     improved: int
+    opened: int
     front: np.ndarray
     extent: np.ndarray
     violation: float
@@ -85,7 +90,9 @@ class Rounds:
     def first(cls, m: int, shortest: int, ceiling: int) -> Rounds:
         """The first round of a search for m objectives."""
         none = np.empty((0, m))
-        return cls(finished=0, end=min(shortest, ceiling), improved=0, front=none, extent=np.zeros(m), violation=np.inf, solved=none)
+        return cls(
+            finished=0, end=min(shortest, ceiling), improved=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf, solved=none
+        )
 
     def news(self, found: np.ndarray) -> bool:
         """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""
@@ -109,6 +116,7 @@ def judged(
     evaluations: int,
     shortest: int,
     ceiling: int,
+    several: bool,
 ) -> Rounds:
     """The rounds after one has ended: with the next one, or the reason why there is none.
 
@@ -128,6 +136,8 @@ def judged(
         See `least`.
     ceiling : int
         Largest number of evaluations.
+    several : bool
+        Whether other starts have led to other optima; so has a later round that improved the front.
     """
     seen = np.vstack([found, feasible])
     extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
@@ -139,13 +149,15 @@ def judged(
     if better:
         known = np.vstack([rounds.front, found])
         known = known[distinct(known, ranges(known))] if len(known) else known
-        rounds = replace(rounds, improved=evaluations, front=known, violation=violation)
-    if evaluations - rounds.improved >= max(rounds.improved, shortest):
+        opened = rounds.opened or (evaluations if len(known) else 0)
+        rounds = replace(rounds, improved=evaluations, opened=opened, front=known, violation=violation)
+    several = several or rounds.improved > rounds.opened
+    if evaluations - rounds.improved >= (max(PATIENCE * shortest, AGAIN * rounds.improved) if several else shortest):
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling:
         return replace(rounds, stopped=CEILING)
     end = min(evaluations + max(shortest, evaluations // GROWTH), ceiling)
-    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // STARTS)
+    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // (STARTS if several else FEW_STARTS))
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:

@@ -109,6 +109,8 @@ class SearchState:
         As long as no point was feasible: number of candidates that the inner level left where the violation can get no smaller nearby.
     polishing : PolishLog, optional
         Solves of a polish that has begun and is not finished.
+    several : bool
+        Whether solves from different starts ended in different optima when the search began.
     polished : Archive, optional
         What the last polish made.
     rounds : Rounds, optional
@@ -131,6 +133,7 @@ class SearchState:
     refinements: int = 0
     hopeless: int = 0
     polishing: PolishLog | None = None
+    several: bool = False
     polished: Archive | None = None
     rounds: Rounds | None = None
 
