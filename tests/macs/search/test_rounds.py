@@ -1,0 +1,216 @@
+"""A search without a number of evaluations: when its rounds count as progress, and when it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from macs import MACS, NSGA2
+from macs.evaluation import bilevel
+from macs.pareto import directions
+from macs.search import rounds as module
+from macs.search.rounds import AGAIN, BEYOND, DONE, PATIENCE, Rounds, beyond, gains, improves, judged
+from problems import Problem, load
+from problems.cases import goddard
+from runs.measures.indicators import gd, hypervolume
+from transcription import DFET
+
+QUARTER = np.stack([1 - np.sin(np.linspace(0, np.pi / 2, 41)), 1 - np.cos(np.linspace(0, np.pi / 2, 41))], axis=1)
+"""Points of a convex front between (1, 0) and (0, 1)."""
+ONE = np.ones(2)
+EVERY = directions.pool(2, 100)
+
+
+def after(known: Rounds, found: np.ndarray, evaluations: int, several: bool = False, ceiling: int = 10**6) -> Rounds:
+    return judged(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, 250, ceiling, several)
+
+
+# What is progress
+
+
+def test_points_on_the_lines_between_points_are_no_progress():
+    coarse = QUARTER[::8]
+    middle = 0.5 * (coarse[:-1] + coarse[1:])
+    assert beyond(middle, coarse).max() < 1e-9 and not improves(middle, coarse, ONE, EVERY)
+    assert gains(coarse, coarse, ONE, EVERY) == (0.0, 0.0, 0.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(0.0, 0.2), st.integers(0, 40))
+def test_the_distance_beyond_a_front(distance, k):
+    """A point moved straight towards the ideal lies beyond by the move, less what its neighbours' line is short of the curve."""
+    sag = 1 - np.cos(np.pi / 160)
+    found = beyond(QUARTER[[k]] - distance, QUARTER)[0]
+    assert found <= distance + 1e-9
+    assert found >= distance - 3 * sag or k in (0, 40)
+
+
+def test_a_better_part_of_the_front_is_progress_and_so_is_a_better_end():
+    better = QUARTER[18:23] - 0.05
+    volume, mean, end = gains(better, QUARTER, ONE, EVERY)
+    assert volume > 1e-3 and mean > 1e-3 and end == 0.0
+    assert gains(np.array([[-0.01, 1.0]]), QUARTER, ONE, EVERY)[2] == pytest.approx(0.01 / 1.01)
+    assert not improves(QUARTER - 0.5 * BEYOND, QUARTER, ONE, EVERY)
+
+
+def test_a_front_of_one_point_is_measured_by_what_was_seen():
+    """Objectives in no conflict: rounding is no progress, in whatever units."""
+    extent = np.array([1e6, 1e-6])
+    best = np.array([[3.0, 5.0]])
+    assert not improves(best - 1e-7 * extent, best, extent, EVERY)
+    assert improves(best - 1e-2 * extent, best, extent, EVERY)
+
+
+# When it ends
+
+
+def test_it_ends_after_as_much_without_progress_as_is_stated():
+    first = after(Rounds.first(2, 250, 10**6), QUARTER, 250)
+    assert first.end == 500 and first.improved == 250 and not first.stopped
+    assert after(first, QUARTER, 500).stopped == DONE
+    some = after(first, QUARTER, 500, several=True)
+    assert not some.stopped and some.end == 750 and some.due > first.due > 0
+    at = 250 + PATIENCE * 250
+    assert after(replace(some, end=at), QUARTER, at, several=True).stopped == DONE
+    late = after(first, QUARTER - 0.1, 500)
+    assert late.improved == 500 and not after(late, QUARTER - 0.1, 750).stopped, "a later round made progress: there is more to find"
+    long = replace(late, improved=10_000)
+    assert not after(long, QUARTER, int(10_000 * (1 + AGAIN)) - 1).stopped
+    assert after(long, QUARTER, int(10_000 * (1 + AGAIN))).stopped == DONE
+
+
+def test_a_ceiling_ends_it():
+    first = after(Rounds.first(2, 250, 300), QUARTER, 250, ceiling=300)
+    assert first.end == 300 and not first.stopped
+    assert after(first, QUARTER - 0.1, 300, ceiling=300).stopped == "ceiling"
+
+
+def test_only_the_violation_counts_as_long_as_nothing_is_feasible():
+    none, opening = np.empty((0, 2)), Rounds.first(2, 250, 10**6)
+    first = judged(opening, none, none, 1.0, EVERY, 250, 250, 10**6, False)
+    assert first.improved == 250 and not len(first.front)
+    nearer = judged(first, none, none, 0.5, EVERY, 500, 250, 10**6, False)
+    assert nearer.improved == 500 and judged(first, none, none, 0.95, EVERY, 1000, 250, 10**6, False).stopped == DONE
+
+
+# Searches
+
+
+def vector(X: np.ndarray) -> np.ndarray:
+    g = 1 + X[:, 1:].sum(axis=1)
+    return np.stack([X[:, 0], g * (1 - np.sqrt(X[:, 0] / g))], axis=1)
+
+
+def double(least: float = -9.0) -> Problem:
+    """From rest at 0 to rest at 1."""
+    problem = Problem("double")
+    phase = problem.phase("way", t0=0.0, tf=(0.5, 3.0))
+    x, v = phase.state("x", bounds=(-10, 10), initial=0, final=1), phase.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = phase.control("u", bounds=(-5, 5))
+    phase.dynamics(x=v, v=u)
+    phase.path("place", x, lower=least)
+    problem.minimize("time", phase.tf)
+    problem.minimize("effort", phase.integral(u**2))
+    return problem
+
+
+MESH = DFET(3, 3)
+SMALL = MACS(agents=4, archive=6, mesh="fixed")
+
+
+def test_a_front_is_found_without_a_number():
+    """The front of `goddard` is known; five times the budget finds no more of it."""
+    front = MACS(mesh="fixed").solve(load("goddard"), seed=1, verify=None)
+    assert front.stats["stopped"] == "done" and front.stats["evaluations"] <= 1500 and front.stats["rounds"] >= 2
+    assert gd(front, goddard.reference()) < 1e-3 and len(front) == 10
+    long = MACS(mesh="fixed").solve(load("goddard"), evaluations=5 * front.stats["evaluations"], seed=1, verify=None)
+    assert hypervolume(front, goddard.reference()) > 0.999 * hypervolume(long, goddard.reference())
+
+
+def test_a_function_without_gradients_is_searched_until_it_is_done():
+    front = MACS().minimize(vector, [(0.0, 1.0)] * 5, seed=1)
+    assert front.stats["stopped"] == "done" and 4000 <= front.stats["evaluations"] < 40_000
+    assert np.abs(front.F[:, 1] - (1 - np.sqrt(front.F[:, 0]))).max() < 1e-2
+
+
+def test_objectives_in_no_conflict_end_soon():
+    front = MACS().minimize(lambda X: np.stack([X.sum(axis=1), 2 * X.sum(axis=1)], axis=1), [(0.0, 1.0)] * 3, seed=1)
+    assert front.stats["stopped"] == "done" and len(front) == 1 and front.F.max() < 1e-3
+
+
+def test_a_ceiling():
+    front = replace(SMALL, ceiling=100).solve(double(), MESH, seed=1, verify=None)
+    assert front.stats["stopped"] == "ceiling" and front.stats["evaluations"] == 100 and len(front) == 6
+
+
+def test_nothing_feasible_ends_soon():
+    front = SMALL.solve(double(least=0.5), MESH, seed=1)
+    assert front.stats["stopped"] == "settled" and "violates path 'place' of 'way'" in front.message
+
+
+def test_settings_follow_from_no_number_and_numbers_are_spent_in_full():
+    front = SMALL.solve(double(), MESH, evaluations=600, seed=1, verify=None)
+    assert front.stats["stopped"] == "budget" and front.stats["evaluations"] == 600 and "rounds" not in front.stats
+
+
+def test_a_callback_ends_it():
+    seen = []
+
+    def stop(progress):
+        assert progress.budget is None
+        seen.append(progress.evaluations)
+        return len(seen) == 3
+
+    front = SMALL.solve(double(), MESH, seed=1, verify=None, callback=stop)
+    assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
+
+
+@pytest.mark.parametrize("solve", [3, 12, 25])
+def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monkeypatch, solve):
+    whole = SMALL.solve(double(), MESH, seed=1, verify=None)
+    original, count = bilevel.scalarize, iter(range(10**6))
+
+    def interrupting(*arguments, **more):
+        found = original(*arguments, **more)
+        if next(count) == solve:
+            os.kill(os.getpid(), signal.SIGINT)
+        return found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bilevel, "scalarize", interrupting)
+        part = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    assert part.stats["stopped"] == "interrupted"
+    rest = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    assert np.array_equal(rest.F, whole.F) and np.array_equal(rest.decision, whole.decision)
+    assert rest.stats["rounds"] == whole.stats["rounds"] and rest.stats["stopped"] == whole.stats["stopped"] == "done"
+
+
+@pytest.mark.parametrize("iterations", [1, 10, 20])
+def test_it_goes_on_to_the_same_bits_from_between_iterations(tmp_path, iterations):
+    whole, left = SMALL.solve(double(), MESH, seed=2, verify=None), iter(range(iterations))
+    part = SMALL.solve(double(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt", callback=lambda p: next(left, None) is None)
+    assert part.stats["stopped"] == "callback"
+    rest = SMALL.solve(double(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt")
+    assert np.array_equal(rest.F, whole.F) and rest.stats["evaluations"] == whole.stats["evaluations"]
+
+
+def test_a_fruitless_round_is_not_polished(monkeypatch):
+    """The second round of `double` finds nothing beyond its front: the archive stays as the first polish left it."""
+    polishes, original = [], module.Rounds.news
+    monkeypatch.setattr(module.Rounds, "news", lambda self, found: polishes.append(original(self, found)) or polishes[-1])
+    front = SMALL.solve(double(), MESH, seed=1, verify=None)
+    assert polishes and polishes[-1] is False and front.stats["rounds"] == len(polishes) + 1
+
+
+def test_others_need_a_number():
+    with pytest.raises(ValueError, match=r"'double' has no number of its own, and NSGA2 needs one: .*only MACS searches until it is done"):
+        NSGA2().solve(double(), MESH)
+    problem = double()
+    problem.default_evaluations = 60
+    assert NSGA2(population=10).solve(problem, MESH, verify=None).stats["evaluations"] == 60
