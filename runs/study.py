@@ -67,8 +67,8 @@ class Study:
     terms : mapping, optional
         {label of a solver: terms of its own}: any of transcription (one, or {label of a problem: one}), evaluations, inner and start.
         Reports compare it with the others on each of their transcriptions.
-    evaluations : int, or mapping, optional
-        Budget of each run, or {label of a problem: budget}. Default: the problem's own.
+    evaluations : int, "auto", or mapping, optional
+        Budget of each run, or {label of a problem: budget}; "auto": searches of MACS end when they are done. Default: the problem's own.
     runs : int
         Of each cell.
     seed : int
@@ -273,14 +273,14 @@ class Study:
 
         Budgets of solvers on terms of their own shrink as the largest does. Its name ends in -quick.
         """
-        share = min(1.0, QUICK_EVALUATIONS / max(cell.evaluations for cell in self.cells))
+        share = min(1.0, QUICK_EVALUATIONS / max(cell.planned for cell in self.cells))
         own = {label: dict(terms) for label, terms in self.terms.items()}
         for label, terms in own.items():
             if "evaluations" in terms:
-                given = {cell.problem: cell.evaluations for cell in self.cells if cell.solver == label}
+                given = {cell.problem: cell.planned for cell in self.cells if cell.solver == label}
                 terms["evaluations"] = {problem: min(n, max(QUICK_LEAST, int(share * n))) for problem, n in given.items()}
         budgets = {
-            cell.problem: min(cell.evaluations, QUICK_EVALUATIONS) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})
+            cell.problem: min(cell.planned, QUICK_EVALUATIONS) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})
         }
         runs = min(self.runs, QUICK_RUNS if len(self.cells) <= MANY_CELLS else 1)
         return replace(self, name=f"{self.name}-quick", runs=runs, evaluations=budgets or None, terms=own)

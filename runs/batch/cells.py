@@ -82,8 +82,10 @@ def combine(
             for method_label in method_labels:
                 method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
                 budget = own_budgets.get(method_label, budgets)[label]
-                own |= {"evaluations": budget} if method_label in own_budgets else {}
+                own |= {"evaluations": AUTO if budget is None else budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
+                if budget is None and not method.searches_until_done:
+                    raise ValueError(f"{place}: evaluations = {AUTO!r} is for MACS; state a number, if need be in terms of '{method_label}'")
                 with errors_begin_with(place):
                     method.check_objectives(len(problem.goals))
                     _check_method(method, scheme, problem, own.get("start", start))
@@ -197,11 +199,17 @@ def _solver(label: str, given: Any) -> Solver:
         return catalogue.solver(name, **settings)
 
 
-def _budgets(given: Any, problems: Mapping[str, Statement]) -> dict[str, int]:
+def _budgets(given: Any, problems: Mapping[str, Statement]) -> dict[str, int | None]:
+    """The budget of each problem; None: until the search is done."""
     found = _by_problem("evaluations", given, problems, lambda problem: problem.default_evaluations)
     for label, budget in found.items():
-        check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
-    return {label: int(budget) for label, budget in found.items()}
+        if budget is None:
+            raise ValueError(f"evaluations: problem '{label}' has no number of its own: state one, or {AUTO!r} for MACS")
+        if not isinstance(budget, str):
+            check_count("evaluations" if budget is given else f"evaluations of '{label}'", budget, 1)
+        elif budget != AUTO:
+            raise ValueError(f"evaluations must be a whole number or {AUTO!r}, not {budget!r}")
+    return {label: None if budget == AUTO else int(budget) for label, budget in found.items()}
 
 
 def _by_problem(key: str, given: Any, problems: Mapping[str, Statement], own: Callable[[Any], Any]) -> dict[str, Any]:
@@ -253,8 +261,8 @@ class Cell:
     ----------
     problem, transcription, solver : str
         Labels, as the study names them; together they are the cell's name.
-    evaluations : int
-        Budget of each run.
+    evaluations : int or None
+        Budget of each run; None: until the search is done.
     details : mapping
         Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
     """
@@ -262,8 +270,13 @@ class Cell:
     problem: str
     transcription: str
     solver: str
-    evaluations: int
+    evaluations: int | None
     details: Mapping[str, Any] = field(hash=False, repr=False)
+
+    @property
+    def planned(self) -> int:
+        """Its budget, or where there is none about what a search takes."""
+        return PLANNED if self.evaluations is None else self.evaluations
 
     @property
     def labels(self) -> tuple[str, str, str]:

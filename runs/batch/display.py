@@ -32,7 +32,7 @@ class StudyDisplay(Display):
         self._title, self._total = title, len(runs)
         self._finished = sum(run.finished for run in runs)
         self._failed = len(runs) - len(todo) - self._finished
-        self._work, self._done = sum(run.cell.evaluations for run in todo), 0
+        self._work, self._done = sum(run.cell.planned for run in todo), 0
         self._going: dict[tuple[str, int], tuple[StoredRun, int, float]] = {}
 
     def __enter__(self) -> Self:
@@ -51,7 +51,7 @@ class StudyDisplay(Display):
     def ended(self, run: StoredRun, outcome: Outcome) -> None:
         """A run is kept."""
         self._going.pop((run.cell.folder, run.number), None)
-        self._done += run.cell.evaluations
+        self._done += run.cell.planned
         if outcome.status == FINISHED:
             self._finished += 1
         else:
@@ -62,7 +62,7 @@ class StudyDisplay(Display):
         """glides: 12 of 30 finished, 1 failed, 17 left; 0:41, 1:02 to go."""
         done = self._done + sum(evaluations for _, evaluations, _ in list(self._going.values()))
         left = self._total - self._finished - self._failed
-        ahead = f", {minutes(self.elapsed * (self._work - done) / done)} to go" if left and done else ""
+        ahead = f", {minutes(self.elapsed * (self._work - done) / done)} to go" if left and 0 < done < self._work else ""
         failed = f", {self._failed} failed" if self._failed else ""
         return f"{self._title}: {self._finished} of {self._total} finished{failed}, {left} left; {minutes(self.elapsed)}{ahead}"
 
@@ -78,6 +78,7 @@ class StudyDisplay(Display):
         for run, evaluations, elapsed in going[:SHOWN]:
             budget = run.cell.evaluations
             bar = ProgressBar(total=budget, completed=evaluations, width=20)
-            count = Text(f"{evaluations:,} / {budget:,} evaluations".replace(",", " "))
+            of = "" if budget is None else f" / {budget:,}"
+            count = Text(f"{evaluations:,}{of} evaluations".replace(",", " "))
             rows.add_row(Text(run.cell.name), Text(f"run {run.number}"), bar, count, Text(minutes(elapsed), style="dim"))
         return Group(Text(self.line(), style="bold"), rows)

@@ -41,8 +41,8 @@ class Samples:
 
     Parameters
     ----------
-    budget : int
-        Evaluations of the run.
+    budget : int or None
+        Evaluations of the run; None: it ends when it is done.
     report : callable, optional
     path : Path, optional
         A file in which they are stored. A resumed run replaces those after the count at which it begins.
@@ -53,8 +53,8 @@ class Samples:
         The columns of its `History`.
     """
 
-    def __init__(self, budget: int, report: Report | None = None, path: Path | None = None) -> None:
-        self._step, self._next, self._report, self._told, self._path = max(1, budget // NUMBER), 0, report, 0.0, path
+    def __init__(self, budget: int | None, report: Report | None = None, path: Path | None = None) -> None:
+        self._step, self._next, self._report, self._told, self._path = max(1, (budget or PLANNED) // NUMBER), 0, report, 0.0, path
         self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
         self._before, self._behind = _read(path), False
 

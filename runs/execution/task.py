@@ -48,7 +48,7 @@ class Task:
     """
 
     payload: Payload = field(repr=False)
-    evaluations: int
+    evaluations: int | None
     seed: int
     inner: str
     tolerance: float
