@@ -65,6 +65,11 @@ class GradientSolver(Solver):
     def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
         """The front of the gradient tool; `terms` are arguments that all of these have."""
 
+    @property
+    def searches_until_done(self) -> bool:
+        """See `SearchMethod.searches_until_done`: it evaluates no candidates."""
+        return True
+
     def solve(
         self,
         problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem,

@@ -14,6 +14,7 @@ import numpy as np
 
 from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
+from macs.search.rounds import PLANNED
 from macs.solvers import catalogue
 from macs.solvers.solver import Solver
 from problems import Problem, VectorProblem, load
@@ -27,6 +28,8 @@ from ..execution.task import Addressed, Payload
 from .terms import check_terms, sampling, terms_of_problem
 
 STATEMENTS = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
+AUTO = "auto"
+"""In place of a budget: a search of MACS ends when it is done."""
 Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
 
 
@@ -85,7 +88,7 @@ def combine(
                 own |= {"evaluations": AUTO if budget is None else budget} if method_label in own_budgets else {}
                 place = f"{label}, {scheme_label}, {method_label}"
                 if budget is None and not method.searches_until_done:
-                    raise ValueError(f"{place}: evaluations = {AUTO!r} is for MACS; state a number, if need be in terms of '{method_label}'")
+                    raise ValueError(f"{place}: evaluations {AUTO!r} is for MACS; state a number, if need be in terms of '{method_label}'")
                 with errors_begin_with(place):
                     method.check_objectives(len(problem.goals))
                     _check_method(method, scheme, problem, own.get("start", start))

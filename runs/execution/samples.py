@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from macs.io.atomic import write_whole
+from macs.search.rounds import PLANNED
 
 from ..data.schema import checked, from_record, to_record
 

@@ -66,6 +66,36 @@ def test_all_may_work_apart(tmp_path):
     assert comparison.transcription == EACH and set(comparison.fronts) == {"macs", "nsga2"}
 
 
+def test_searches_of_macs_may_end_when_they_are_done(tmp_path):
+    made = study(terms={"macs": {**APART["macs"], "evaluations": "auto", "inner": "auto"}}, runs=1, transcriptions="shooting:5")
+    cells = {cell.solver: cell for cell in made.cells}
+    assert cells["macs"].evaluations is None and cells["macs"].planned > 0 and cells["nsga2"].evaluations == 60
+    assert {cell.solver: cell.evaluations for cell in made.quick().cells}["macs"] == 500
+    made.run(tmp_path / "out", executor=Inline())
+    found = {run.cell.solver: run.front.stats for run in Store.open(tmp_path / "out").runs()}
+    assert found["macs"]["stopped"] == "done" and found["macs"]["evaluations"] >= 500 and found["nsga2"]["evaluations"] == 60
+    assert "macs" in str(made.report(tmp_path / "out", figures=False))
+
+
+def endless() -> Problem:
+    problem = glide()
+    problem.default_evaluations = None
+    return problem
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"evaluations": "auto"}, r"shooting:5, nsga2: evaluations 'auto' is for MACS; state a number, if need be in terms of 'nsga2'"),
+        ({"evaluations": "many"}, "evaluations must be a whole number or 'auto', not 'many'"),
+        ({"evaluations": None, "problems": endless()}, "problem 'glide' has no number of its own: state one, or 'auto' for MACS"),
+    ],
+)
+def test_budgets_that_cannot_be(given, message):
+    with pytest.raises(ValueError, match=message):
+        study(**given)
+
+
 def test_a_solver_may_have_a_transcription_for_each_problem():
     two = {"slow": glide(), "fast": glide()}
     own = {"slow": "radau:1x3", "fast": "chebyshev:1x4"}
