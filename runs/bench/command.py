@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import density, inner, methods, passages, peers, population, prefer, search, standard, study
+from . import density, fronts, inner, methods, passages, peers, population, prefer, search, standard, study
 from .measured import Row, save
 
 BENCHMARKS = {
     "density": density,
+    "front": fronts,
     "inner": inner,
     "methods": methods,
     "passages": passages,
@@ -52,6 +53,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     cases = [case for case in inner.INNER if case.quick or not quick]
     work: dict[str, Callable[[], None]] = {
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
+        "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
         "passages": lambda: passages.bench_passages(rows, passages.QUICK if quick else passages.Effort()),

@@ -38,6 +38,7 @@ BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
 density     shooting on equal intervals, and on as many that follow the trajectory: error when simulated, and of the objective
+front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 passages    the boundary value problem of aerocapture by our solver and its table, against scipy's solve_bvp at known accuracy

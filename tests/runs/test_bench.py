@@ -19,8 +19,9 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, density, inner, methods, passages, population, prefer, search, standard, study
+from runs.bench import command, density, fronts, inner, methods, passages, population, prefer, search, standard, study
 from runs.bench.cases import BATCH, INNER
+from runs.bench.fronts.contest import as_good
 from runs.bench.measured import Row, short
 from runs.cli import main
 from transcription import DFET
@@ -61,6 +62,7 @@ def small(monkeypatch):
     monkeypatch.setattr(command.density, "QUICK", (density.Flight("standard/van_der_pol", density.on(8)),))
     monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
     monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
+    monkeypatch.setattr(command.fronts, "QUICK", fronts.Effort(fronts.QUICK.cases[:1], (1,), (100,)))
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.passages, "QUICK", passages.Effort(rounds=1, coefficients=2, rows=20))
     monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
@@ -136,6 +138,25 @@ def test_searches_for_the_same_time_and_points(small):
     assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
     assert all(t > 0.9 * o for o, t in zip(ours.values["seconds"], theirs.values["seconds"], strict=True))
     assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
+
+
+def test_fronts_to_the_same_quality():
+    rows: list[Row] = []
+    fronts.bench_fronts(rows, fronts.Effort(fronts.QUICK.cases[:1], (1, 2), (60, 1000)))
+    found = {row.who: row for row in rows}
+    assert [*found] == ["until done", "propagate", "projection", "sweep", "sweep, ten starts"]
+    ours, projection = found["until done"], found["projection"]
+    assert ours.values["good"] == [1.0, 1.0] == ours.values["ratio"] and ours.of("volume") > 0.97
+    assert projection.values["evaluations"] == [1000.0, 1000.0] and projection.of("good", np.min) == 1.0, "60 were not enough"
+    np.testing.assert_allclose(np.array(projection.values["seconds"]) / ours.values["seconds"], projection.values["ratio"])
+    text = fronts.report(rows)
+    assert "goddard: " in text and "(asked 1.3 at most)" in text and all(len(line) <= 150 for line in text.splitlines())
+
+
+def test_a_front_that_is_as_good():
+    front = np.stack([np.linspace(0, 1, 30), 1 - np.sqrt(np.linspace(0, 1, 30))], axis=1)
+    assert as_good(front, front) and not as_good(front[:-3], front), "an end is missing"
+    assert as_good(front[[0, *range(1, 29, 2), 29]], front) and not as_good(front + 0.01, front) and not as_good(front[:0], front)
 
 
 def test_a_guided_search_beside_an_even_one():
@@ -257,6 +278,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
         table = list(csv.DictReader(file))
     assert {row["benchmark"] for row in table} == {
         "density",
+        "front",
         "inner",
         "methods",
         "passages",
@@ -301,7 +323,10 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["bench", "studies"], ["studies", "study", "density, inner, methods, passages, peers, population, prefer, search, standard"]),
+        (
+            ["bench", "studies"],
+            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, search, standard"],
+        ),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
     ],
