@@ -156,7 +156,7 @@ def test_fronts_to_the_same_quality():
 def test_a_front_that_is_as_good():
     front = np.stack([np.linspace(0, 1, 30), 1 - np.sqrt(np.linspace(0, 1, 30))], axis=1)
     assert as_good(front, front) and not as_good(front[:-3], front), "an end is missing"
-    assert as_good(front[[0, *range(1, 29, 2), 29]], front) and not as_good(front + 0.01, front) and not as_good(front[:0], front)
+    assert as_good(np.delete(front, 15, axis=0), front) and not as_good(front + 0.01, front) and not as_good(front[:0], front)
 
 
 def test_a_guided_search_beside_an_even_one():
@@ -325,7 +325,7 @@ def test_an_interrupt_ends_the_steps():
     [
         (
             ["bench", "studies"],
-            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, search, standard"],
+            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, search"],
         ),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),

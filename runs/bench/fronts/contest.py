@@ -107,9 +107,9 @@ def report(rows: Sequence[Row]) -> str:
     lines = [
         f"FRONTS: MACS with defaults until it is done, {POINTS} points, on a given mesh, not simulated. 'propagate' and 'projection': the",
         "same search with these inner levels, and the fewest evaluations of a few numbers with which its front is as good as ours: 0.99 of",
-        "the hypervolume, ends within 0.001 of the ranges; the time is that of this search alone. Where none is as good, the time is that of",
-        "the most evaluations. 'sweep': from the problem's guess, one start or ten a point. Volume: in that of ten points of the best of all",
-        "of one seed. Median and quartiles over seeds, least and greatest of few.",
+        "the hypervolume, ends within 0.001 of the ranges; the time is that of this search alone. Where none is as good, the time is that",
+        "of the most evaluations. 'sweep': from the problem's guess, one start or ten a point. Volume: in that of ten points of the best",
+        "of all of one seed. Median and quartiles over seeds, least and greatest of few.",
         "",
         table(rows, COLUMNS),
         "",
