@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from macs import MACS, NSGA2
 from macs.evaluation import bilevel
+from macs.gradients import multistart
 from macs.pareto import directions
 from macs.search import rounds as module
 from macs.search.rounds import AGAIN, BEYOND, DONE, PATIENCE, Rounds, beyond, gains, improves, judged
@@ -214,3 +215,22 @@ def test_others_need_a_number():
     problem = double()
     problem.default_evaluations = 60
     assert NSGA2(population=10).solve(problem, MESH, verify=None).stats["evaluations"] == 60
+
+
+@pytest.mark.parametrize("solve", [2, 9, 45])
+def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
+    """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 45 of a later round."""
+    whole = SMALL.solve(double(), MESH, seed=1, verify=None)
+    original, count = multistart.scalarize, iter(range(10**6))
+
+    def interrupting(*arguments, **more):
+        if next(count) == solve:
+            os.kill(os.getpid(), signal.SIGINT)
+        return original(*arguments, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(multistart, "scalarize", interrupting)
+        part = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    assert part.stats["stopped"] == "interrupted" and not part.stats["reproducible"]
+    rest = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    assert np.array_equal(rest.F, whole.F) and rest.stats["gradient_solves"] == whole.stats["gradient_solves"]
