@@ -86,7 +86,7 @@ def test_the_truss_is_found_to_its_closed_form():
     truth = four_bar_truss.reference()
     ranges = np.ptp(truth, axis=0)
     distances = np.linalg.norm((found.objectives[:, None] - truth) / ranges, axis=2).min(axis=1)
-    assert found.stats["evaluations"] == 5_000 and distances.mean() < 2e-3
+    assert found.stats["stopped"] == "done" and found.stats["evaluations"] <= 20_000 and distances.mean() < 2e-3
     assert np.allclose(found.objectives.min(axis=0), truth.min(axis=0), rtol=1e-3)
 
 

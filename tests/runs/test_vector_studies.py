@@ -136,7 +136,7 @@ def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatc
 
 
 def test_a_problem_of_a_file_is_evaluated_again_only_with_trust(mine, capsys):
-    assert main(["solve", mine, "--seed", "1", "--out", "own.nc"]) == 0
+    assert main(["solve", mine, "--seed", "1", "--evaluations", "150", "--out", "own.nc"]) == 0
     assert "150 evaluations" in capsys.readouterr().out
     assert main(["verify", "own.nc"]) == 2
     assert "not run unasked" in capsys.readouterr().err

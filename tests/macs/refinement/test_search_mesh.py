@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from macs import MACS
+from macs import MACS, NSGA2
 from macs.refinement.search_mesh import COARSE, MOST, _together, default_transcription, found_mesh
 from problems import Problem, load
 from problems.cases.standard.collection import published
@@ -125,5 +125,7 @@ def test_a_mesh_with_more_elements_than_a_search_is_to_have_is_thinned_evenly():
 def test_the_number_of_evaluations_has_a_default(budget):
     problem = smooth()
     problem.default_evaluations = 250
-    front = MACS(agents=4, archive=4).solve(problem, evaluations=budget, seed=1)
+    front = NSGA2(population=10).solve(problem, evaluations=budget, seed=1)
     assert front.stats["evaluations"] == (budget or 250)
+    if budget is None:
+        assert MACS(agents=4, archive=4).solve(problem, seed=1).stats["stopped"] == "done"
