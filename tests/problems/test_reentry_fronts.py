@@ -116,7 +116,8 @@ def test_flights_of_the_reference_pass_south_of_all_zones(flights):
 def test_points_that_the_default_search_calls_verified_are_right():
     """Each of those that stayed on the mesh of the search, by the equations that are written here."""
     problem = load("reentry_case1")
-    front = MACS().solve(problem, inner=problem.default_inner, start=problem.default_start, seed=3)
+    given = {"inner": problem.default_inner, "start": problem.default_start, "evaluations": problem.default_evaluations}
+    front = MACS().solve(problem, seed=3, **given)
     assert len(front) == 10 and front.verified.sum() >= 8
     kept = [point for point in front if point.verified and point.transcription["settings"]["mesh"] is None]
     laws = np.array([point.trajectory["entry"].control.coefficients for point in kept])
