@@ -39,7 +39,7 @@ MOST_ITERATIONS = 500
 """Iterations of IPOPT after which a strategy of a solve is given up by default."""
 
 
-SHORT, LITTLE, SHARE = 200, 6e5, 4.0
+SHORT, LITTLE, SHARE = 200, 6e5, 1.0
 """Most iterations of each further start; work, see `Counts`, that they may always take, a matter of a second or two; and what they may
 take beside the first one."""
 

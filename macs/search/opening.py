@@ -62,7 +62,7 @@ class Opening:
     def __init__(
         self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: np.random.Generator
     ) -> None:
-        self._evaluator, self._given, self._budget, self._rng = evaluator, given, budget, rng
+        self._evaluator, self._Z, self._given, self._budget, self._rng = evaluator, Z, given, budget, rng
         self._points = min(points, FIRST)
         gradients = gradients and isinstance(evaluator, Bilevel)
         quick = gradients and bool(evaluator.ways)
@@ -72,7 +72,7 @@ class Opening:
         self.evaluations, self.optima, self.several = [self.population], self.population.take(np.arange(0)), False
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
-            self._project(Z)
+            self._project()
             solver = self._solver()
         if solver is not None and not stopping():
             self.optima = self._found(solver)
@@ -82,11 +82,11 @@ class Opening:
     def _feasible(self) -> np.ndarray:
         return self.population.violation <= self._evaluator.tolerance
 
-    def _project(self, Z: np.ndarray) -> None:
+    def _project(self) -> None:
         """Make the population feasible by the fixed rule, as far as the budget goes."""
-        found = self._evaluator.evaluate(Z[: max(0, self._budget - self._evaluator.counts.evaluations)])
-        rows = np.arange(len(Z))
-        rows[: len(found.F)] += len(Z)
+        found = self._evaluator.evaluate(self._Z[: max(0, self._budget - self._evaluator.counts.evaluations)])
+        rows = np.arange(len(self._Z))
+        rows[: len(found.F)] += len(self._Z)
         self.population = self.population.joined(found).take(rows)
         self.evaluations.append(found)
 
@@ -99,7 +99,7 @@ class Opening:
         violation = np.where(known, seen.violation, np.inf)
         start = guessed_start(self._evaluator.nlp)
         if known[given].any():
-            start = seen.Z[[np.argmin(violation[given])]]
+            start = self._Z[[np.argmin(violation[given])]]  # as it was given: propagated states may be far from those
         elif start is None and known.any():
             start = seen.Z[[np.argmin(violation)]]
         if start is None:

@@ -110,3 +110,21 @@ def test_what_nothing_makes_feasible_is_projected() -> None:
     few = projecting(walk(least=0.5), METHOD)
     MACS(agents=4, sample=10).begin(few, 13, np.random.default_rng(0))
     assert few.counts.evaluations == 13, "as far as the budget goes"
+
+
+def test_they_begin_at_what_was_given_and_not_at_its_propagated_states(monkeypatch) -> None:
+    starts = []
+
+    class Recorded(MultistartSolver):
+        def __init__(self, nlp, given, *rest):
+            starts.append(given)
+            super().__init__(nlp, given, *rest)
+
+    monkeypatch.setattr(opening, "MultistartSolver", Recorded)
+    nlp = METHOD.nlp(walk().compile())
+    given = np.clip(nlp.first_guess(nlp.lower[nlp.free][None]) + 0.1, nlp.lower, nlp.upper)
+    for inner in ("propagate", "auto"):
+        MACS(agents=4).begin(Bilevel(nlp, inner_solver(inner), 1e-6), 60, np.random.default_rng(3), given)
+    assert len(starts) == 2 and not np.allclose(nlp.propagate(given), given)
+    np.testing.assert_array_equal(starts[0], given)
+    np.testing.assert_array_equal(starts[1], given)
