@@ -39,9 +39,8 @@ MOST_ITERATIONS = 500
 """Iterations of IPOPT after which a strategy of a solve is given up by default."""
 
 
-SHORT, LITTLE, SHARE = 200, 6e5, 1.0
-"""Most iterations of each further start; work, see `Counts`, that they may always take, a matter of a second or two; and what they may
-take beside the first one."""
+SHORT, LITTLE = 200, 6e5
+"""Most iterations of each further start; work, see `Counts`, that they may always take together, a matter of a second or two."""
 
 
 class GradientSolves:
@@ -167,11 +166,11 @@ class MultistartSolver:
         return self.better(found, reference, weights)
 
     def seek(self, reference: np.ndarray, weights: np.ndarray, census: Census) -> Solved:
-        """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or several times what
-        the first one took."""
+        """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or as much as the first
+        one took."""
         before = self.counts.work
         best = self.solve(reference, weights)
-        limit = self.counts.work + max(LITTLE, SHARE * (self.counts.work - before))
+        limit = self.counts.work + max(LITTLE, self.counts.work - before)
         census.add(self.loss(best, reference, weights))
         while not (census.enough or self.drawn_enough or self.counts.work >= limit or stopping()):
             # Where none has converged yet, they may all take long.
