@@ -46,8 +46,9 @@ def test_without_gradients_or_time_there_are_none() -> None:
     assert not len(state.optima) and evaluator.counts.gradient_solves == 0
 
 
-def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
-    starts = []
+def recorded(monkeypatch) -> list[np.ndarray]:
+    """Where solvers of openings begin from now on."""
+    starts: list[np.ndarray] = []
 
     class Recorded(MultistartSolver):
         def __init__(self, nlp, given, *rest):
@@ -55,6 +56,11 @@ def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
             super().__init__(nlp, given, *rest)
 
     monkeypatch.setattr(opening, "MultistartSolver", Recorded)
+    return starts
+
+
+def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
+    starts = recorded(monkeypatch)
     evaluator = evaluator_of_vectors()
     rng = np.random.default_rng(3)
     worse, better = evaluator.box.to_values(rng.random((2, len(evaluator.free))))
@@ -113,14 +119,7 @@ def test_what_nothing_makes_feasible_is_projected() -> None:
 
 
 def test_they_begin_at_what_was_given_and_not_at_its_propagated_states(monkeypatch) -> None:
-    starts = []
-
-    class Recorded(MultistartSolver):
-        def __init__(self, nlp, given, *rest):
-            starts.append(given)
-            super().__init__(nlp, given, *rest)
-
-    monkeypatch.setattr(opening, "MultistartSolver", Recorded)
+    starts = recorded(monkeypatch)
     nlp = METHOD.nlp(walk().compile())
     given = np.clip(nlp.first_guess(nlp.lower[nlp.free][None]) + 0.1, nlp.lower, nlp.upper)
     for inner in ("propagate", "auto"):
