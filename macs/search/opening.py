@@ -104,9 +104,8 @@ class Opening:
             start = seen.Z[[np.argmin(violation)]]
         if start is None:
             return None
-        solves = GradientSolves(self._evaluator.tolerance)
-        solves.before, solves.counts = self._evaluator.before_batch, self._evaluator.counts
-        solver = MultistartSolver(self._evaluator.nlp, start, None if self._evaluator.ways else 1, self._rng, solves)
+        count = None if self._evaluator.ways else 1
+        solver = MultistartSolver(self._evaluator.nlp, start, count, self._rng, _counted_by(self._evaluator))
         solver.unseen, solver.most = UNSEEN, self._budget // EVERY
         return solver
 
@@ -147,15 +146,13 @@ def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: i
         How many such starts there have been before.
     rng : numpy.random.Generator
     """
-    solves = GradientSolves(evaluator.tolerance)
-    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
-    solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, solves)
+    solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
     m = archive.F.shape[1]
     ends = archive.F[extremes(archive.F)]
     singles = [single_task(i, m) for i in range(m)]
     between = targets(ends, np.ptp(ends, axis=0), max(min(points, FIRST), m + 1), METHODS[0]) if m > 1 else []
     found = []
-    with solves.at_most(SHORT):
+    with solver.solves.at_most(SHORT):
         for k in range(drawn, drawn + count):
             if stopping():
                 break
@@ -165,6 +162,13 @@ def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: i
             start = Starts(evaluator.nlp, rng, starts.FIRST + number + number // len(tasks)).draw(solver.nearest(*task))[0]
             found.append(solver.from_vector(start, *task))
     return _feasible_of(found, evaluator)
+
+
+def _counted_by(evaluator: Evaluator) -> GradientSolves:
+    """Gradient solves whose counts are the evaluator's, and before each of which it does what it does before a batch."""
+    solves = GradientSolves(evaluator.tolerance)
+    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
+    return solves
 
 
 def _feasible_of(found: list[Solved], evaluator: Bilevel) -> Evaluation:

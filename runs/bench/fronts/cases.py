@@ -16,12 +16,11 @@ GRAVITY = 9.80665e-3
 
 @dataclass(frozen=True)
 class Case:
-    """A problem, the word of its transcription, and whether it has more than one valley."""
+    """A problem, and the word of its transcription."""
 
     name: str
     build: Callable[[], Problem]
     transcription: str
-    valleys: bool
 
 
 def cart_pole() -> Problem:
@@ -69,7 +68,7 @@ def bioreactor() -> Problem:
 
 
 def rocket() -> Problem:
-    """Payload against time of flight of a rocket with two stages over a flat earth, with the relief of a round one."""
+    """Payload against time to orbit of a rocket with two stages over a flat earth, with the centrifugal force of a round one."""
     problem = Problem("two-stage rocket")
     payload = problem.parameter("payload", bounds=(0.5, 8.0), unit="t")
     first = problem.phase("first stage", t0=0.0, tf=(50.0, 150.0))
@@ -109,10 +108,10 @@ def rocket() -> Problem:
 
 
 CASES = (
-    Case("goddard", lambda: load("goddard"), "dfet:4x6", False),
-    Case("orbit_rise", lambda: load("orbit_rise"), "dfet:30x1", False),
-    Case("rocket", rocket, "dfet:8x4", False),
-    Case("cart-pole", cart_pole, "dfet:10x5", True),
-    Case("landing_site", lambda: load("landing_site"), "dfet:1x3", True),
-    Case("bioreactor", bioreactor, "dfet:12x3:bernstein", True),
+    Case("goddard", lambda: load("goddard"), "dfet:4x6"),
+    Case("orbit_rise", lambda: load("orbit_rise"), "dfet:30x1"),
+    Case("rocket", rocket, "dfet:8x4"),
+    Case("cart-pole", cart_pole, "dfet:10x5"),
+    Case("landing_site", lambda: load("landing_site"), "dfet:1x3"),
+    Case("bioreactor", bioreactor, "dfet:12x3:bernstein"),
 )

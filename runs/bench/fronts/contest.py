@@ -125,8 +125,11 @@ def _verdicts(rows: Sequence[Row]) -> list[str]:
         rivals = [found[case, who] for who in (PROPAGATE, PROJECTION)]
         best = min((row.of("ratio") for row in rivals if row.of("good") == 1.0), default=np.inf)
         said = "no other inner level is as good" if np.isinf(best) else f"{short(1 / best)} times as long as the better other inner level"
-        told = found[case, SWEEP]
-        lines.append(f"{case}: {said} (asked 1.3 at most); {short(1 / told.of('ratio'))} times as long as a sweep from one start")
+        one = found[case, SWEEP]
+        told = (
+            f"{short(1 / one.of('ratio'))} times as long as a sweep from one start" if one.of("good") == 1.0 else "one start is not enough"
+        )
+        lines.append(f"{case}: {said} (asked 1.3 at most); {told}")
     return lines
 
 

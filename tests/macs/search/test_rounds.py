@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_opening import walk
 
 from macs import MACS, NSGA2
 from macs.evaluation import bilevel
@@ -17,7 +18,7 @@ from macs.gradients import multistart
 from macs.pareto import directions
 from macs.search import rounds as module
 from macs.search.rounds import AGAIN, BEYOND, DONE, PATIENCE, Rounds, beyond, gains, improves, judged
-from problems import Problem, load
+from problems import load
 from problems.cases import goddard
 from runs.measures.indicators import gd, hypervolume
 from transcription import DFET
@@ -108,19 +109,6 @@ def vector(X: np.ndarray) -> np.ndarray:
     return np.stack([X[:, 0], g * (1 - np.sqrt(X[:, 0] / g))], axis=1)
 
 
-def double(least: float = -9.0) -> Problem:
-    """From rest at 0 to rest at 1."""
-    problem = Problem("double")
-    phase = problem.phase("way", t0=0.0, tf=(0.5, 3.0))
-    x, v = phase.state("x", bounds=(-10, 10), initial=0, final=1), phase.state("v", bounds=(-5, 5), initial=0, final=0)
-    u = phase.control("u", bounds=(-5, 5))
-    phase.dynamics(x=v, v=u)
-    phase.path("place", x, lower=least)
-    problem.minimize("time", phase.tf)
-    problem.minimize("effort", phase.integral(u**2))
-    return problem
-
-
 MESH = DFET(3, 3)
 SMALL = MACS(agents=4, archive=6, mesh="fixed")
 
@@ -146,17 +134,17 @@ def test_objectives_in_no_conflict_end_soon():
 
 
 def test_a_ceiling():
-    front = replace(SMALL, ceiling=100).solve(double(), MESH, seed=1, verify=None)
+    front = replace(SMALL, ceiling=100).solve(walk(), MESH, seed=1, verify=None)
     assert front.stats["stopped"] == "ceiling" and front.stats["evaluations"] == 100 and len(front) == 6
 
 
 def test_nothing_feasible_ends_soon():
-    front = SMALL.solve(double(least=0.5), MESH, seed=1)
-    assert front.stats["stopped"] == "settled" and "violates path 'place' of 'way'" in front.message
+    front = SMALL.solve(walk(least=0.5), MESH, seed=1)
+    assert front.stats["stopped"] == "settled" and "violates path 'place' of 'walk'" in front.message
 
 
 def test_settings_follow_from_no_number_and_numbers_are_spent_in_full():
-    front = SMALL.solve(double(), MESH, evaluations=600, seed=1, verify=None)
+    front = SMALL.solve(walk(), MESH, evaluations=600, seed=1, verify=None)
     assert front.stats["stopped"] == "budget" and front.stats["evaluations"] == 600 and "rounds" not in front.stats
 
 
@@ -168,13 +156,13 @@ def test_a_callback_ends_it():
         seen.append(progress.evaluations)
         return len(seen) == 3
 
-    front = SMALL.solve(double(), MESH, seed=1, verify=None, callback=stop)
+    front = SMALL.solve(walk(), MESH, seed=1, verify=None, callback=stop)
     assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
 
 
 @pytest.mark.parametrize("solve", [3, 12, 25])
 def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monkeypatch, solve):
-    whole = SMALL.solve(double(), MESH, seed=1, verify=None)
+    whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
     original, count = bilevel.scalarize, iter(range(10**6))
 
     def interrupting(*arguments, **more):
@@ -185,34 +173,34 @@ def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monke
 
     with monkeypatch.context() as patch:
         patch.setattr(bilevel, "scalarize", interrupting)
-        part = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+        part = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert part.stats["stopped"] == "interrupted"
-    rest = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    rest = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert np.array_equal(rest.F, whole.F) and np.array_equal(rest.decision, whole.decision)
     assert rest.stats["rounds"] == whole.stats["rounds"] and rest.stats["stopped"] == whole.stats["stopped"] == "done"
 
 
 @pytest.mark.parametrize("iterations", [1, 10, 20])
 def test_it_goes_on_to_the_same_bits_from_between_iterations(tmp_path, iterations):
-    whole, left = SMALL.solve(double(), MESH, seed=2, verify=None), iter(range(iterations))
-    part = SMALL.solve(double(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt", callback=lambda p: next(left, None) is None)
+    whole, left = SMALL.solve(walk(), MESH, seed=2, verify=None), iter(range(iterations))
+    part = SMALL.solve(walk(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt", callback=lambda p: next(left, None) is None)
     assert part.stats["stopped"] == "callback"
-    rest = SMALL.solve(double(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt")
+    rest = SMALL.solve(walk(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert np.array_equal(rest.F, whole.F) and rest.stats["evaluations"] == whole.stats["evaluations"]
 
 
 def test_a_fruitless_round_is_not_polished(monkeypatch):
-    """The second round of `double` finds nothing beyond its front: the archive stays as the first polish left it."""
+    """The second round of `walk` finds nothing beyond its front: the archive stays as the first polish left it."""
     polishes, original = [], module.Rounds.news
     monkeypatch.setattr(module.Rounds, "news", lambda self, found: polishes.append(original(self, found)) or polishes[-1])
-    front = SMALL.solve(double(), MESH, seed=1, verify=None)
+    front = SMALL.solve(walk(), MESH, seed=1, verify=None)
     assert polishes and polishes[-1] is False and front.stats["rounds"] == len(polishes) + 1
 
 
 def test_others_need_a_number():
-    with pytest.raises(ValueError, match=r"'double' has no number of its own, and NSGA2 needs one: .*only MACS searches until it is done"):
-        NSGA2().solve(double(), MESH)
-    problem = double()
+    with pytest.raises(ValueError, match=r"'walk' has no number of its own, and NSGA2 needs one: .*only MACS searches until it is done"):
+        NSGA2().solve(walk(), MESH)
+    problem = walk()
     problem.default_evaluations = 60
     assert NSGA2(population=10).solve(problem, MESH, verify=None).stats["evaluations"] == 60
 
@@ -220,7 +208,7 @@ def test_others_need_a_number():
 @pytest.mark.parametrize("solve", [2, 9, 45])
 def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
     """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 45 of a later round."""
-    whole = SMALL.solve(double(), MESH, seed=1, verify=None)
+    whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
     original, count = multistart.scalarize, iter(range(10**6))
 
     def interrupting(*arguments, **more):
@@ -230,7 +218,7 @@ def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_p
 
     with monkeypatch.context() as patch:
         patch.setattr(multistart, "scalarize", interrupting)
-        part = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+        part = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert part.stats["stopped"] == "interrupted" and not part.stats["reproducible"]
-    rest = SMALL.solve(double(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+    rest = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert np.array_equal(rest.F, whole.F) and rest.stats["gradient_solves"] == whole.stats["gradient_solves"]
