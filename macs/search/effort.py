@@ -29,10 +29,10 @@ all work; all evaluations, or solves."""
 
 
 def no_effort(ways: int, gradients: int) -> np.ndarray:
-    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, 0 without them, are believed to bring a
-    whole front each, until they were tried."""
+    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, are believed to bring a whole front each,
+    until they were tried. Without gradients there is nothing to choose: what is only propagated is never made feasible."""
     effort = np.zeros((ways + 1, 4))
-    effort[ways, [BROUGHT, FOR]] = 1.0 if gradients else 0.0, gradients
+    effort[ways, [BROUGHT, FOR]] = 1.0, gradients
     return effort
 
 
@@ -95,8 +95,8 @@ class Gains:
 
 def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Gains, every: int | None) -> Evaluation:
     """The evaluation of full vectors (k, D), each by the way that is worth most now; the state's effort knows what that brought. As long as
-    nothing is feasible, all are projected."""
-    if not evaluator.ways or not len(state.archive):
+    nothing is feasible, and without gradients, all are projected."""
+    if len(state.effort) == 1 or not len(state.archive):
         return evaluator.evaluate(Z)
     chosen, parts = ways_of(state.effort, len(Z), every, MAKING * Z.shape[1]), []
     for way in np.unique(chosen).tolist():

@@ -103,7 +103,7 @@ class MACS(Settings, Solver):
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
             credit=no_credit(),
-            effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1] if gradients else 0),
+            effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
             optima=opening.optima.F[opening.optima.status == CONVERGED],
@@ -151,7 +151,6 @@ class MACS(Settings, Solver):
         if state.evaluations >= budget:
             return
         self._begin_anew(state, evaluator)
-        self._begin_anew(state, evaluator)
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
@@ -163,7 +162,7 @@ class MACS(Settings, Solver):
                 gains, before = Gains(state, evaluator.tolerance), evaluator.counts.work
                 found = gradient_action.individual_action(state, evaluator, self.F, guide)
                 brought = sum(gains.of(one) for one in found)
-                state.effort = credited(state.effort, len(evaluator.ways), brought, evaluator.counts.work - before, len(found))
+                state.effort = credited(state.effort, -1, brought, evaluator.counts.work - before, len(found))
                 remember(state, found, self, evaluator)
         assign(state, self, guide)
         state.iteration += 1
@@ -275,7 +274,7 @@ class MACS(Settings, Solver):
         """Where the inner level was chosen during the search, "ways" are the evaluations and the work of each. With a preference that the
         archive's ranges do not contain, "prefer" is the reason why it did not guide the search."""
         objection = self._objection(state, evaluator)
-        found: dict[str, Any] = {"ways": spent(state.effort, evaluator.ways)} if evaluator.ways else {}
+        found: dict[str, Any] = {"ways": spent(state.effort, evaluator.ways)} if len(state.effort) > 1 else {}
         found |= {} if state.rounds is None else {"rounds": state.rounds.finished}
         return found | ({"prefer": f"not followed: {objection}"} if objection else {})
 
