@@ -29,8 +29,8 @@ all work; all evaluations, or solves."""
 
 
 def no_effort(ways: int, gradients: int) -> np.ndarray:
-    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, are believed to bring a whole front each,
-    until they were tried. Without gradients there is nothing to choose: what is only propagated is never made feasible."""
+    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, are believed to bring a whole front
+    each, until they were tried. Without gradients there is nothing to choose: what is only propagated is never made feasible."""
     effort = np.zeros((ways + 1, 4))
     effort[ways, [BROUGHT, FOR]] = 1.0, gradients
     return effort

@@ -75,9 +75,10 @@ class Solver(SearchMethod):
             The same seed gives the same front, to the last bit. None draws one, which is recorded in `stats`.
         inner : str or InnerSolver, optional
             How candidates are made feasible: "auto" (MACS with gradients chooses between propagation, a quick projection and IPOPT, by
-            what each has brought for its work; all others as by "projection"), "projection" (fast, and IPOPT if that fails), "propagate" (not at all), "none"
-            (not at all, and states are not propagated, but searched, too, with the dynamics as constraints), "ipopt" (the nearest feasible
-            point), "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own. Default: the problem's own, usually "auto".
+            what each has brought for its work; all others as by "projection"), "projection" (fast, and IPOPT if that fails), "propagate"
+            (not at all), "none" (not at all, and states are not propagated, but searched, too, with the dynamics as constraints), "ipopt"
+            (the nearest feasible point), "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own. Default: the problem's
+            own, usually "auto".
         tolerance : float
             Largest scaled residual of a feasible point.
         start : Front, Points, array (k, n), "uniform", "smooth" or Smooth, optional
