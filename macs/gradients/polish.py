@@ -39,7 +39,8 @@ def polish(
     limit: int,
     exponent: float | None = None,
     guide: Guide | None = None,
-    optima: np.ndarray | None = None,
+    optima: Archive | None = None,
+    alike: bool = False,
 ) -> Archive:
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
@@ -48,7 +49,7 @@ def polish(
     2. One guarded solve from each point that no solve has found; the best point of each objective is first solved for the least value of
        that objective.
     3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two objectives and
-       few solves, each from the point that is nearest to dominating it.
+       few solves, each from the point that is nearest to dominating it. Not where all starts are `alike`.
     4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap
        is too far, places nearer to its sides. The ends are then solved once more from their neighbours.
 
@@ -66,12 +67,15 @@ def polish(
         See `archive.pair_energies`.
     guide : Guide, optional
         How densely points are wanted. Default: evenly.
-    optima : array (k, m), optional
-        Objectives of points that gradient solves have found already.
+    optima : Archive, optional
+        Points that gradient solves have found already: they need no solve, nor do points that are no better.
+    alike : bool
+        Whether solves from many starts have all led to the same optima: neighbours then find nothing better.
     """
     if not len(archive):
         return archive
-    solved = np.empty((0, archive.F.shape[1])) if optima is None else optima
+    optima = archive.take(np.arange(0)) if optima is None else optima
+    archive, solved = _settled(archive, optima), optima.F
     if archive.F.shape[1] > CURVE:
         ends = _ends(archive, ranges(archive.F), solves, solved)
         surface = cover(archive, ends, solves, limit, guide)
@@ -79,7 +83,7 @@ def polish(
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
-    for _ in range(ROUNDS):
+    for _ in range(0 if alike else ROUNDS):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:
             break
@@ -102,7 +106,7 @@ def polish(
         before, archive = archive, _thinned(pool, limit, exponent, guide)
         if np.array_equal(before.F, archive.F):
             break
-    archive = _helped_by_neighbours(archive, solves, extremes(archive.F))
+    archive = archive if alike else _helped_by_neighbours(archive, solves, extremes(archive.F))
     if len(waiting):
         archive = _thinned(_front(archive.joined(waiting), span), limit, exponent, guide)
     return archive
@@ -130,6 +134,17 @@ def _descend(
     kept = feasible_and_no_worse(found, points.F, points.violation, span)
     archive = points.replaced(kept, found).joined(archive.take(~chosen))
     return _front(_ends(archive, span, solves, solved).joined(archive), span), waiting
+
+
+def _settled(archive: Archive, optima: Archive) -> Archive:
+    """The archive, with optima in place of points that are no better than these by more than their violation explains."""
+    if not len(optima):
+        return archive
+    span = ranges(archive.F)
+    gain = ((optima.F - archive.F[:, None]) / span).max(axis=2)  # of each point over each optimum
+    best = gain.argmin(axis=1)
+    settled = gain.min(axis=1) <= slack(archive.violation)
+    return _front(optima.take(np.unique(best[settled])).joined(archive.take(~settled)), span)
 
 
 def _among(F: np.ndarray, known: np.ndarray) -> np.ndarray:

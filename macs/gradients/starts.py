@@ -93,8 +93,8 @@ class Census:
 
     Parameters
     ----------
-    unseen : float
-        Probability that another start would find another optimum below which there are enough.
+    alike : float
+        Probability that another start would find another optimum below which there are enough, as long as all have led to one.
 
     Attributes
     ----------
@@ -102,10 +102,10 @@ class Census:
         Number of solves.
     """
 
-    def __init__(self, unseen: float = UNSEEN) -> None:
+    def __init__(self, alike: float = UNSEEN) -> None:
         self._losses: list[float] = []
         self.starts = 0
-        self._last, self._unseen = 0, unseen
+        self._last, self._alike = 0, alike
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
@@ -140,7 +140,8 @@ class Census:
         found, optima = self.converged, self.optima()
         if not found:
             return self.starts >= FEWEST
-        if found > optima and optima * (optima + 1) < self._unseen * found * (found - 1):
+        unseen = self._alike if optima == 1 else UNSEEN
+        if found > optima and optima * (optima + 1) <= unseen * found * (found - 1):
             return True
         return self.starts >= min(max(MANY, LAST * self._last), MOST)
 

@@ -106,8 +106,9 @@ class MACS(Settings, Solver):
             effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
-            optima=opening.optima.F[opening.optima.status == CONVERGED],
+            optima=Archive.of(opening.optima, opening.optima.status == CONVERGED),
             several=opening.several,
+            alike=opening.alike,
             rng=rng,
         )
         remember(state, [*opening.evaluations, opening.optima], self, evaluator)
@@ -175,7 +176,7 @@ class MACS(Settings, Solver):
         if (count := rounds.due - rounds.anew) > 0:
             found = anew(state.archive, evaluator, self.archive, count, rounds.anew, state.rng)
             rounds.anew = rounds.due
-            rounds.solved = np.vstack([rounds.solved, found.F[found.status == CONVERGED]])
+            state.learn(Archive.of(found, found.status == CONVERGED))
             remember(state, [found], self, evaluator)
 
     def has_settled(self, state: SearchState) -> bool:
@@ -197,20 +198,22 @@ class MACS(Settings, Solver):
                 self._end_round(state, evaluator, state.archive.F)
                 return
             state.polishing = PolishLog.of(state.archive)
-        polishing, optima = state.polishing, state.optima
+        polishing = state.polishing
         count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
         if state.rounds is not None:
-            count, optima = SOLVES * self.archive, np.vstack([optima, state.rounds.solved])
+            count = SOLVES * self.archive
         solves = CountedSolves(evaluator, count, polishing)
-        state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide_of(self.prefer, evaluator), optima)
+        # A later round is polished if it found something new: not all starts are alike.
+        guide, alike = guide_of(self.prefer, evaluator), state.alike and state.polished is None
+        state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide, state.optima, alike)
         if not solves.stopped:
             state.polishing, state.polished = None, state.archive
-            solved = polishing.status == CONVERGED
-            good = solved | (polishing.violation <= evaluator.tolerance)
-            found = np.vstack([polishing.archive.F, polishing.F[good], state.archive.F])
-            self._end_round(state, evaluator, found, polishing.F[solved])
+            solved = polishing.take(slice(None))
+            state.learn(Archive.of(solved, solved.status == CONVERGED))
+            found = np.vstack([polishing.archive.F, solved.F[solves.feasible(solved)], state.archive.F])
+            self._end_round(state, evaluator, found)
 
-    def _end_round(self, state: SearchState, evaluator: Evaluator, found: np.ndarray, solved: np.ndarray | None = None) -> None:
+    def _end_round(self, state: SearchState, evaluator: Evaluator, found: np.ndarray) -> None:
         """Compare what a round has found with the front as it was, and begin the next round unless the search is at its end."""
         if state.rounds is None:
             return
@@ -219,8 +222,6 @@ class MACS(Settings, Solver):
         violation = float(state.closest.violation.min()) if len(state.closest) else np.inf
         spent, shortest = state.evaluations, least(gradients)
         state.rounds = judged(state.rounds, found, feasible, violation, state.directions, spent, shortest, self.ceiling, state.several)
-        if solved is not None:
-            state.rounds.solved = np.vstack([state.rounds.solved, solved])
         if len(state.archive):
             state.ideal, state.nadir = np.fmin(state.ideal, state.archive.F.min(axis=0)), state.archive.F.max(axis=0)
         assign(state, self, guide_of(self.prefer, evaluator))

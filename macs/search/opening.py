@@ -24,9 +24,9 @@ from ..pareto.ranges import ranges
 
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
-UNSEEN, EVERY = 0.02, 20
-"""Probability that another start would find another optimum below which there are enough; and the number of evaluations for each of which
-one start may be drawn."""
+ALIKE, EVERY = 0.1, 20
+"""Probability that another start would find another optimum below which there are enough, as long as all have led to one: the search goes
+on with others; and the number of evaluations for each of which one start may be drawn."""
 
 
 class Opening:
@@ -57,6 +57,8 @@ class Opening:
         What gradient solves found.
     several : bool
         Whether solves from different starts ended in different optima.
+    alike : bool
+        Whether solves from as many starts as are enough all ended in the same ones.
     """
 
     def __init__(
@@ -69,14 +71,14 @@ class Opening:
         self.population = evaluator.evaluate(Z, 0) if quick and not given else evaluator.evaluate(Z[:given] if quick else Z)
         if quick and 0 < given < len(Z):
             self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
-        self.evaluations, self.optima, self.several = [self.population], self.population.take(np.arange(0)), False
+        self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
+        self.several = self.alike = False
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
             self._project()
             solver = self._solver()
         if solver is not None and not stopping():
             self.optima = self._found(solver)
-            self.several = any(census.optima() > 1 for census in solver.census.values())
 
     @property
     def _feasible(self) -> np.ndarray:
@@ -106,7 +108,7 @@ class Opening:
             return None
         count = None if self._evaluator.ways else 1
         solver = MultistartSolver(self._evaluator.nlp, start, count, self._rng, _counted_by(self._evaluator))
-        solver.unseen, solver.most = UNSEEN, self._budget // EVERY
+        solver.alike, solver.most = ALIKE, self._budget // EVERY
         return solver
 
     def _solvable(self, solver: MultistartSolver | None) -> bool:
@@ -120,6 +122,11 @@ class Opening:
         """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
         many starts as pay. Fewer if asked to end early, or where none was found."""
         found = solver.ends()
+        census = solver.census.values()
+        self.several = any(one.optima() > 1 for one in census)
+        self.alike = bool(census) and not self.several and all(one.enough for one in census)
+        if self.alike:
+            solver.most = 0  # nothing else is expected between the ends, either
         if 1 < len(found) == sum(one.status == CONVERGED for one in found):
             F = np.array([one.F for one in found])
             if self._evaluator.ways:

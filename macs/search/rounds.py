@@ -66,8 +66,6 @@ class Rounds:
         Largest range of each objective over feasible agents and points of the archive so far.
     violation : float
         The least violation then, as long as nothing was feasible.
-    solved : array (s, m)
-        Objectives of the optima that polishes found: they need no solve to become optima.
     due, anew : int
         Number of gradient solves from other starts with which rounds begin, up to the current one; number of those that were made.
     stopped : str
@@ -81,7 +79,6 @@ class Rounds:
     front: np.ndarray
     extent: np.ndarray
     violation: float
-    solved: np.ndarray
     due: int = 0
     anew: int = 0
     stopped: str = ""
@@ -90,9 +87,7 @@ class Rounds:
     def first(cls, m: int, shortest: int, ceiling: int) -> Rounds:
         """The first round of a search for m objectives."""
         none = np.empty((0, m))
-        return cls(
-            finished=0, end=min(shortest, ceiling), improved=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf, solved=none
-        )
+        return cls(finished=0, end=min(shortest, ceiling), improved=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf)
 
     def news(self, found: np.ndarray) -> bool:
         """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""

@@ -11,6 +11,7 @@ from ..gradients.counted import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
+from ..pareto.dominance import nondominated
 from .guide import guide_of
 from .rounds import Rounds
 from .settings import Settings
@@ -101,16 +102,16 @@ class SearchState:
         What the inner solvers, and the gradient solves, have brought for how much work; see `effort`.
     iteration, evaluations, refinements : int
         Iterations done; evaluations counted by the evaluator; gradient solves of agents.
-    optima : array (k, m)
-        Objectives of the optima that the search began with.
+    optima : Archive
+        The best of what gradient solves for the whole front have found: when the search, or a round, began, and in polishes.
     rng : numpy.random.Generator
         The generator of all random numbers; a checkpoint keeps its `bit_generator.state`.
     hopeless : int
         As long as no point was feasible: number of candidates that the inner level left where the violation can get no smaller nearby.
     polishing : PolishLog, optional
         Solves of a polish that has begun and is not finished.
-    several : bool
-        Whether solves from different starts ended in different optima when the search began.
+    several, alike : bool
+        Whether solves from different starts ended in different optima when the search began; or, from as many as are enough, in the same.
     polished : Archive, optional
         What the last polish made.
     rounds : Rounds, optional
@@ -128,14 +129,20 @@ class SearchState:
     effort: np.ndarray
     iteration: int
     evaluations: int
-    optima: np.ndarray
+    optima: Archive
     rng: np.random.Generator
     refinements: int = 0
     hopeless: int = 0
     polishing: PolishLog | None = None
     several: bool = False
+    alike: bool = False
     polished: Archive | None = None
     rounds: Rounds | None = None
+
+    def learn(self, optima: Archive) -> None:
+        """Keep those of these optima, and of the known ones, that are non-dominated."""
+        both = self.optima.joined(optima)
+        self.optima = both.take(nondominated(both.F))
 
     def __repr__(self) -> str:
         counts = {"iteration": self.iteration, "evaluation": self.evaluations, "gradient solve": self.refinements}

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-VERSION = 5
+VERSION = 6
 FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
 LONGEST_LINE = 200
 DOCUMENT = "document"

@@ -160,7 +160,7 @@ def test_a_callback_ends_it():
     assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
 
 
-@pytest.mark.parametrize("solve", [3, 12, 25])
+@pytest.mark.parametrize("solve", [3, 8, 14])
 def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monkeypatch, solve):
     whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
     original, count = bilevel.scalarize, iter(range(10**6))
@@ -205,9 +205,9 @@ def test_others_need_a_number():
     assert NSGA2(population=10).solve(problem, MESH, verify=None).stats["evaluations"] == 60
 
 
-@pytest.mark.parametrize("solve", [2, 9, 45])
+@pytest.mark.parametrize("solve", [2, 9, 25])
 def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
-    """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 45 of a later round."""
+    """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 25 of a later round."""
     whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
     original, count = multistart.scalarize, iter(range(10**6))
 
