@@ -56,6 +56,8 @@ class CountedSolves:
         Largest number of solves.
     log : PolishLog, optional
         The solves in it are not made again; all further solves are added to it.
+    in_vain : array (k, 2 m), optional
+        Objectives of pairs of points: solves from the second did not improve the first, and need not be tried again.
 
     Attributes
     ----------
@@ -63,12 +65,14 @@ class CountedSolves:
         Number of solves that may still be made; 0 after a request to end early.
     stopped : bool
         Whether the work was asked to end while solves were left.
+    in_vain : array (k, 2 m) or None
+        With what the polish tried.
     """
 
-    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None) -> None:
+    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None, in_vain: np.ndarray | None = None) -> None:
         self._evaluator, self._log = evaluator, log
         self._made = 0
-        self.left, self.stopped = left, False
+        self.left, self.stopped, self.in_vain = left, False, in_vain
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
         """The results of `Evaluator.descend`; rows beyond the number of solves have failed."""

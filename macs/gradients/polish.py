@@ -173,8 +173,8 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.
 
 
 def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.ndarray | None = None) -> Archive:
-    """The archive after guarded solves of all, or the chosen, points from their neighbours; the archive itself if none is better or solves
-    are too few."""
+    """The archive after guarded solves of all, or the chosen, points from their neighbours, but for those that were in vain before; the
+    archive itself if none is better or solves are too few."""
     span, m = ranges(archive.F), archive.F.shape[1]
     rows = range(len(archive)) if chosen is None else np.unique(chosen).tolist()
     pairs = [(i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]]
@@ -183,12 +183,15 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.nd
         worse = ((archive.F[None] - archive.F[:, None]) / span).max(axis=2)
         np.fill_diagonal(worse, np.inf)
         pairs = [(i, int(worse[i].argmin())) for i in sorted(rows, key=lambda i: worse[i].min())[: solves.left // 2]]
+    known = solves.in_vain if solves.in_vain is not None else np.empty((0, 2 * m))
+    pairs = [(i, j) for i, j in pairs if not _among(np.hstack([archive.F[[i]], archive.F[[j]]]), known)[0]]
     if not 0 < len(pairs) <= solves.left:
         return archive
     own, other = (np.array(index) for index in zip(*pairs, strict=True))
     found = solves(archive.Z[other], archive.F[own], np.tile(span, (len(own), 1)))
     gain = ((archive.F[own] - found.F) / span).min(axis=1)
     better = (found.status == CONVERGED) & (gain > BETTER)
+    solves.in_vain = np.vstack([known, np.hstack([archive.F[own], archive.F[other]])[~better]])
     if not better.any():
         return archive
     return _front(Archive.of(found, better).joined(archive), span)

@@ -1,4 +1,4 @@
-"""Starts of gradient solves: from everywhere in the box and near the best that is known, in turn, until new ones stop paying.
+"""Starts of gradient solves: from everywhere in the box and near the best that is known, until new ones stop paying.
 
 A solve ends in the valley in which it begins. Trajectories of most controls drawn at random are much alike, so that starts are of several
 kinds; near the best that is known other valleys are often better ones. That is monotonic basin hopping: Leary, "Global optimization on
@@ -16,21 +16,26 @@ import numpy as np
 from transcription.base import NLP
 from transcription.smooth import Smooth
 
+ALMOST_CONSTANT, SLOW = Smooth(spread=1.0, length=3.0), Smooth(spread=1.0, length=0.3)
 KINDS: tuple[tuple[Smooth | None, bool], ...] = (
+    (ALMOST_CONSTANT, True),
+    (SLOW, True),
     (None, True),
-    (Smooth(spread=0.4, length=3.0), True),
-    (Smooth(spread=0.3), True),
+    (ALMOST_CONSTANT, True),
+    (SLOW, True),
     (Smooth(spread=0.3), False),
 )
-"""How controls are drawn, None evenly and each value by itself, and whether states are propagated from them: noise, almost constant,
-smooth; and smooth with the states of the guess, from which a solve also finds what nothing that is propagated comes near to."""
-SPREADS, LENGTHS = (0.02, 0.5), (0.05, 2.0)
-"""Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known; see `Smooth`."""
+"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds, for the most part on them, which
+leads to the most different optima; None evenly, each value by itself; and smooth about the middle with the states of the guess, from which
+a solve also finds what nothing that is propagated comes near to."""
+SPREADS, LENGTHS, WINDOWS = (0.02, 1.0), (0.05, 2.0), (0.05, 1.0)
+"""Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known, see `Smooth`; and of the part of
+a phase in which controls deviate: what else there is to a good solution stays as it is."""
 HOPELESS = 100.0
 """If propagated states violate bounds or constraints by more scales than this, the states of the guess are the better start."""
 
-FIRST = 8
-"""Starts from everywhere before every second one is near the best that is known."""
+FIRST, EACH = 3, 2
+"""Starts from everywhere before only each second one is: the others are near the best that is known."""
 UNSEEN = 0.005
 """Probability that another start would find another optimum below which there are enough."""
 FEWEST, MANY, LAST, MOST = 8, 60, 2, 200
@@ -41,7 +46,7 @@ SAME, ROUNDING = 1e-3, 1e-5
 
 
 class Starts:
-    """Starts of gradient solves of one NLP, later every second one near the best vector that is known.
+    """Starts of gradient solves of one NLP, later every second near the best vector that is known.
 
     Parameters
     ----------
@@ -69,17 +74,26 @@ class Starts:
         """
         nlp, rng = self._nlp, self._rng
         drawn, self.drawn = self.drawn, self.drawn + 1
-        near = drawn >= FIRST and drawn % 2
+        near = drawn >= FIRST and (drawn - FIRST) % EACH
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
         candidates = (lower + rng.random(len(lower)) * span)[None]
         if near and best is not None:
-            spread, length = (float(np.exp(rng.uniform(*np.log(limits)))) for limits in (SPREADS, LENGTHS))
-            moved = best.copy()
-            moved[nlp.free] = Smooth(spread, length).shaped(nlp, candidates, best[nlp.free])[0]
-            return self._propagated(moved)[:1]
-        shape, propagate = KINDS[(drawn if drawn < FIRST else drawn // 2) % len(KINDS)]
+            return self._propagated(self._moved(best, candidates))[:1]
+        shape, propagate = KINDS[(drawn if drawn < FIRST else FIRST + (drawn - FIRST) // EACH) % len(KINDS)]
         guessed = nlp.first_guess(candidates if shape is None else shape.shaped(nlp, candidates))[0]
         return self._propagated(guessed) if propagate else guessed[None]
+
+    def _moved(self, best: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+        """The vector (n,) with a random deviation of its free variables, of controls in a part of each phase."""
+        nlp = self._nlp
+        spread, length, width = (float(np.exp(self._rng.uniform(*np.log(limits)))) for limits in (SPREADS, LENGTHS, WINDOWS))
+        middle, about = self._rng.random(), best[nlp.free]
+        deviation = Smooth(spread, length).shaped(nlp, candidates, about)[0] - about
+        for profile in nlp.profiles:
+            deviation[profile.columns] *= np.exp(-(((profile.places - middle) / width) ** 2))
+        moved = best.copy()
+        moved[nlp.free] += deviation
+        return moved
 
     def _propagated(self, z: np.ndarray) -> np.ndarray:
         """The vector with propagated states, unless these are absurd, and as it is."""

@@ -107,8 +107,8 @@ class MACS(Settings, Solver):
             iteration=0,
             evaluations=evaluator.counts.evaluations,
             optima=Archive.of(opening.optima, opening.optima.status == CONVERGED),
-            several=opening.several,
             alike=opening.alike,
+            several=opening.several,
             rng=rng,
         )
         remember(state, [*opening.evaluations, opening.optima], self, evaluator)
@@ -126,7 +126,7 @@ class MACS(Settings, Solver):
     def begin_rounds(self, evaluator: Evaluator, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
         """As `begin`, of a search that ends when it is done; see `rounds`."""
         state = self.begin(evaluator, min(PLANNED, self.ceiling), rng, start)
-        state.rounds = Rounds.first(len(state.ideal), least(self._polishes(evaluator)), self.ceiling)
+        state.rounds = Rounds.first(len(state.ideal), least(self._polishes(evaluator))[0], self.ceiling)
         return state
 
     def round_end(self, state: SearchState) -> int:
@@ -174,8 +174,8 @@ class MACS(Settings, Solver):
         if rounds is None or not (chooses and len(state.archive) and isinstance(evaluator, Bilevel)):
             return
         if (count := rounds.due - rounds.anew) > 0:
-            found = anew(state.archive, evaluator, self.archive, count, rounds.anew, state.rng)
-            rounds.anew = rounds.due
+            found, worse = anew(state.archive, evaluator, self.archive, count, rounds.anew, state.alike, state.rng)
+            state.several, rounds.anew = state.several or worse, rounds.due
             state.learn(Archive.of(found, found.status == CONVERGED))
             remember(state, [found], self, evaluator)
 
@@ -202,12 +202,12 @@ class MACS(Settings, Solver):
         count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
         if state.rounds is not None:
             count = SOLVES * self.archive
-        solves = CountedSolves(evaluator, count, polishing)
+        solves = CountedSolves(evaluator, count, polishing, state.in_vain)
         # A later round is polished if it found something new: not all starts are alike.
-        guide, alike = guide_of(self.prefer, evaluator), state.alike and state.polished is None
+        guide, alike = guide_of(self.prefer, evaluator), bool(state.alike.all()) and state.polished is None
         state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide, state.optima, alike)
         if not solves.stopped:
-            state.polishing, state.polished = None, state.archive
+            state.polishing, state.polished, state.in_vain = None, state.archive, solves.in_vain
             solved = polishing.take(slice(None))
             state.learn(Archive.of(solved, solved.status == CONVERGED))
             found = np.vstack([polishing.archive.F, solved.F[solves.feasible(solved)], state.archive.F])
@@ -217,11 +217,11 @@ class MACS(Settings, Solver):
         """Compare what a round has found with the front as it was, and begin the next round unless the search is at its end."""
         if state.rounds is None:
             return
-        agents, gradients = state.agents, self._polishes(evaluator)
+        agents = state.agents
         feasible = agents.F[agents.violation <= evaluator.tolerance]
         violation = float(state.closest.violation.min()) if len(state.closest) else np.inf
-        spent, shortest = state.evaluations, least(gradients)
-        state.rounds = judged(state.rounds, found, feasible, violation, state.directions, spent, shortest, self.ceiling, state.several)
+        numbers = (state.evaluations, evaluator.counts.work, *least(self._polishes(evaluator)), self.ceiling)
+        state.rounds = judged(state.rounds, found, feasible, violation, state.directions, *numbers, state.several)
         if len(state.archive):
             state.ideal, state.nadir = np.fmin(state.ideal, state.archive.F.min(axis=0)), state.archive.F.max(axis=0)
         assign(state, self, guide_of(self.prefer, evaluator))

@@ -25,8 +25,10 @@ from ..pareto.ranges import ranges
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
 ALIKE, EVERY = 0.1, 20
-"""Probability that another start would find another optimum below which there are enough, as long as all have led to one: the search goes
-on with others; and the number of evaluations for each of which one start may be drawn."""
+"""Probability that another start would find another optimum below which there are enough to begin with, as long as all led to one; and the
+number of evaluations for each of which one start may be drawn."""
+OTHER = 1e-3
+"""Part of the ranges of the front by which the result of another start must be worse to be another optimum."""
 
 
 class Opening:
@@ -57,8 +59,8 @@ class Opening:
         What gradient solves found.
     several : bool
         Whether solves from different starts ended in different optima.
-    alike : bool
-        Whether solves from as many starts as are enough all ended in the same ones.
+    alike : array (m,) of bool
+        Whether solves for an objective alone, from as many starts as are enough, all ended in the same optimum.
     """
 
     def __init__(
@@ -72,7 +74,7 @@ class Opening:
         if quick and 0 < given < len(Z):
             self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
         self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
-        self.several = self.alike = False
+        self.several, self.alike = False, np.zeros(self.population.F.shape[1], dtype=bool)
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
             self._project()
@@ -122,10 +124,10 @@ class Opening:
         """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
         many starts as pay. Fewer if asked to end early, or where none was found."""
         found = solver.ends()
-        census = solver.census.values()
-        self.several = any(one.optima() > 1 for one in census)
-        self.alike = bool(census) and not self.several and all(one.enough for one in census)
-        if self.alike:
+        self.several = any(one.optima() > 1 for one in solver.census.values())
+        for i, one in solver.census.items():
+            self.alike[i] = one.enough and one.optima() == 1
+        if self.alike.all():
             solver.most = 0  # nothing else is expected between the ends, either
         if 1 < len(found) == sum(one.status == CONVERGED for one in found):
             F = np.array([one.F for one in found])
@@ -137,9 +139,11 @@ class Opening:
         return _feasible_of(found, self._evaluator)
 
 
-def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, rng: np.random.Generator) -> Evaluation:
+def anew(
+    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, alike: np.ndarray, rng: np.random.Generator
+) -> tuple[Evaluation, bool]:
     """What `count` gradient solves from other starts find, for the ends of the front and points along it in turn; fewer if asked to end
-    early.
+    early. Where starts led to several optima for some objectives only, other ends are not sought.
 
     Parameters
     ----------
@@ -151,24 +155,37 @@ def anew(archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: i
     count : int
     drawn : int
         How many such starts there have been before.
+    alike : array (m,) of bool
+        See `Opening`.
     rng : numpy.random.Generator
+
+    Returns
+    -------
+    Evaluation
+        Feasible points.
+    bool
+        Whether any is an optimum that is worse than what was known.
     """
     solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
-    m = archive.F.shape[1]
+    m, span = archive.F.shape[1], ranges(archive.F)
     ends = archive.F[extremes(archive.F)]
-    singles = [single_task(i, m) for i in range(m)]
+    singles = [single_task(i, m) for i in range(m) if alike.all() or not alike[i]]
     between = targets(ends, np.ptp(ends, axis=0), max(min(points, FIRST), m + 1), METHODS[0]) if m > 1 else []
-    found = []
+    found, worse = [], False
     with solver.solves.at_most(SHORT):
         for k in range(drawn, drawn + count):
             if stopping():
                 break
-            tasks, number = (between, k // 2) if between and k % 2 else (singles, k // 2 if between else k)
-            task = tasks[number % len(tasks)]
-            # A task has one start near the best, and one from everywhere, in turn.
-            start = Starts(evaluator.nlp, rng, starts.FIRST + number + number // len(tasks)).draw(solver.nearest(*task))[0]
-            found.append(solver.from_vector(start, *task))
-    return _feasible_of(found, evaluator)
+            # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
+            inner = bool(between) and k % 3 == 2
+            turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))
+            reference, weights = (between if inner else singles)[which]
+            start = Starts(evaluator.nlp, rng, starts.FIRST + turn + which).draw(solver.nearest(reference, weights))[0]
+            found.append(solver.from_vector(start, reference, weights))
+            loss = solver.loss(found[-1], reference, weights)
+            known = solver.merits(reference, weights, archive.F, archive.violation).min()
+            worse |= loss is not None and loss > known + OTHER * float((span / np.where(weights > 0, weights, np.inf)).max())
+    return _feasible_of(found, evaluator), worse
 
 
 def _counted_by(evaluator: Evaluator) -> GradientSolves:

@@ -18,12 +18,13 @@ from ..pareto.ranges import distinct, ranges
 
 PLANNED = 2_000
 """Settings that follow from a number of evaluations are those of this one."""
-FIRST, FIRST_WITHOUT = 250, 2_000
+FIRST, FIRST_WITHOUT = 150, 2_000
 """Evaluations of the first round, and least number of a later one, with gradients; without."""
-STARTS, FEW_STARTS = 10, 20
-"""A later round begins with one gradient solve from another start for so many of its evaluations; where all starts led to one optimum."""
-PATIENCE, AGAIN = 3, 0.5
-"""Where optima are several: work without progress before the search ends, in least rounds, and as a part of what the last progress took."""
+STARTS = 6
+"""A later round begins with one gradient solve from another start for so many of its evaluations."""
+PATIENCE, AGAIN, LITTLE = 2, 0.25, 6e5
+"""Where optima are several: evaluations without progress before the search ends, in least rounds, and as a part of what the last progress
+took; and the least work, see `Counts`, a matter of some seconds."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8
@@ -56,8 +57,8 @@ class Rounds:
         Number of rounds that have ended.
     end : int
         Number of evaluations at which the current round ends.
-    improved : int
-        Number of evaluations at the end of the round that last improved the front.
+    improved, work : int
+        Number of evaluations, and work, at the end of the round that last improved the front.
     opened : int
         Number of evaluations at the end of the first round that found anything feasible; 0 before.
     front : array (k, m)
@@ -75,6 +76,7 @@ class Rounds:
     finished: int
     end: int
     improved: int
+    work: int
     opened: int
     front: np.ndarray
     extent: np.ndarray
@@ -87,7 +89,7 @@ class Rounds:
     def first(cls, m: int, shortest: int, ceiling: int) -> Rounds:
         """The first round of a search for m objectives."""
         none = np.empty((0, m))
-        return cls(finished=0, end=min(shortest, ceiling), improved=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf)
+        return cls(finished=0, end=min(shortest, ceiling), improved=0, work=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf)
 
     def news(self, found: np.ndarray) -> bool:
         """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""
@@ -97,9 +99,10 @@ class Rounds:
         return bool((beyond((found - ideal) / span, (self.front - ideal) / span) > BEYOND).any())
 
 
-def least(gradients: bool) -> int:
-    """Least number of evaluations of a round, and of further work without progress before the search ends."""
-    return FIRST if gradients else FIRST_WITHOUT
+def least(gradients: bool) -> tuple[int, float]:
+    """Least number of evaluations of a round, and without progress before the search ends; and least work then, where optima are
+    several."""
+    return (FIRST, LITTLE) if gradients else (FIRST_WITHOUT, 0.0)
 
 
 def judged(
@@ -109,7 +112,9 @@ def judged(
     violation: float,
     directions: np.ndarray,
     evaluations: int,
+    work: int,
     shortest: int,
+    little: float,
     ceiling: int,
     several: bool,
 ) -> Rounds:
@@ -125,9 +130,9 @@ def judged(
     violation : float
         The least violation of all points; it counts as long as nothing is feasible.
     directions : array (d, m)
-    evaluations : int
+    evaluations, work : int
         So far.
-    shortest : int
+    shortest, little : int, float
         See `least`.
     ceiling : int
         Largest number of evaluations.
@@ -145,14 +150,15 @@ def judged(
         known = np.vstack([rounds.front, found])
         known = known[distinct(known, ranges(known))] if len(known) else known
         opened = rounds.opened or (evaluations if len(known) else 0)
-        rounds = replace(rounds, improved=evaluations, opened=opened, front=known, violation=violation)
+        rounds = replace(rounds, improved=evaluations, work=work, opened=opened, front=known, violation=violation)
     several = several or rounds.improved > rounds.opened
-    if evaluations - rounds.improved >= (max(PATIENCE * shortest, AGAIN * rounds.improved) if several else shortest):
+    patience = max(PATIENCE * shortest, AGAIN * rounds.improved) if several else shortest
+    if evaluations - rounds.improved >= patience and (not several or work - rounds.work >= little):
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling:
         return replace(rounds, stopped=CEILING)
     end = min(evaluations + max(shortest, evaluations // GROWTH), ceiling)
-    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // (STARTS if several else FEW_STARTS))
+    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // STARTS)
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:

@@ -110,10 +110,14 @@ class SearchState:
         As long as no point was feasible: number of candidates that the inner level left where the violation can get no smaller nearby.
     polishing : PolishLog, optional
         Solves of a polish that has begun and is not finished.
-    several, alike : bool
-        Whether solves from different starts ended in different optima when the search began; or, from as many as are enough, in the same.
+    alike : array (m,) of bool
+        Whether, when the search began, solves for an objective alone from as many starts as are enough all ended in the same optimum.
+    several : bool
+        Whether solves from different starts ended in different optima, then or when a round began.
     polished : Archive, optional
         What the last polish made.
+    in_vain : array (k, 2 m), optional
+        What polishes need not try again; see `CountedSolves`.
     rounds : Rounds, optional
         Of a search without a number of evaluations.
     """
@@ -130,13 +134,14 @@ class SearchState:
     iteration: int
     evaluations: int
     optima: Archive
+    alike: np.ndarray
     rng: np.random.Generator
     refinements: int = 0
     hopeless: int = 0
     polishing: PolishLog | None = None
     several: bool = False
-    alike: bool = False
     polished: Archive | None = None
+    in_vain: np.ndarray | None = None
     rounds: Rounds | None = None
 
     def learn(self, optima: Archive) -> None:

@@ -29,8 +29,10 @@ ONE = np.ones(2)
 EVERY = directions.pool(2, 100)
 
 
-def after(known: Rounds, found: np.ndarray, evaluations: int, several: bool = False, ceiling: int = 10**6) -> Rounds:
-    return judged(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, 250, ceiling, several)
+def after(
+    known: Rounds, found: np.ndarray, evaluations: int, several: bool = False, ceiling: int = 10**6, work: int = 0, little: float = 0.0
+) -> Rounds:
+    return judged(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, work, 250, little, ceiling, several)
 
 
 # What is progress
@@ -87,6 +89,14 @@ def test_it_ends_after_as_much_without_progress_as_is_stated():
     assert after(long, QUARTER, int(10_000 * (1 + AGAIN))).stopped == DONE
 
 
+def test_where_optima_are_several_it_also_ends_after_some_work_only():
+    first = after(Rounds.first(2, 250, 10**6), QUARTER, 250, several=True, work=1000)
+    at = 250 + PATIENCE * 250
+    assert first.work == 1000 and not after(first, QUARTER, at, several=True, work=1499, little=500.0).stopped
+    assert after(first, QUARTER, at, several=True, work=1500, little=500.0).stopped == DONE
+    assert after(first, QUARTER, at, several=False, work=1000, little=500.0).stopped == DONE
+
+
 def test_a_ceiling_ends_it():
     first = after(Rounds.first(2, 250, 300), QUARTER, 250, ceiling=300)
     assert first.end == 300 and not first.stopped
@@ -95,10 +105,10 @@ def test_a_ceiling_ends_it():
 
 def test_only_the_violation_counts_as_long_as_nothing_is_feasible():
     none, opening = np.empty((0, 2)), Rounds.first(2, 250, 10**6)
-    first = judged(opening, none, none, 1.0, EVERY, 250, 250, 10**6, False)
+    first = judged(opening, none, none, 1.0, EVERY, 250, 0, 250, 0.0, 10**6, False)
     assert first.improved == 250 and not len(first.front)
-    nearer = judged(first, none, none, 0.5, EVERY, 500, 250, 10**6, False)
-    assert nearer.improved == 500 and judged(first, none, none, 0.95, EVERY, 1000, 250, 10**6, False).stopped == DONE
+    nearer = judged(first, none, none, 0.5, EVERY, 500, 0, 250, 0.0, 10**6, False)
+    assert nearer.improved == 500 and judged(first, none, none, 0.95, EVERY, 1000, 0, 250, 0.0, 10**6, False).stopped == DONE
 
 
 # Searches
