@@ -25,9 +25,9 @@ KINDS: tuple[tuple[Smooth | None, bool], ...] = (
     (SLOW, True),
     (Smooth(spread=0.3), False),
 )
-"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds, for the most part on them, which
-leads to the most different optima; None evenly, each value by itself; and smooth about the middle with the states of the guess, from which
-a solve also finds what nothing that is propagated comes near to."""
+"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds and mostly on them, which leads
+to the most different optima; None evenly, each value by itself; and smooth about the middle with the states of the guess, from which a
+solve also finds what nothing that is propagated comes near to."""
 SPREADS, LENGTHS, WINDOWS = (0.02, 1.0), (0.05, 2.0), (0.05, 1.0)
 """Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known, see `Smooth`; and of the part of
 a phase in which controls deviate: what else there is to a good solution stays as it is."""

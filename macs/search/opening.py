@@ -148,7 +148,7 @@ def anew(
     Parameters
     ----------
     archive : Archive
-        The front so far; every second start is near one of its points.
+        The front so far; about every second start is near one of its points.
     evaluator : Bilevel
     points : int
         Most points in the archive.
