@@ -22,9 +22,9 @@ FIRST, FIRST_WITHOUT = 150, 2_000
 """Evaluations of the first round, and least number of a later one, with gradients; without."""
 STARTS = 6
 """A later round begins with one gradient solve from another start for so many of its evaluations."""
-PATIENCE, AGAIN, LITTLE = 2, 0.25, 6e5
+PATIENCE, AGAIN, LITTLE, LONG = 2, 0.25, 6e5, 8
 """Where optima are several: evaluations without progress before the search ends, in least rounds, and as a part of what the last progress
-took; and the least work, see `Counts`, a matter of some seconds."""
+took; the least work, see `Counts`, a matter of some seconds; and the least rounds that are enough with less work."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8
@@ -153,7 +153,8 @@ def judged(
         rounds = replace(rounds, improved=evaluations, work=work, opened=opened, front=known, violation=violation)
     several = several or rounds.improved > rounds.opened
     patience = max(PATIENCE * shortest, AGAIN * rounds.improved) if several else shortest
-    if evaluations - rounds.improved >= patience and (not several or work - rounds.work >= little):
+    fruitless = evaluations - rounds.improved
+    if fruitless >= patience and (not several or work - rounds.work >= little or fruitless >= LONG * shortest):
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling:
         return replace(rounds, stopped=CEILING)

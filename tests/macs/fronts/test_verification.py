@@ -36,7 +36,7 @@ def test_an_honest_front_verifies(front, tmp_path):
 
 
 def test_simulations_are_compared_to_the_tolerance(front):
-    checks = verify(front, tolerance=1e-12)
+    checks = verify(front, tolerance=1e-15)
     assert not any(check.ok for check in checks) and all("simulated, it ends" in check.reasons[0] for check in checks)
 
 

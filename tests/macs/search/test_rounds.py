@@ -17,7 +17,7 @@ from macs.evaluation import bilevel
 from macs.gradients import multistart
 from macs.pareto import directions
 from macs.search import rounds as module
-from macs.search.rounds import AGAIN, BEYOND, DONE, PATIENCE, Rounds, beyond, gains, improves, judged
+from macs.search.rounds import AGAIN, BEYOND, DONE, LONG, PATIENCE, Rounds, beyond, gains, improves, judged
 from problems import load
 from problems.cases import goddard
 from runs.measures.indicators import gd, hypervolume
@@ -95,6 +95,7 @@ def test_where_optima_are_several_it_also_ends_after_some_work_only():
     assert first.work == 1000 and not after(first, QUARTER, at, several=True, work=1499, little=500.0).stopped
     assert after(first, QUARTER, at, several=True, work=1500, little=500.0).stopped == DONE
     assert after(first, QUARTER, at, several=False, work=1000, little=500.0).stopped == DONE
+    assert after(first, QUARTER, 250 + LONG * 250, several=True, work=1499, little=500.0).stopped == DONE
 
 
 def test_a_ceiling_ends_it():
