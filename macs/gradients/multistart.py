@@ -118,7 +118,7 @@ class MultistartSolver:
         Gradient solves, iterations, failures by status.
     most : float
         Number of starts that may be drawn in all before each problem gets no more than it needs; at first, there is no such limit.
-    alike : float
+    unseen : float
         Probability that another start would find another optimum below which there are enough, if all led to one; see `Census`.
     census : dict of int to Census
         What the starts for each single objective have found; those in it are not sought again.
@@ -134,7 +134,7 @@ class MultistartSolver:
     ) -> None:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
         self.solves, self._starts = solves, Starts(nlp, rng)
-        self.rng, self.census, self.most, self.alike = rng, dict[int, Census](), np.inf, UNSEEN
+        self.rng, self.census, self.most, self.unseen = rng, dict[int, Census](), np.inf, UNSEEN
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -201,7 +201,7 @@ class MultistartSolver:
         objective within tight limits, also from what was given."""
         task = single_task(i, len(self.nlp.problem.goals))
         if self.starts is None and i not in self.census:
-            self.census[i] = Census(self.alike)
+            self.census[i] = Census(self.unseen)
             solved = self.seek(*task, self.census[i])
         else:
             solved = self.solve(*task)

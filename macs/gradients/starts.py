@@ -25,9 +25,9 @@ KINDS: tuple[tuple[Smooth | None, bool], ...] = (
     (SLOW, True),
     (Smooth(spread=0.3), False),
 )
-"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds and mostly on them, which leads
-to the most different optima; None evenly, each value by itself; and smooth about the middle with the states of the guess, from which a
-solve also finds what nothing that is propagated comes near to."""
+"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds and mostly on them, since
+trajectories of others are much alike; None evenly, each value by itself; and smooth about the middle with the states of the guess, from
+which a solve also finds what nothing that is propagated comes near to."""
 SPREADS, LENGTHS, WINDOWS = (0.02, 1.0), (0.05, 2.0), (0.05, 1.0)
 """Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known, see `Smooth`; and of the part of
 a phase in which controls deviate: what else there is to a good solution stays as it is."""
@@ -107,7 +107,7 @@ class Census:
 
     Parameters
     ----------
-    alike : float
+    unseen : float
         Probability that another start would find another optimum below which there are enough, as long as all have led to one.
 
     Attributes
@@ -116,10 +116,10 @@ class Census:
         Number of solves.
     """
 
-    def __init__(self, alike: float = UNSEEN) -> None:
+    def __init__(self, unseen: float = UNSEEN) -> None:
         self._losses: list[float] = []
         self.starts = 0
-        self._last, self._alike = 0, alike
+        self._last, self._unseen = 0, unseen
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
@@ -154,7 +154,7 @@ class Census:
         found, optima = self.converged, self.optima()
         if not found:
             return self.starts >= FEWEST
-        unseen = self._alike if optima == 1 else UNSEEN
+        unseen = self._unseen if optima == 1 else UNSEEN
         if found > optima and optima * (optima + 1) <= unseen * found * (found - 1):
             return True
         return self.starts >= min(max(MANY, LAST * self._last), MOST)

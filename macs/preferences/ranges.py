@@ -13,14 +13,13 @@ from problems.compiled import Objective
 from ..evaluation.evaluator import CONVERGED
 from ..fronts.points import Points
 from ..pareto.dominance import nondominated
+from ..pareto.ranges import SAME
 from .checks import named_numbers, places, shown
 
 PAYOFF = "payoff"
 """The solver of a payoff table."""
 TWO = 2
 """Points without which there is no range."""
-EXACT = 1e-7
-"""Part of a range, or of its ends, to which solves find these: a value that lies beyond by less lies at the end."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +110,12 @@ class Ranges:
         return [(goal.sign / span) * (value - low) for goal, value, low, span in zip(goals, J, best.tolist(), spans.tolist(), strict=True)]
 
     def check(self, value: float, goal: Objective, what: str) -> None:
-        """Raise ValueError if a value of a goal lies beyond its range. A range without width says nothing on this."""
+        """Raise ValueError if a value of a goal lies beyond its range by more than solves miss its ends by.
+
+        A range without width says nothing.
+        """
         low, high = sorted((self.best[goal.name], self.worst[goal.name]))
-        slack = EXACT * max(high - low, abs(low), abs(high))
+        slack = SAME * max(high - low, abs(low), abs(high))
         if low < high and not low - slack <= value <= high + slack:
             best, worst = shown(self.best[goal.name], goal), shown(self.worst[goal.name], goal)
             raise ValueError(f"{what} of '{goal.name}', {shown(value, goal)}, lies beyond its range: best {best}, worst {worst}")

@@ -24,7 +24,7 @@ from ..pareto.ranges import ranges
 
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""
-ALIKE, EVERY = 0.1, 20
+UNSEEN, EVERY = 0.1, 20
 """Probability that another start would find another optimum below which there are enough to begin with, as long as all led to one; and the
 number of evaluations for each of which one start may be drawn."""
 OTHER = 1e-3
@@ -110,7 +110,7 @@ class Opening:
             return None
         count = None if self._evaluator.ways else 1
         solver = MultistartSolver(self._evaluator.nlp, start, count, self._rng, _counted_by(self._evaluator))
-        solver.alike, solver.most = ALIKE, self._budget // EVERY
+        solver.unseen, solver.most = UNSEEN, self._budget // EVERY
         return solver
 
     def _solvable(self, solver: MultistartSolver | None) -> bool:
@@ -184,7 +184,7 @@ def anew(
             found.append(solver.from_vector(start, reference, weights))
             loss = solver.loss(found[-1], reference, weights)
             known = solver.merits(reference, weights, archive.F, archive.violation).min()
-            worse |= loss is not None and loss > known + OTHER * float((span / np.where(weights > 0, weights, np.inf)).max())
+            worse |= loss is not None and bool(loss > known + OTHER * (span / np.where(weights > 0, weights, np.inf)).max())
     return _feasible_of(found, evaluator), worse
 
 

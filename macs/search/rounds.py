@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from moocore import hypervolume
 
+from ..gradients.multistart import LITTLE
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import distinct, ranges
@@ -22,9 +23,9 @@ FIRST, FIRST_WITHOUT = 150, 2_000
 """Evaluations of the first round, and least number of a later one, with gradients; without."""
 STARTS = 6
 """A later round begins with one gradient solve from another start for so many of its evaluations."""
-PATIENCE, AGAIN, LITTLE, LONG = 2, 0.25, 6e5, 8
+PATIENCE, AGAIN, LONG = 2, 0.25, 8
 """Where optima are several: evaluations without progress before the search ends, in least rounds, and as a part of what the last progress
-took; the least work, see `Counts`, a matter of some seconds; and the least rounds that are enough with less work."""
+took; and the least rounds that are enough where they took less work than other starts may always take, `LITTLE`."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8

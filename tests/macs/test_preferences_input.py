@@ -24,6 +24,7 @@ from macs.decisions import (
     Value,
     WeightedSum,
 )
+from problems.compiled import Objective
 
 BOTH = {"time": 2.0, "effort": 1.0}
 NOW = {"time": 2.0, "effort": 1.5}
@@ -89,6 +90,15 @@ def test_what_is_wrong_alone(make, words):
         make()
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_value_at_an_end_that_solves_missed_by_rounding_lies_within():
+    """The longest way of a glide is 15 km, and a solve found 27 micrometers less."""
+    found = Ranges({"distance": 14.999999972693187}, {"distance": 2.999999986871098})
+    goal = Objective("distance", "km", "maximize")
+    found.check(15.0, goal, "the target")
+    with pytest.raises(ValueError, match="lies beyond its range"):
+        found.check(15.0001, goal, "the target")
 
 
 @pytest.mark.parametrize(

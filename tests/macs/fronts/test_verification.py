@@ -36,8 +36,13 @@ def test_an_honest_front_verifies(front, tmp_path):
 
 
 def test_simulations_are_compared_to_the_tolerance(front):
-    checks = verify(front, tolerance=1e-15)
+    """A point fails where it ends farther away than the tolerance, and none does below the least that any is away."""
+    away = [check.defect for check in verify(front, tolerance=1.0)]
+    assert 0.0 < min(away) < max(away)
+    checks = verify(front, tolerance=0.5 * min(away))
     assert not any(check.ok for check in checks) and all("simulated, it ends" in check.reasons[0] for check in checks)
+    between = verify(front, tolerance=0.5 * max(away))
+    assert [any("simulated, it ends" in reason for reason in check.reasons) for check in between] == [one > 0.5 * max(away) for one in away]
 
 
 def test_objectives_that_were_touched_up_are_found(front):

@@ -397,3 +397,28 @@ def test_with_few_solves_poor_points_start_from_what_nearly_dominates_them() -> 
     evaluator = Answers(*[[9.0, 9.0, 9.0]] * 4)
     assert _helped_by_neighbours(archive, CountedSolves(evaluator, 4)) is archive  # type: ignore[arg-type]
     assert [start[0] for start in evaluator.starts] == [3.0, 3.0], "of four solves two, from the point in the middle"
+
+
+def test_what_neighbours_did_not_improve_is_not_tried_again_but_what_is_new_is() -> None:
+    F = np.array([[0.0, 1.0], [0.4, 0.4], [1.0, 0.0]])
+    archive = Archive(np.arange(3.0)[:, None], F, np.zeros(3))
+    evaluator = Answers(*[[9.0, 9.0]] * 20)
+    solves = CountedSolves(evaluator, 20)  # type: ignore[arg-type]
+    assert _helped_by_neighbours(archive, solves) is archive and len(evaluator.starts) == 6
+    again = CountedSolves(evaluator, 20, in_vain=solves.in_vain)  # type: ignore[arg-type]
+    assert _helped_by_neighbours(archive, again) is archive and len(evaluator.starts) == 6
+    moved = Archive(archive.Z, F - [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]], archive.violation)
+    _helped_by_neighbours(moved, again)
+    assert len(evaluator.starts) == 6 + 4, "the point that moved from both others, and these from it"
+
+
+def test_where_all_starts_are_alike_none_is_made_from_neighbours() -> None:
+    F = np.array([[0.0, 1.0], [0.3, 0.3], [1.0, 0.0]])
+    optima = Archive(np.arange(3.0)[:, None], F, np.zeros(3))
+    made = []
+    for alike in (False, True):
+        evaluator = Answers(*[[9.0, 9.0]] * 40)
+        found = polish(optima, CountedSolves(evaluator, 40), 3, optima=optima, alike=alike)  # type: ignore[arg-type]
+        assert np.array_equal(np.sort(found.Z[:, 0]), [0.0, 1.0, 2.0])
+        made.append(len(evaluator.starts))
+    assert made[0] == made[1] + 6

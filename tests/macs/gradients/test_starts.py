@@ -78,6 +78,19 @@ def test_starts_are_near_the_best_or_anywhere():
     assert np.array_equal([again.draw(best)[0] for _ in range(FIRST + 40)], drawn)
 
 
+def test_near_the_best_controls_deviate_in_a_window():
+    """Farther from its middle than three widths, controls stay as they are; the narrowest windows have a twentieth of the phase."""
+    nlp = DFET(20, 2).transcribe(load("goddard"))
+    best = nlp.first_guess(nlp.lower[nlp.free][None] + 0.5 * nlp.span[nlp.free])[0]
+    (profile, *_) = nlp.profiles
+    kept = []
+    for seed in range(40):
+        moved = Starts(nlp, np.random.default_rng(seed), FIRST + 1).draw(best)[0]
+        deviation = np.abs(moved - best)[nlp.free][profile.columns]
+        kept.append(np.mean(deviation < 1e-3 * deviation.max()))
+    assert np.mean(np.array(kept) > 0.2) > 0.25 and min(kept) == 0.0 and max(kept) > 0.5
+
+
 @pytest.mark.parametrize("deepest", range(0, 8, 3))
 def test_the_deepest_of_eight_wells_is_found(deepest):
     depths = [1.0 + (2.0 if k == deepest else 0.1 * (k % 3)) for k in range(8)]

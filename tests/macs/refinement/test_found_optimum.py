@@ -35,7 +35,7 @@ def back_to_the_side() -> Problem:
 
 
 def test_other_starts_find_a_better_optimum():
-    """From the first start alone the car goes round the wrong way."""
+    """From the first start of this seed alone the car goes round the wrong way."""
     record = published("dubins")[0]
     alone, best = optimize(back_to_the_side(), starts=1, seed=1), optimize(back_to_the_side())
     assert alone.verified and any(alone.F[0] == pytest.approx(other, rel=1e-3) for other in record.local)

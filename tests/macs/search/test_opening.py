@@ -11,7 +11,7 @@ from macs.gradients.multistart import MultistartSolver
 from macs.search import opening
 from macs.search.state import SearchState
 from problems import Problem, load
-from transcription import Collocation
+from transcription import DFET, Collocation
 from transcription.inner import inner_solver
 from transcription.stopping import stopped_by
 
@@ -127,3 +127,28 @@ def test_they_begin_at_what_was_given_and_not_at_its_propagated_states(monkeypat
     assert len(starts) == 2 and not np.allclose(nlp.propagate(given), given)
     np.testing.assert_array_equal(starts[0], given)
     np.testing.assert_array_equal(starts[1], given)
+
+
+@pytest.mark.parametrize(("several", "problem", "method"), [(False, walk(), METHOD), (True, load("landing_site", landers=1), DFET(1, 3))])
+def test_worse_optima_from_other_starts_are_noticed(several, problem, method) -> None:
+    evaluator = projecting(problem, method)
+    state = begun(evaluator, archive=6)
+    found, worse = opening.anew(state.archive, evaluator, 6, 12, 0, state.alike, np.random.default_rng(1))
+    assert worse is several and len(found.F) >= 6
+
+
+def test_ends_that_were_alike_are_not_sought_again_where_others_were_not(monkeypatch) -> None:
+    evaluator, tasks = projecting(walk(), METHOD), []
+    state = begun(evaluator, archive=6)
+    assert state.alike.all() and not state.several
+    original = MultistartSolver.from_vector
+
+    def noted(self, start, reference, weights):
+        tasks.append(np.flatnonzero(weights).tolist())
+        return original(self, start, reference, weights)
+
+    monkeypatch.setattr(MultistartSolver, "from_vector", noted)
+    for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
+        tasks.clear()
+        opening.anew(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
+        assert tasks == [*ends[:2], [0, 1], *ends[2:], [0, 1]], "two of three are ends"
