@@ -26,9 +26,9 @@ from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped
 
-from .evaluation.evaluator import CONVERGED
+from .evaluation.evaluator import CONVERGED, INFEASIBLE
 from .front import Front
-from .fronts.builders import certified, nearest_violation, no_points, vectors_points
+from .fronts.builders import certified, conflict, no_points, vectors_points
 from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.provenance import costs
@@ -143,7 +143,8 @@ def payoff(
     Returns
     -------
     Front
-        Exactly one point for each objective, in the order of their declaration. The `status` of a point says whether it converged.
+        Exactly one point for each objective, in the order of their declaration. The `status` of a point says whether it converged. Where
+        nothing feasible is found, all are the one that violates least, and `message` says what.
 
     Raises
     ------
@@ -155,7 +156,8 @@ def payoff(
 
     def work() -> Front:
         ends = job.ends()
-        return job.front(ends, job.ranges(ends), sort=False)
+        front = job.front(ends, job.ranges(ends), sort=False)
+        return front if job.solver.closest is None else front.replace(message=f"nothing feasible was found; {conflict(job.nlp, front[0])}")
 
     return job.run(work, solved_again)
 
@@ -338,6 +340,8 @@ class _Job:
                 notes=[found.note],
                 **certified(found.nlp, found.z[None], None, self._sole),
             )
+            if found.status == INFEASIBLE:
+                points = points.replace(notes=[f"{found.note}; {conflict(found.nlp, points[0])}"])
             return Front.of(points).verify(verify)
 
     def swept(self, points: int, method: str) -> Front:
@@ -376,7 +380,7 @@ class _Job:
         good = [solved for solved in found if solved.status == CONVERGED]
         if not good:
             nearest = self.front([min(found, key=lambda solved: solved.violation)], None)[0]
-            return self.front([], None, message=f"no solve converged; {nearest_violation(nearest)}", closest=nearest)
+            return self.front([], None, message=f"no solve converged; {conflict(self.nlp, nearest)}", closest=nearest)
         F = np.array([solved.F for solved in good])
         # Rounded to the accuracy of the solves: otherwise one of two equal points might dominate the other.
         kept = distinct(F, self._unit(ranges))

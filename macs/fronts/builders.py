@@ -12,6 +12,7 @@ from problems.compiled import CompiledProblem, Objective
 from problems.vector import CompiledVectorProblem
 from transcription.base import NLP
 from transcription.nlp.costates import costates
+from transcription.nlp.elastic import opposing
 from transcription.nlp.optimality import Conditions
 from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped, check_stopping
@@ -46,7 +47,8 @@ def trajectory_points(
         found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
         return vectors_points(nlp, archive.Z, solver, stats, **found)
     nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
-    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {nearest_violation(nearest)}", closest=nearest)
+    violated = conflict(nlp, nearest) if certify and _settled(stats) else nearest_violation(nearest)
+    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {violated}", closest=nearest)
 
 
 def no_points(
@@ -110,6 +112,12 @@ def nearest_violation(nearest: Point) -> str:
     return f"the nearest violates {label} by {amount:.2g} of its scale{also}"
 
 
+def conflict(nlp: NLP, nearest: Point) -> str:
+    """That text of a point that violates least, with the constraints for which it does."""
+    others = [label for label in opposing(nlp, nearest.decision) if not nearest.violations.get(label, 0.0) > nearest.violation * SIDE]
+    return nearest_violation(nearest) + (f", in conflict with {', '.join(others[:NAMED])}" if others else "")
+
+
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
     """Columns of `Points`, of k entries each, for vectors (k, n) of one NLP."""
     k = len(Z)
@@ -169,5 +177,10 @@ def _status(violation: np.ndarray, tolerance: float) -> np.ndarray:
 
 
 def _nothing(stats: Mapping[str, Any]) -> str:
-    ended = ": near none of them there is one, as far as solves for feasibility tell" if stats.get("stopped") == "settled" else ""
+    ended = ": solves for feasibility from different starts find none nearby" if _settled(stats) else ""
     return f"no feasible point in {counted(stats['evaluations'], 'evaluation')}{ended}"
+
+
+def _settled(stats: Mapping[str, Any]) -> bool:
+    """Whether a search ended since it can find nothing else."""
+    return stats.get("stopped") == "settled"

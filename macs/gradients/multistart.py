@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from transcription.base import NLP
+from transcription.base import INFEASIBLE, NLP
+from transcription.nlp.elastic import least_violation
 from transcription.nlp.scalarized import Solved, scalarize
 from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import stopping
@@ -43,6 +44,10 @@ SHORT, LITTLE = 200, 6e5
 """Most iterations of each further start; work, see `Counts`, that they may always take together, a matter of a second or two."""
 
 
+TRIED = (8, 16)
+"""Fewest and most starts from which no feasible vector is found before the search for one ends; between them, what took `LITTLE`."""
+
+
 class GradientSolves:
     """Gradient solves with one tolerance, which are counted.
 
@@ -72,7 +77,14 @@ class GradientSolves:
         """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
         self.before()
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
-        solved = scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, near=self._near, **limits)
+        return self._counted(nlp, scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, near=self._near, **limits))
+
+    def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
+        """What is feasible, or violates least, near a vector (n,); see `least_violation`."""
+        self.before()
+        return self._counted(nlp, least_violation(nlp, start, tolerance=self.tolerance))
+
+    def _counted(self, nlp: NLP, solved: Solved) -> Solved:
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
 
@@ -122,6 +134,8 @@ class MultistartSolver:
         Probability that another start would find another optimum below which there are enough, if all led to one; see `Census`.
     census : dict of int to Census
         What the starts for each single objective have found; those in it are not sought again.
+    closest : Solved or None
+        What violates least, where solves for feasibility from many starts have found nothing feasible; see `reached`.
     """
 
     def __init__(
@@ -135,6 +149,7 @@ class MultistartSolver:
         self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
         self.solves, self._starts = solves, Starts(nlp, rng)
         self.rng, self.census, self.most, self.unseen = rng, dict[int, Census](), np.inf, UNSEEN
+        self.closest: Solved | None = None
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
         self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
@@ -169,10 +184,10 @@ class MultistartSolver:
         """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or as much as the first
         one took."""
         before = self.counts.work
-        best = self.solve(reference, weights)
+        best = self.reached(self.solve(reference, weights), reference, weights)
         limit = self.counts.work + max(LITTLE, self.counts.work - before)
         census.add(self.loss(best, reference, weights))
-        while not (census.enough or self.drawn_enough or self.counts.work >= limit or stopping()):
+        while not (census.enough or self.closest or self.drawn_enough or self.counts.work >= limit or stopping()):
             # Where none has converged yet, they may all take long.
             with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
                 found = self.from_drawn(reference, weights, best=best if census.converged else None)
@@ -180,6 +195,27 @@ class MultistartSolver:
             if census.add(self.loss(found, reference, weights)) or (not census.converged and found.violation < best.violation):
                 best = found
         return best
+
+    def reached(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> Solved:
+        """The result of a solve, or, where that is not feasible, of one from a vector that is.
+
+        That vector is sought near the best that is known and near starts that are drawn. If there is none near any of them, the result is
+        what violates least, now and later: `closest`.
+        """
+        if self.closest is not None:
+            return self.closest
+        if solved.violation <= self.tolerance or len(self._F) > self._given:
+            return solved
+        tried, limit, known = list[Solved](), self.counts.work + LITTLE, self.nearest(reference, weights)
+        while not stopping() and len(tried) < TRIED[1] and (len(tried) < TRIED[0] or self.counts.work < limit):
+            start = self._starts.draw()[0] if known is None else known
+            near, known = self.solves.least_violation(self.nlp, start), None
+            if near.status == CONVERGED:
+                return self.better([solved, self.from_vector(near.z, reference, weights)], reference, weights)
+            tried.append(near)
+        if sum(near.status == INFEASIBLE for near in tried) >= TRIED[0]:
+            self.closest = min(tried, key=lambda near: near.violation)
+        return self.closest or solved
 
     def loss(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> float | None:
         """What a scalarised problem minimises, at a result that converged."""
@@ -200,6 +236,8 @@ class MultistartSolver:
         """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
         objective within tight limits, also from what was given."""
         task = single_task(i, len(self.nlp.problem.goals))
+        if self.closest is not None:
+            return self.closest
         if self.starts is None and i not in self.census:
             self.census[i] = Census(self.unseen)
             solved = self.seek(*task, self.census[i])
@@ -207,7 +245,7 @@ class MultistartSolver:
             solved = self.solve(*task)
         if (rival := self.rival(solved, *task)) is not None:
             solved = self.from_rival(rival, solved, *task)
-        for start in self._known[: self._given] if solved.status != CONVERGED else ():
+        for start in self._known[: self._given] if solved.status != CONVERGED and not self.closest else ():
             solved = self.better([solved, self.from_vector(start, *task)], *task)
         return solved
 

@@ -37,6 +37,8 @@ LITTLE, MUCH = 6e5, 2e6
 tried, if there is a result."""
 PASSABLE = 5.0
 """How many times what is wanted a point may miss where other meshes are tried only as long as that takes little."""
+HOPELESS = 2
+"""Coarse meshes on which solves for feasibility from many starts find nothing feasible, after which no other is tried."""
 CLEARLY, REFINED = 1e-3, 2
 """Part of its unit by which an objective on a coarse mesh differs that is another optimum; most other optima that are refined."""
 
@@ -172,13 +174,15 @@ class _Search:
         self._task = Along(reference, weights, np.ones(len(weights)))
         self.all: list[_Attempt] = []
         self._units = np.full(len(weights), np.inf)
-        self.exhausted = False
+        self.exhausted, self.hopeless = False, 0
         self._searched: set[Meshed] = set()
 
     def begin(self, method: Meshed, solver: MultistartSolver, elsewhere: bool) -> None:
         """Solve on a coarse mesh, also `elsewhere` if other starts were not made yet, and refine what is best; where that leads to no good
         point, also what the first start gave: an optimum that is better on a coarse mesh may be none."""
-        solved = best = solver.solve(self.reference, self.weights)
+        solved = solver.solve(self.reference, self.weights)
+        solved = best = solver.reached(solved, self.reference, self.weights) if elsewhere else solved
+        self.hopeless += solver.closest is not None
         census = Census()
         census.add(self._loss(solved))
         if elsewhere and not self._searched and solved.status == CONVERGED:
@@ -233,6 +237,8 @@ class _Search:
         """Whether no other coarse mesh is to be tried."""
         best, work = self.best, self.loop.work
         refined = best.refinement is not None
+        if not refined and self.hopeless >= HOPELESS:
+            return True
         return best.good or self.loop.ended or (refined and (work >= MUCH or (work >= LITTLE and self._passable(best))))
 
     def _passable(self, best: Found) -> bool:

@@ -45,7 +45,8 @@ from .trials import Trials
 log = logging.getLogger(__name__)
 
 HOPELESS = 30
-"""Candidates without a feasible point nearby after which a search that has none at all ends."""
+"""Candidates without a feasible point nearby after which a search that has none at all ends; solves for feasibility by which the opening
+found this count as so many."""
 FEWEST = 60
 """Gradient solves that a polish may always make if proposals are only propagated where that is best: solves are then what finds points."""
 ITERATIONS = 50
@@ -111,7 +112,9 @@ class MACS(Settings, Solver):
             several=opening.several,
             rng=rng,
         )
-        remember(state, [*opening.evaluations, opening.optima], self, evaluator)
+        remember(state, [*opening.evaluations, opening.optima, opening.closest], self, evaluator)
+        if len(opening.closest.F):
+            state.hopeless = HOPELESS
         Z = np.vstack([Z, opening.optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
         state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)

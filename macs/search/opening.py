@@ -61,6 +61,8 @@ class Opening:
         Whether solves from different starts ended in different optima.
     alike : array (m,) of bool
         Whether solves for an objective alone, from as many starts as are enough, all ended in the same optimum.
+    closest : Evaluation
+        What violates least, where solves for feasibility from many starts have found nothing feasible; else empty.
     """
 
     def __init__(
@@ -74,12 +76,16 @@ class Opening:
         if quick and 0 < given < len(Z):
             self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
         self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
+        self.closest = self.optima
         self.several, self.alike = False, np.zeros(self.population.F.shape[1], dtype=bool)
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
-        if quick and not self._feasible.any() and not self._solvable(solver) and evaluator.counts.evaluations < budget:
+        if quick and not self._feasible.any() and not self._decided(solver) and evaluator.counts.evaluations < budget:
             self._project()
             solver = self._solver()
-        if solver is not None and not stopping():
+        if solver is not None and solver.closest is not None:
+            assert isinstance(evaluator, Bilevel)
+            self.closest = _evaluation([solver.closest], evaluator)
+        elif solver is not None and not stopping():
             self.optima = self._found(solver)
 
     @property
@@ -113,12 +119,14 @@ class Opening:
         solver.unseen, solver.most = UNSEEN, self._budget // EVERY
         return solver
 
-    def _solvable(self, solver: MultistartSolver | None) -> bool:
-        """Whether a gradient solve for the first objective ends at an optimum."""
+    def _decided(self, solver: MultistartSolver | None) -> bool:
+        """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
         if solver is None:
             return False
+        task = single_task(0, len(self._evaluator.goals))
         with solver.solves.at_most(SHORT):
-            return solver.solve(*single_task(0, len(self._evaluator.goals))).status == CONVERGED
+            solved = solver.solve(*task)
+        return solver.reached(solved, *task).status == CONVERGED or solver.closest is not None
 
     def _found(self, solver: MultistartSolver) -> Evaluation:
         """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
@@ -196,10 +204,13 @@ def _counted_by(evaluator: Evaluator) -> GradientSolves:
 
 
 def _feasible_of(found: list[Solved], evaluator: Bilevel) -> Evaluation:
-    good = [one for one in found if one.violation <= evaluator.tolerance]
+    return _evaluation([one for one in found if one.violation <= evaluator.tolerance], evaluator)
+
+
+def _evaluation(found: list[Solved], evaluator: Bilevel) -> Evaluation:
     return Evaluation(
-        Z=np.array([one.z for one in good]).reshape(-1, len(evaluator.nlp.variables)),
-        F=np.array([one.F for one in good]).reshape(-1, len(evaluator.goals)),
-        violation=np.array([one.violation for one in good]),
-        status=np.array([one.status for one in good], dtype="<U10"),
+        Z=np.array([one.z for one in found]).reshape(-1, len(evaluator.nlp.variables)),
+        F=np.array([one.F for one in found]).reshape(-1, len(evaluator.goals)),
+        violation=np.array([one.violation for one in found]),
+        status=np.array([one.status for one in found], dtype="<U10"),
     )

@@ -41,12 +41,12 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
     values = ca.vertcat(g * rows, above - x[n] * slope, above)
     dF, dg, _, _ = gradients(nlp)(z)
     check_stopping()
-    of_rows, of_objectives = _scaled(dg, rows, scales), _scaled(dF, inverse, scales)
+    of_rows, of_objectives = multiplied(dg, rows, scales), multiplied(dF, inverse, scales)
     jacobian = ca.blockcat([[of_rows, ca.MX(r, 1)], [of_objectives, -slope], [of_objectives, ca.MX(m, 1)]])
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", r + 2 * m)
     of_g, moving, resting = ca.vertsplit(lam_g, [0, r, r + m, r + 2 * m])
     # The program's own objective is linear.
-    curvature = _scaled(hessian(nlp)(z, (moving + resting) * inverse, of_g * rows), scales, scales)
+    curvature = multiplied(hessian(nlp)(z, (moving + resting) * inverse, of_g * rows), scales, scales)
     curvature = ca.diagcat(curvature, ca.MX(1, 1))
     derivatives = {
         "jac_g": ca.Function("jac_g", [x, p], [values, jacobian], ["x", "p"], ["g", "jac_g_x"]),
@@ -58,7 +58,7 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
     return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives | unasked)
 
 
-def _scaled(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:
+def multiplied(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:
     """A sparse matrix with its rows and columns multiplied by these vectors."""
     sparsity = matrix.sparsity()
     i, j = sparsity.get_triplet()

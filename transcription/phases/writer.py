@@ -21,6 +21,8 @@ from .layout import Layout
 from .pointwise import Pointwise
 from .state_equations import StateEquations
 
+DYNAMICS = "dynamics of"
+"""How labels of the equations of states begin; where an imposed final value enters, rows bear the name of that."""
 NEGLIGIBLE = 1e-8
 """Multipliers of limits that are smaller than this part of the costates are none."""
 
@@ -341,7 +343,7 @@ class PhaseWriter(ABC):
         An imposed final value enters the last column, whose rows therefore bear its name.
         """
         states, k = self.phase.states, residual.shape[1]
-        names = [f"dynamics of {self.phase.name}.{v.name}" for v in states]
+        names = [f"{DYNAMICS} {self.phase.name}.{v.name}" for v in states]
         last = [
             f"final value of {self.phase.name}.{v.name}" if low == high else name
             for v, (low, high), name in zip(states, self.phase.final, names, strict=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from macs import MACS
+from macs import MACS, optimize, payoff, sweep
+from macs.gradients.multistart import GradientSolves, MultistartSolver, guessed_start, single_task
 from macs.search.macs import HOPELESS
 from problems import Problem
 from transcription import DFET
@@ -26,14 +27,53 @@ def ride(low: float) -> Problem:
     return problem
 
 
-def test_a_search_ends_where_solves_for_feasibility_find_nothing(tmp_path):
+@pytest.mark.parametrize(("inner", "least", "most"), [("auto", 5, 10), ("projection", HOPELESS, 500)])
+def test_a_search_ends_where_solves_for_feasibility_find_nothing(tmp_path, inner, least, most):
     """At rest at 0 the sum is 0: it exceeds -0.5 by half of its scale, wherever a solve begins."""
-    front = MACS(agents=5, archive=5).solve(ride(-0.5), DFET(3, 3), evaluations=5000, seed=1, checkpoint=tmp_path / "run.ckpt")
-    assert len(front) == 0 and front.stats["stopped"] == "settled" and HOPELESS <= front.stats["evaluations"] < 500
-    assert "near none of them there is one" in front.message and "violates path 'sum' of 'walk' by 0.5 of its scale" in front.message
+    terms = {"evaluations": 5000, "seed": 1, "inner": inner, "checkpoint": tmp_path / "run.ckpt"}
+    front = MACS(agents=5, archive=5).solve(ride(-0.5), DFET(3, 3), **terms)
+    assert len(front) == 0 and front.stats["stopped"] == "settled" and least <= front.stats["evaluations"] < most
+    assert (
+        "solves for feasibility from different starts find none nearby" in front.message
+        and "violates path 'sum' of 'walk' by 0.5 of its scale" in front.message
+    )
     assert front.closest.violations["path 'sum' of 'walk'"] == pytest.approx(0.5, abs=1e-3)
-    again = MACS(agents=5, archive=5).solve(ride(-0.5), DFET(3, 3), evaluations=5000, seed=1, checkpoint=tmp_path / "run.ckpt")
+    again = MACS(agents=5, archive=5).solve(ride(-0.5), DFET(3, 3), **terms)
     assert again.message == front.message
+
+
+def unreachable() -> Problem:
+    """From rest at 0 to rest at 1 in a unit of time, where 0.25 is the most."""
+    problem = Problem("walk")
+    walk = problem.phase("walk", t0=0.0, tf=1.0)
+    walk.state("x", bounds=(-4, 4), initial=0, final=1)
+    v, u = walk.state("v", bounds=(-1, 1), initial=0, final=0), walk.control("u", bounds=(-1, 1))
+    walk.dynamics(x=v, v=u)
+    problem.minimize("effort", walk.integral(u**2))
+    problem.minimize("jerk", walk.integral(u**4))
+    return problem
+
+
+def test_the_conflict_is_known_after_few_solves_by_all_ways():
+    """A metre is an eighth of the scale; the nearest end at rest, on any mesh with an edge or node in the middle, is at 0.25."""
+    fronts = [MACS().solve(unreachable(), seed=1), sweep(unreachable(), points=5), payoff(unreachable()), optimize(unreachable()).alone()]
+    for front in fronts:
+        point = front[0] if len(front) else front.closest
+        assert point.status == "infeasible" and point.violations["final value of walk.x"] == pytest.approx(0.75 / 8, abs=1e-3)
+        words = front.message or point.note
+        assert "violates final value of walk.x by 0.094 of its scale, in conflict with final value of walk.v" in words
+        assert front.stats["gradient_solves"] <= 60 and front.stats["evaluations"] <= 60
+
+
+def test_what_is_feasible_is_reached_from_infeasible_solves():
+    """With as good as no iterations, a solve from the guess ends where nothing is feasible; one from a feasible vector follows."""
+    nlp = DFET(4, 3).nlp(ride(0.0))
+    solver = MultistartSolver(nlp, guessed_start(nlp), None, np.random.default_rng(0), GradientSolves(1e-6))
+    task = single_task(0, 2)
+    with solver.solves.at_most(2):
+        poor = solver.solve(*task)
+    assert poor.status != "converged" and poor.violation > 1e-3
+    assert solver.reached(poor, *task).status == "converged" and solver.closest is None
 
 
 def test_it_goes_on_where_something_is_feasible():
@@ -45,7 +85,7 @@ def test_what_is_only_propagated_is_no_reason_to_end():
     front = MACS(agents=5, archive=5, mesh="fixed", refine=False).solve(
         ride(-0.5), DFET(3, 3), evaluations=300, seed=1, verify=None, inner="propagate"
     )
-    assert len(front) == 0 and front.stats["evaluations"] == 300 and "near none" not in front.message
+    assert len(front) == 0 and front.stats["evaluations"] == 300 and "solves for feasibility" not in front.message
 
 
 def test_black_boxes_go_on():

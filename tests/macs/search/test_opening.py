@@ -7,6 +7,7 @@ import pytest
 
 from macs import MACS, payoff
 from macs.evaluation.bilevel import Bilevel
+from macs.gradients import multistart
 from macs.gradients.multistart import MultistartSolver
 from macs.search import opening
 from macs.search.state import SearchState
@@ -108,7 +109,15 @@ def test_starts_agree_soon_and_are_never_more_than_the_budget_allows() -> None:
     assert few.counts.gradient_solves < many.counts.gradient_solves < 60
 
 
-def test_what_nothing_makes_feasible_is_projected() -> None:
+def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -> None:
+    evaluator = projecting(walk(least=0.5), METHOD)
+    state = begun(evaluator)
+    assert not len(state.archive) and not len(state.optima) and MACS().has_settled(state)
+    assert evaluator.counts.evaluations == 10 and evaluator.counts.fallbacks == 0 and len(state.closest) == 1
+
+
+def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
+    monkeypatch.setattr(multistart, "TRIED", (1, 0))
     evaluator = projecting(walk(least=0.5), METHOD)
     state = begun(evaluator)
     assert not len(state.archive) and not len(state.optima)

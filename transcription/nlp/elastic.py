@@ -1,0 +1,145 @@
+"""The least violation near a vector: every row of an NLP may give way, and what they give way by is minimised.
+
+    minimise sum |gap_i| weight_i   subject to   g_lower <= g(z) + gap <= g_upper,   bounds of the variables.
+
+Something is strictly inside wherever it begins, so that IPOPT takes some tens of iterations, also where nothing is feasible; see Nocedal
+and Wright, "Numerical Optimization", 2nd edition, section 18.5. The sum of absolute values is 0 wherever that is possible nearby; elsewhere
+it leaves few rows violated: those in conflict. Dynamics weigh more than what a user demands, so that the result is a trajectory.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from problems.derived import remembered
+from problems.peaks import refuse_peaks
+
+from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
+from ..phases.writer import DYNAMICS
+from ..stopping import Stopped, check_stopping, stopping
+from .derivatives import gradients, hessian
+from .program import multiplied
+from .scalarized import SOLVED, Solved
+from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
+from .watched import Watched
+
+HEAVY = 100.0
+"""How much more the equations of the dynamics weigh than other rows."""
+ACCURACY = 1e-9
+"""IPOPT's tolerance: of the sum, over thousands of rows."""
+INSIDE = 1e-2
+"""By how much more than they miss rows may give way at the start, in their scales."""
+OPPOSING = 1e-2
+"""Least multiplier of a constraint that opposes others: how much less these would miss in sum, were its limit moved by a scale."""
+
+
+def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max_iterations: int = 300, seconds: float = 600.0) -> Solved:
+    """A vector near a start (n,) that is feasible, or violates least in sum: no smaller change of it violates less.
+
+    Parameters
+    ----------
+    nlp : NLP
+    start : array (n,)
+        A full vector; its states need not obey the dynamics.
+    tolerance : float
+        Largest scaled residual of a feasible vector.
+    max_iterations, seconds : int, float
+        Limits of the solve. The time is a safety net: what it ends is not reproducible.
+
+    Returns
+    -------
+    Solved
+        Its status is "converged" if it is feasible; "infeasible" if its violation can get no smaller nearby; else "failed", or "timeout".
+        Objectives were not minimised. The start itself, with status "timeout" and not begun, if the work is to end early (`stopping`).
+
+    Raises
+    ------
+    ValueError
+        If a peak is used otherwise than minimised or bounded above.
+    """
+    start = back_in_bounds(nlp, start)
+    F, violation = nlp.evaluate(start[None])
+    if stopping() or not np.isfinite(violation[0]):
+        # Where there are no numbers, IPOPT would not begin.
+        status = TIMEOUT if stopping() else FAILED
+        return Solved(start, F[0], float(violation[0]), status, 0, status == TIMEOUT, begun=False, message="it was not begun")
+    try:
+        run = _program(nlp, seconds, max_iterations)
+    except Stopped:
+        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, True, begun=False, message="it was not begun")
+    weights = _weights(nlp)
+    gaps = weights * np.maximum(nlp.residuals(start[None])[1][0, len(start) :], 0.0)
+    limits = nlp.g_lower * weights / nlp.g_scale, nlp.g_upper * weights / nlp.g_scale
+    (lower, upper), none = scaled_bounds(nlp), np.zeros(2 * len(weights))
+    answer = run(
+        x0=np.concatenate([(start - origin(nlp)) / nlp.scale, gaps + INSIDE, gaps + INSIDE]),
+        lbx=np.append(lower, none),
+        ubx=np.append(upper, none + np.inf),
+        lbg=limits[0],
+        ubg=limits[1],
+    )
+    stats = run.stats()
+    outcome, iterations = stats["return_status"], int(np.clip(stats["iter_count"], 0, max_iterations))
+    z = origin(nlp) + np.array(answer["x"]).ravel()[: len(start)] * nlp.scale
+    z = nlp.tighten(back_in_bounds(nlp, z)[None])[0]
+    F, violation = nlp.evaluate(z[None])
+    status = STATUS_OF_IPOPT.get(outcome, FAILED)
+    if not np.isfinite([*F[0], violation[0]]).all():
+        z, status = start, FAILED
+        F, violation = nlp.evaluate(z[None])
+    elif violation[0] <= tolerance:
+        status = CONVERGED
+    elif outcome in SOLVED:
+        status = INFEASIBLE
+    message = "" if status == CONVERGED else "the violation can get no smaller nearby" if status == INFEASIBLE else outcome
+    # Of the sum of what rows miss, in their weights.
+    multipliers = np.concatenate([np.zeros(len(F[0])), np.array(answer["lam_g"]).ravel() * weights / nlp.g_scale])
+    message = message.replace("_", " ").lower()
+    return Solved(z, F[0], float(violation[0]), status, iterations, status == TIMEOUT, message=message, multipliers=multipliers)
+
+
+def opposing(nlp: NLP, z: np.ndarray, tolerance: float = 1e-6) -> tuple[str, ...]:
+    """Labels of constraints that are met at a vector (n,) which violates least, and for which others are violated; the strongest first.
+
+    Bounds are not among them, nor is the dynamics.
+    """
+    solved, found = least_violation(nlp, z, tolerance=tolerance), dict[str, float]()
+    if solved.status != INFEASIBLE or solved.multipliers is None:
+        return ()
+    missed, strengths = nlp.violations(solved.z), np.abs(solved.multipliers[len(solved.F) :]) * nlp.g_scale
+    for label, strength in zip(nlp.g_labels, strengths.tolist(), strict=True):
+        if not label.startswith(DYNAMICS) and missed[label] <= tolerance:
+            found[label] = found.get(label, 0.0) + strength
+    return tuple(sorted((label for label in found if found[label] > OPPOSING), key=lambda label: -found[label]))
+
+
+def _weights(nlp: NLP) -> np.ndarray:
+    """What a scale of each row (r,) counts."""
+    return np.array([HEAVY if label.startswith(DYNAMICS) else 1.0 for label in nlp.g_labels])
+
+
+@remembered
+def _program(nlp: NLP, seconds: float, max_iterations: int) -> Watched:
+    """The program in x = (y, up, down), with z = origin + scale y, and the gaps up - down in weighted scales of their rows."""
+    refuse_peaks(nlp.problem)
+    n, r = len(nlp.variables), len(nlp.g_scale)
+    x, rows = ca.MX.sym("x", n + 2 * r), ca.MX(ca.DM(_weights(nlp) / nlp.g_scale))
+    y, up, down = ca.vertsplit(x, [0, n, n + r, n + 2 * r])
+    z, scale = origin(nlp) + y * nlp.scale, ca.MX(ca.DM(nlp.scale))
+    _, g = nlp.functions(z)
+    values = g * rows - up + down
+    check_stopping()
+    jacobian = ca.horzcat(multiplied(gradients(nlp)(z)[1], rows, scale), -ca.MX.eye(r), ca.MX.eye(r))
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", r)
+    curvature = multiplied(hessian(nlp)(z, ca.MX(len(nlp.problem.goals), 1), lam_g * rows), scale, scale)
+    curvature = ca.diagcat(curvature, ca.MX(2 * r, 2 * r))
+    derivatives = {
+        "jac_g": ca.Function("jac_g", [x, ca.MX(0, 1)], [values, jacobian], ["x", "p"], ["g", "jac_g_x"]),
+        "hess_lag": ca.Function(
+            "hess_lag", [x, ca.MX(0, 1), lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
+        ),
+    }
+    options = ipopt_options(seconds, max_iterations)
+    options |= {"ipopt.tol": ACCURACY, "ipopt.nlp_scaling_method": "none", "ipopt.bound_relax_factor": 0.0, "ipopt.mu_init": 0.1}
+    return Watched("elastic", {"x": x, "f": ca.sum1(up) + ca.sum1(down), "g": values}, options | derivatives | {"calc_lam_p": False})
