@@ -363,7 +363,7 @@ def test_same_seed_same_bits() -> None:
 @pytest.mark.slow
 def test_two_phases_of_a_skip_entry() -> None:
     problem = load("skip")
-    choice = decide(problem, ReferencePoint({"terminal mass": 60000.0}))
+    choice = decide(problem, ReferencePoint({"terminal mass": 60000.0}), starts=1)
     assert choice.message == "" and choice.point.verified and choice.point.optimality < 1e-6
     a, b = (1 - degree for degree in choice.degrees.values())
     # The kink of the largest distance: both are equal there.

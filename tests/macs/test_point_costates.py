@@ -136,6 +136,7 @@ def switching(name: str, point) -> tuple[np.ndarray, np.ndarray]:
     return np.array(slope(x.T, u.T, times[None], s, adjoint.T)).ravel(), u.ravel()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "switches"), [("car", 1), ("moon_landing", 1), ("f8", 3), ("fast_oscillator", 1)])
 def test_switching_functions_change_sign_where_controls_do(name, switches):
     point = refined(name)

@@ -10,6 +10,7 @@ from problems.cases import betts, betts_heating
 from transcription import DFET, MultipleShooting
 
 
+@pytest.mark.slow
 def test_the_optimum_is_near_on_a_coarse_mesh():
     point = optimize(load("betts"), DFET(12, 3))
     assert point.status == "converged"

@@ -345,6 +345,7 @@ def solved(problem, mesh="dfet:20x5"):
     return next(iter(point.simulate().objectives.values()))
 
 
+@pytest.mark.slow
 def test_the_rocket_with_three_arcs():
     import casadi as ca
 
@@ -358,6 +359,7 @@ def test_the_rocket_with_three_arcs():
     assert value("rocket") == pytest.approx(1.01283, abs=1e-5), "as published"
 
 
+@pytest.mark.slow
 def test_the_blend_with_three_arcs():
     def rates(x, y, u):
         return u * (10 * y - x), u * (x - 10 * y) - (1 - u) * y
@@ -369,6 +371,7 @@ def test_the_blend_with_three_arcs():
     assert value("catalyst_mixing") == pytest.approx(0.0480556, abs=2e-7), "as published"
 
 
+@pytest.mark.slow
 def test_fishing_with_three_arcs():
     def rates(x, y, u):
         return x - x * y - 0.4 * x * u, -y + x * y - 0.2 * y * u

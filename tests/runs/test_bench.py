@@ -140,6 +140,7 @@ def test_searches_for_the_same_time_and_points(small):
     assert f"goddard: hypervolume asked at least 0.999, measured {ours.spread('ratio')}" in search.report(rows)
 
 
+@pytest.mark.slow
 def test_fronts_to_the_same_quality():
     rows: list[Row] = []
     fronts.bench_fronts(rows, fronts.Effort(fronts.QUICK.cases[:1], (1, 2), (60, 1000)))
@@ -224,6 +225,7 @@ def test_what_does_not_end_or_crashes_is_told(capfd):
     assert "measured 0 of 2, MISSED" in standard.report(rows)
 
 
+@pytest.mark.slow
 def test_methods_agree_on_published_problems():
     rows: list[Row] = []
     methods.bench_methods(rows, methods.Effort(("zermelo",)))

@@ -81,6 +81,7 @@ def rows(changed: ChangedData, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(changed.tables()[name].csv().splitlines()))
 
 
+@pytest.mark.slow
 def test_shifts_are_those_of_the_same_flights(folder, changed):
     light = union(folder, "light")
     assert 5 < len(light) <= MANY
@@ -155,6 +156,7 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
     assert [ax.get_xlabel() for ax in figure.axes[:3]] == [""] * 3 and "distance" in figure.axes[5].get_xlabel()
 
 
+@pytest.mark.slow
 def test_the_report_has_all_of_it(folder):
     said = str(report(folder, trust=True, figures=False))
     assert "The front of light under changed data." in said and "Points of the front of light" in said

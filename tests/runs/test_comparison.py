@@ -228,6 +228,7 @@ def test_a_state_that_does_not_exist_is_named(folder):
         published_tables(comparisons(Store.open(folder), {}), papers([paper]))
 
 
+@pytest.mark.slow
 def test_where_nothing_is_found_the_report_says_so(tmp_path):
     truth = tmp_path / "truth.csv"
     truth.write_text("distance [m],effort\n1,3\n2,15\n")

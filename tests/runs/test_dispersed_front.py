@@ -51,6 +51,7 @@ def found(folder) -> DispersedFront:
     return one
 
 
+@pytest.mark.slow
 def test_each_point_is_flown_as_the_case_says(found):
     settings = coupled.Dispersions(**GIVEN)
     assert found.settings == settings and settings.entry_angle == 0.1
@@ -63,6 +64,7 @@ def test_each_point_is_flown_as_the_case_says(found):
     assert all(0.0 < one["captured", "%"] < 60.0 for one in found.measures["bank as it is"])
 
 
+@pytest.mark.slow
 def test_tables_and_figures_of_the_report(folder, found):
     made = report(folder)
     table = next(path for path in made.files if path.name.endswith("dispersed-bank-as-it-is.csv"))

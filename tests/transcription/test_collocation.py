@@ -307,6 +307,7 @@ def two_legs() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", POINTS)
 def test_phases_free_times_interior_points_and_path_constraints(points):
     """The path limits hold at the points and at the ends of intervals, and all points agree on the optimum."""

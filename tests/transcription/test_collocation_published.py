@@ -14,6 +14,7 @@ QUICK = ("breakwell", "linear_tangent", "van_der_pol")
 """One of each kind that takes little: a path limit, a free time, a bound; for one with none of these, see the tests of the benchmark."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_all_transcriptions_have_the_same_optimum(name):
     """Each from the problem's own guess, on the mesh it begins on in `macs bench methods`; refined, they agree to 1e-3 or better."""

@@ -35,6 +35,7 @@ def method_of(point) -> MultipleShooting:
 # As many intervals as before
 
 
+@pytest.mark.slow
 def test_layers_at_equal_numbers_of_intervals():
     """The cost of the two layers is a closed form; between them nothing happens."""
     problem, method = load("standard/hypersensitive"), MultipleShooting(20, steps=7, control="linear")
@@ -67,6 +68,7 @@ def test_elements_of_other_methods_move_too():
 # As many as it takes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "tolerance", "most"), [("van_der_pol", 1e-5, 130), ("hypersensitive", 1e-5, 40)])
 def test_simulations_agree_after_refinement(case, tolerance, most):
     problem = load(f"standard/{case}")
@@ -106,6 +108,7 @@ def swinging(bounds: tuple[float, float] = (-5, 5)) -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_a_search_refines_the_intervals_of_its_points():
     solver = MACS(agents=3, archive=3, mesh="adaptive", mesh_tolerance=2e-2)
     front = solver.solve(swinging(), MultipleShooting(12, control="linear"), evaluations=40, seed=1)

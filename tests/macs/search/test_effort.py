@@ -120,6 +120,7 @@ def test_proposals_keep_their_order():
         assert np.abs(nearest - z)[box.free].sum() <= min(np.abs(nearest - other)[box.free].sum() for other in Z) + 1e-9
 
 
+@pytest.mark.slow
 def test_a_divided_search_takes_a_part_of_the_work_and_finds_as_good_a_front():
     def found(inner):
         return MACS(mesh="fixed").solve(swing(), MESH, evaluations=240, seed=1, inner=inner, verify=None)

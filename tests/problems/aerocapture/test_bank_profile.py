@@ -113,6 +113,7 @@ def test_refined_solutions_flown_again(shape):
     confirm(point, shape)
 
 
+@pytest.mark.slow
 def test_another_mesh_another_arrival_and_a_slower_roll():
     """The default mesh resolves the profile; the planet is round and does not turn, and the plane of the entry is free, so the direction
     of the arrival does not matter; half the bank rate costs something, as it must."""
@@ -163,6 +164,7 @@ def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, f
     return apoapsis - TARGET, CIRCULAR - momentum / apoapsis, 0.091 * heat**0.51575
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shield", [7.98, 8.9928])
 def test_bang_bang_laws_are_as_good(shield):
     """With one switch at once from lift up to lift down, the entry angle that gives the heat shield is found by roots. A roll at 10 deg/s
@@ -178,6 +180,7 @@ def test_bang_bang_laws_are_as_good(shield):
     assert instant - 0.01 < point.objectives["delta v"] < instant + 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "above", "heavier"), [(2, 1.6, 1.022), (3, 2.9, 1.055)])
 def test_table_3_is_beside_the_front(shape, above, heavier):
     """With the printed heat shield the least delta v is `above` the printed one; at the printed delta v the shield is less than `heavier`

@@ -181,6 +181,7 @@ def confirm(point) -> None:
 NAMES = ("nose radius", "rear radius", "front angle", "rear angle", "angle of attack")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["inverse packing efficiency", "TPS mass fraction"])
 def test_single_optima_flown_again(objective):
     problem = load("aerocapture_codesign", shape=2)
@@ -191,6 +192,7 @@ def test_single_optima_flown_again(objective):
     assert point.objectives[objective] < float((start.packing if objective == "inverse packing efficiency" else start.shield)[0])
 
 
+@pytest.mark.slow
 def test_slender_shapes_are_mirror_images():
     problem = load("aerocapture_codesign", shape=1)
     point = optimize(problem, stated(problem.default_transcription), objective="inverse packing efficiency")
@@ -226,6 +228,7 @@ def test_the_steepest_exit_for_a_limit_of_the_burn():
     assert v * TOP * np.cos(angle) == pytest.approx(w * TARGET, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_corridor_is_a_fourth_objective():
     problem = load("aerocapture_codesign", shape=2, corridor=True)
     point = optimize(problem, stated(problem.default_transcription), objective="entry corridor")

@@ -309,6 +309,7 @@ def test_settings_that_make_no_sense(given_, words):
         Dispersions(**given_)
 
 
+@pytest.mark.slow
 def test_points_of_the_bank_problem_fly_their_profiles():
     """The nominal case of both ends of the front has the objectives that the simulation of the whole motion in space finds."""
     problem = load("aerocapture_bank")
