@@ -73,7 +73,7 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
 
 
 def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
-    """A row for each cost and solver: evaluations, inner iterations, gradient solves and time of a run."""
+    """A row for each cost and solver: evaluations, inner iterations, gradient solves, work and time of a run."""
     rows: list[list[Cell]] = [
         [cost, solver, summary.count, summary.mean, summary.median, summary.best, summary.worst]
         for cost, solvers in spent(comparison).items()
@@ -82,7 +82,8 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
     ]
     heads: list[Column | str] = [Column("cost", grouped=True), "solver", "runs"]
     heads += [Column(name, digits=4) for name in ("mean", "median", "least", "most")]
-    return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.")}
+    note = "Work: iterations of IPOPT times variables, or what takes about as long; the same on all machines."
+    return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", [note])}
 
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]

@@ -51,12 +51,13 @@ def samples(comparison: Comparison, reference: Reference, *, curve: bool = True)
 
 
 def spent(comparison: Comparison) -> dict[str, dict[str, list[float]]]:
-    """{cost: {solver: a value for each finished run}}."""
-    keys = {key.replace("_", " "): key for key in COUNTS} | {"time [s]": "wall_time"}
-    return {
-        name: {solver: [float(run.front.stats[key]) for run in runs] for solver, runs in comparison.runs.items() if runs}
+    """{cost: {solver: a value for each finished run}}; work of those that record it."""
+    keys = {key.replace("_", " "): key for key in COUNTS} | {"work": "work", "time [s]": "wall_time"}
+    found = {
+        name: {solver: [float(run.front.stats[key]) for run in runs if key in run.front.stats] for solver, runs in comparison.runs.items()}
         for name, key in keys.items()
     }
+    return {name: {solver: values for solver, values in solvers.items() if values} for name, solvers in found.items()}
 
 
 def histories(comparison: Comparison, reference: Reference, name: str, axis: str) -> dict[str, list[History]]:

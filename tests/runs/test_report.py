@@ -86,6 +86,16 @@ def test_everything_is_told_and_written(folder, told):
         assert (folder / "report" / f"{stem}-{figure}.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_costs_are_those_of_the_runs(folder, told):
+    runs = [run.front.stats for run in Store.open(folder).runs() if run.finished and run.cell.solver == "one"]
+    with (folder / "report" / "glide-dfet-2x2-spent.csv").open() as file:
+        rows = {row["cost"]: row for row in csv.DictReader(file) if row["solver"] == "one"}
+    for cost in ("evaluations", "inner iterations", "gradient solves", "work"):
+        known = [stats[cost.replace(" ", "_")] for stats in runs]
+        assert float(rows[cost]["mean"]) == pytest.approx(np.mean(known), rel=1e-3) and int(rows[cost]["runs"]) == len(known)
+    assert float(rows["work"]["mean"]) > 0
+
+
 def test_its_numbers_are_those_of_the_fronts(folder, told):
     store = Store.open(folder)
     fronts = [run.front for run in store.runs() if run.finished]
