@@ -68,8 +68,8 @@ COMMON: Options = (
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
 SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS: it takes a tenth of an iteration or less. Where limits of objectives leave nothing strictly inside, and far
-from feasible trajectories, those that are not scaled may make iterations many times as long: 40 times on the skip entry."""
+"""Scaling of matrices by MUMPS: it takes a tenth of an iteration or less. Where limits of objectives leave nothing strictly inside, and
+from starts that are drawn, iterations with matrices that are not scaled may take many times as long: 40 times on the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -233,7 +233,7 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    scaling = UNCHANGED if (feasible or near) and not task.limited else SCALED
+    scaling = SCALED if task.limited or not (persistent or feasible or near) else UNCHANGED
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
