@@ -113,7 +113,7 @@ def nearest_violation(nearest: Point) -> str:
 
 
 def conflict(nlp: NLP, nearest: Point) -> str:
-    """That text of a point that violates least, with the constraints for which it does."""
+    """Text of `nearest_violation` for a point that violates least, with the constraints that are in conflict with those it names."""
     others = [label for label in opposing(nlp, nearest.decision) if not nearest.violations.get(label, 0.0) > nearest.violation * SIDE]
     return nearest_violation(nearest) + (f", in conflict with {', '.join(others[:NAMED])}" if others else "")
 

@@ -9,6 +9,8 @@ it leaves few rows violated: those in conflict. Dynamics weigh more than what a 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 
@@ -20,7 +22,7 @@ from ..phases.writer import DYNAMICS
 from ..stopping import Stopped, check_stopping, stopping
 from .derivatives import gradients, hessian
 from .program import multiplied
-from .scalarized import SOLVED, Solved
+from .scalarized import SOLVED, Solved, not_begun
 from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from .watched import Watched
 
@@ -30,6 +32,8 @@ ACCURACY = 1e-9
 """IPOPT's tolerance: of the sum, over thousands of rows."""
 INSIDE = 1e-2
 """By how much more than they miss rows may give way at the start, in their scales."""
+MET = 1e-6
+"""Violation, in scales, up to which a constraint is met."""
 OPPOSING = 1e-2
 """Least multiplier of a constraint that opposes others: how much less these would miss in sum, were its limit moved by a scale."""
 
@@ -59,15 +63,15 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
         If a peak is used otherwise than minimised or bounded above.
     """
     start = back_in_bounds(nlp, start)
-    F, violation = nlp.evaluate(start[None])
-    if stopping() or not np.isfinite(violation[0]):
-        # Where there are no numbers, IPOPT would not begin.
-        status = TIMEOUT if stopping() else FAILED
-        return Solved(start, F[0], float(violation[0]), status, 0, status == TIMEOUT, begun=False, message="it was not begun")
+    if stopping():
+        return not_begun(nlp, start)
+    if not np.isfinite(nlp.evaluate(start[None])[1][0]):
+        # IPOPT would not begin either.
+        return replace(not_begun(nlp, start), status=FAILED, clocked=False)
     try:
         run = _program(nlp, seconds, max_iterations)
     except Stopped:
-        return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, True, begun=False, message="it was not begun")
+        return not_begun(nlp, start)
     weights = _weights(nlp)
     gaps = weights * np.maximum(nlp.residuals(start[None])[1][0, len(start) :], 0.0)
     limits = nlp.g_lower * weights / nlp.g_scale, nlp.g_upper * weights / nlp.g_scale
@@ -99,17 +103,17 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
     return Solved(z, F[0], float(violation[0]), status, iterations, status == TIMEOUT, message=message, multipliers=multipliers)
 
 
-def opposing(nlp: NLP, z: np.ndarray, tolerance: float = 1e-6) -> tuple[str, ...]:
+def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
     """Labels of constraints that are met at a vector (n,) which violates least, and for which others are violated; the strongest first.
 
-    Bounds are not among them, nor is the dynamics.
+    Bounds are not among them, nor are the dynamics.
     """
-    solved, found = least_violation(nlp, z, tolerance=tolerance), dict[str, float]()
+    solved, found = least_violation(nlp, z), dict[str, float]()
     if solved.status != INFEASIBLE or solved.multipliers is None:
         return ()
     missed, strengths = nlp.violations(solved.z), np.abs(solved.multipliers[len(solved.F) :]) * nlp.g_scale
     for label, strength in zip(nlp.g_labels, strengths.tolist(), strict=True):
-        if not label.startswith(DYNAMICS) and missed[label] <= tolerance:
+        if not label.startswith(DYNAMICS) and missed[label] <= MET:
             found[label] = found.get(label, 0.0) + strength
     return tuple(sorted((label for label in found if found[label] > OPPOSING), key=lambda label: -found[label]))
 

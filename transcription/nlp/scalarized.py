@@ -68,8 +68,8 @@ COMMON: Options = (
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
 SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS: it takes a tenth of an iteration or less. Where limits of objectives leave nothing strictly inside, and
-from starts that are drawn, iterations with matrices that are not scaled may take many times as long: 40 times on the skip entry."""
+"""Scaling of matrices by MUMPS, which takes a little of each iteration. Where limits of objectives leave nothing strictly inside, and
+from starts that are drawn, iterations with matrices that are not scaled may take many times as long: some 30 times on the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -225,11 +225,11 @@ def scalarize(
     """
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
-        return _not_begun(nlp, start)
+        return not_begun(nlp, start)
     try:
         task = _task(nlp, start, reference, weights, ceiling, margin)
     except Stopped:  # while derivatives were built
-        return _not_begun(nlp, start)
+        return not_begun(nlp, start)
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
@@ -272,7 +272,7 @@ def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
     return np.minimum(usual, np.where(own > 0, own, usual))
 
 
-def _not_begun(nlp: NLP, start: np.ndarray) -> Solved:
+def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
     """The start itself, where the work is to end before IPOPT begins."""
     F, violation = nlp.evaluate(start[None])
     return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False, message="it was not begun")
@@ -334,7 +334,7 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
     except Stopped:
-        return _not_begun(nlp, start), False
+        return not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
     slack = min(1e-8, SLACK * tolerance)
     states = np.where(made_up, 0.0, slack * nlp.scale)
