@@ -146,4 +146,4 @@ def _program(nlp: NLP, seconds: float, max_iterations: int) -> Watched:
     }
     options = ipopt_options(seconds, max_iterations)
     options |= {"ipopt.tol": ACCURACY, "ipopt.nlp_scaling_method": "none", "ipopt.bound_relax_factor": 0.0, "ipopt.mu_init": 0.1}
-    return Watched("elastic", {"x": x, "f": ca.sum1(up) + ca.sum1(down), "g": values}, options | derivatives | {"calc_lam_p": False})
+    return Watched("elastic", {"x": x, "f": ca.sum1(up) + ca.sum1(down), "g": values}, options | derivatives)

@@ -115,17 +115,18 @@ class Linearised:
 
     @classmethod
     def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Linearised | None:
-        """Those at z, see `optimality`; None where a derivative is no number."""
+        """Those at z, see `optimality`; None where a derivative, in units, is no number."""
         z = np.asarray(z, dtype=float)
         found = gradients(nlp)(z)
         dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
-        if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
-            return None
         natural = nlp_scales(nlp)
         scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
         unit = units(nlp)
-        dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
-        dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
+        with np.errstate(over="ignore", invalid="ignore"):  # derivatives may be of any size
+            dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
+            dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
+        if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):
+            return None
         near, sides, slack = _inequalities(nlp, z, g, dg)
         return cls(nlp, z, scales, dF, dg[nlp.g_lower == nlp.g_upper], sides, near, slack)
 
@@ -152,9 +153,10 @@ class Conditions:
         if linear is None:
             return None
         try:
-            return cls(linear, *_reduced(nlp, linear.of_equations, np.vstack([linear.of_objectives, -linear.of_inequalities])))
+            reduced, adjoints = _reduced(nlp, linear.of_equations, np.vstack([linear.of_objectives, -linear.of_inequalities]))
         except RuntimeError:
             return None
+        return cls(linear, reduced, adjoints) if np.isfinite(reduced).all() and np.isfinite(adjoints).all() else None
 
     @cached_property
     def residual(self) -> float:
@@ -265,6 +267,8 @@ def _by_elimination(
     right = np.vstack([of_states.T, np.zeros((beyond, len(of_states)))])
     adjoints = _solved(factors, square.T, right, "T")
     left = of_free.T - by_free.T @ adjoints
+    if not np.isfinite(left).all():
+        return None
     if beyond:
         others = _solved(factors, square.T, np.eye(r)[:, states:], "T")
         taken = np.linalg.lstsq(by_free.T @ others, left, rcond=None)[0]

@@ -52,10 +52,8 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
         "jac_g": ca.Function("jac_g", [x, p], [values, jacobian], ["x", "p"], ["g", "jac_g_x"]),
         "hess_lag": ca.Function("hess_lag", [x, p, lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]),
     }
-    # Sensitivities to the parameters are not used, and would take longer to derive than some solves take.
-    unasked = {"calc_lam_p": False, "no_nlp_grad": True}
     settings = ipopt_options(seconds, max_iterations) | {f"ipopt.{name}": value for name, value in options}
-    return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives | unasked)
+    return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives)
 
 
 def multiplied(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:

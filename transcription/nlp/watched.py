@@ -18,6 +18,11 @@ EVERY = 0.25
 """Least seconds between two questions whether to end: most solves take less, and need not ask."""
 
 
+UNASKED = {"calc_lam_p": False, "no_nlp_grad": True}
+"""Sensitivities to the parameters are not used. They would take longer to derive than some solves take, and fail where rates are no numbers,
+which CasADi prints."""
+
+
 class Watched:
     """A program for IPOPT: called as what `casadi.nlpsol` returns. Its return status is "User_Requested_Stop" where it was asked to end.
 
@@ -38,7 +43,7 @@ class Watched:
     def __init__(self, name: str, parts: Any, options: Mapping[str, Any]) -> None:
         check_stopping()
         self._watch = _Watch()
-        self._solver = ca.nlpsol(name, "ipopt", parts, {**options, "iteration_callback": self._watch})
+        self._solver = ca.nlpsol(name, "ipopt", parts, {**UNASKED, **options, "iteration_callback": self._watch})
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
         """The answer, by the names of CasADi. Raises KeyboardInterrupt after Ctrl-C, unless that is handled otherwise."""

@@ -1,0 +1,79 @@
+"""Random expressions that CasADi and plain Python evaluate alike, each by its own functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+Term = tuple[Any, ...]
+"""A number, a name, or a function of other terms: ("number", value), ("name", text), or (function, term, ...)."""
+
+SMOOTH = ("+", "-", "*", "sin", "cos", "tanh", "square")
+RISKY = ("/", "exp", "root", "log", "abs", "cube")
+"""They may leave the numbers, or have no derivatives. Roots are of absolute values: CasADi takes the square of a root of x for x."""
+
+
+def random_term(rng: np.random.Generator, names: Sequence[str], depth: int, risk: float) -> Term:
+    """A term of these names; each function in it is a risky one with this probability."""
+    if depth == 0 or (depth < 3 and rng.random() < 0.25):
+        return ("name", str(rng.choice(list(names)))) if names and rng.random() < 0.75 else ("number", _number(rng))
+    kind = str(rng.choice(RISKY if rng.random() < risk else SMOOTH))
+    count = 2 if kind in "+-*/" else 1
+    return (kind, *(random_term(rng, names, depth - 1, risk) for _ in range(count)))
+
+
+def _number(rng: np.random.Generator) -> float:
+    return float(rng.choice([0.0, 1.0, -1.0, 0.5, 2.0, round(float(rng.normal()), 3), float(10.0 ** rng.integers(-3, 4))]))
+
+
+def symbolic(term: Term, values: Mapping[str, Any]) -> Any:
+    """The term as an expression of CasADi, with symbols by name."""
+    return _evaluated(term, values, SYMBOLIC)
+
+
+def numeric(term: Term, values: Mapping[str, float]) -> float:
+    """The term as a number; NaN where it has none."""
+    try:
+        return float(_evaluated(term, values, NUMERIC))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+def _evaluated(term: Term, values: Mapping[str, Any], functions: Mapping[str, Any]) -> Any:
+    kind, *parts = term
+    if kind == "number":
+        return parts[0]
+    if kind == "name":
+        return values[parts[0]]
+    return functions[kind](*(_evaluated(part, values, functions) for part in parts))
+
+
+SYMBOLIC: dict[str, Any] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / (ca.MX(b) if not isinstance(b, ca.MX) else b),
+    "square": lambda a: a * a,
+    "cube": lambda a: a * a * a,
+    "sin": ca.sin,
+    "cos": ca.cos,
+    "tanh": ca.tanh,
+    "exp": ca.exp,
+    "root": lambda a: ca.sqrt(ca.fabs(a)),
+    "log": ca.log,
+    "abs": ca.fabs,
+}
+NUMERIC: dict[str, Any] = SYMBOLIC | {
+    "/": lambda a, b: a / b,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tanh": math.tanh,
+    "exp": math.exp,
+    "root": lambda a: math.sqrt(abs(a)),
+    "log": math.log,
+    "abs": abs,
+}
