@@ -49,7 +49,7 @@ def with_sizes(problem: CompiledProblem) -> CompiledProblem:
     for i, phase in enumerate(problem.phases):
         kept = [k for k, row in enumerate(phase.sized) if (i, row) not in wrong]
         inputs = phase.sizes.mx_in()
-        sizes = ca.Function("sizes", inputs, [phase.sizes(*inputs)[kept]], phase.sizes.name_in(), ["sizes"])
+        sizes = ca.Function("sizes", inputs, [phase.sizes(*inputs)[kept, :]], phase.sizes.name_in(), ["sizes"])
         duration = points[i][1] - points[i][0]
         scales = [float(np.median(points[i][columns[i][k]] / duration)) or 1.0 for k in kept]
         phases.append(replace(phase, sizes=sizes, sized=tuple(phase.sized[k] for k in kept), size_scales=tuple(scales)))

@@ -257,7 +257,10 @@ def _misses(
 def _growing(problem: CompiledProblem, trajectory: Trajectory, tolerance: float) -> str:
     """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
     rtol, atol = accuracy(PART * tolerance)
-    own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
+    try:
+        own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
+    except Stopped:
+        return ""
     if not own <= PART * tolerance:
         return ""
     return f", though on each element by at most {own:.0e}: the dynamics are unstable, and no simulation without feedback can follow them"

@@ -28,12 +28,12 @@ class Hang(BaseException):
     """The clock ended an attempt."""
 
 
-class Finding(AssertionError):
+class FindingError(AssertionError):
     """The contract is broken."""
 
 
 def attempt_flight(seed: int) -> str:
-    """The outcome of one random problem; raises Finding."""
+    """The outcome of one random problem; raises FindingError."""
     rng = np.random.default_rng([seed, 1])
     way = str(rng.choice(["macs", "macs", "macs", "propagate", "sweep", "optimize", "nsga2"]))
     found = _outcome(lambda: _solved(seed, way))
@@ -44,9 +44,9 @@ def attempt_flight(seed: int) -> str:
         return "nothing feasible" if front.message or way in ("nsga2",) else "no points"
     for point in front:
         if not np.isfinite(list(point.objectives.values())).all():
-            raise Finding(f"objectives that are no numbers: {point.objectives}")
+            raise FindingError(f"objectives that are no numbers: {point.objectives}")
         if point.verified:
-            _check_flown(plain, point, front)
+            check_flown(plain, point, front)
     return "verified points" if front.verified.any() else "points, none verified"
 
 
@@ -63,61 +63,61 @@ def _solved(seed: int, way: str) -> tuple[Front, Any]:
     return MACS(agents=4, archive=5).solve(problem, transcription, evaluations=40, **inner, **common), plain
 
 
-def _check_flown(plain: Any, point: Any, front: Front) -> None:
+def check_flown(plain: Any, point: Any, front: Front) -> None:
     """Raise Finding where other code does not get what a verified point says."""
     misses, objectives = flown(plain, point)
     worst = max(misses, key=lambda label: misses[label]) if misses else ""
     if worst and not misses[worst] <= FLIES:
-        raise Finding(f"verified, but other code misses {worst} by {misses[worst]:.2e}; its own defect {point.defect:.1e}")
+        raise FindingError(f"verified, but other code misses {worst} by {misses[worst]:.2e}; its own defect {point.defect:.1e}")
     ranges = np.ptp(front.objectives, axis=0)
     for k, (name, value) in enumerate(objectives.items()):
         scale = max(float(ranges[k]), abs(point.objectives[name]), 1e-9)
         if not abs(value - point.objectives[name]) <= FLIES * scale:
-            raise Finding(f"verified, but other code has '{name}' = {value!r} instead of {point.objectives[name]!r}")
+            raise FindingError(f"verified, but other code has '{name}' = {value!r} instead of {point.objectives[name]!r}")
 
 
 def attempt_box(seed: int) -> str:
-    """The outcome of one random black box; raises Finding."""
+    """The outcome of one random black box; raises FindingError."""
     box, rng = random_box(seed), np.random.default_rng([seed, 1])
     solver = [MACS(agents=4, archive=6), NSGA2(population=8), MOPSO(particles=8, archive=8)][int(rng.integers(3))]
     calls = {"evaluations": 60, "seed": seed, "time_limit": LIMIT, "progress": False}
     found = _outcome(lambda: solver.minimize(box.function, box.bounds, **calls), box.kind)
     if isinstance(found, str):
         if box.honest:
-            raise Finding(f"{box.kind}: refused: {found}")
+            raise FindingError(f"{box.kind}: refused: {found}")
         return "refused"
     if not box.honest and box.kind not in ("objects", "raises later", "other columns later", "masked"):
-        raise Finding(f"{box.kind}: accepted")
+        raise FindingError(f"{box.kind}: accepted")
     if len(found) and box.honest:
         again = box.function(found.decision.copy())
         F = np.asarray(again[0] if isinstance(again, tuple) else again, dtype=float).reshape(len(found), -1)
         if not np.array_equal(F, found.objectives):
-            raise Finding(f"{box.kind}: objectives are not those of the variables: {np.abs(F - found.objectives).max():.1e} off")
+            raise FindingError(f"{box.kind}: objectives are not those of the variables: {np.abs(F - found.objectives).max():.1e} off")
     return "points" if len(found) else "no points"
 
 
 def _outcome(work: Callable[[], Any], kind: str = "") -> Any:
-    """What the work returns, or the words of its error; raises Finding for another exception, warnings, or a hang."""
+    """What the work returns, or the words of its error; raises FindingError for another exception, warnings, or a hang."""
     began = time.process_time()
     with warnings.catch_warnings(record=True) as said, _clock(HANGS):
         warnings.simplefilter("always")
         try:
             found = work()
         except Hang:
-            raise Finding(f"{kind}: it hangs") from None
+            raise FindingError(f"{kind}: it hangs") from None
         except (ValueError, TypeError) as error:
             if not _deliberate(error):
-                raise Finding(f"an error from the depths:\n{traceback.format_exc()}") from None
+                raise FindingError(f"an error from the depths:\n{traceback.format_exc()}") from None
             return f"refused: {error}"
         except Exception as error:
             if kind.startswith("raises") and _its_own(error):
                 return "its own error"
-            raise Finding(f"an error from the depths:\n{traceback.format_exc()}") from None
+            raise FindingError(f"an error from the depths:\n{traceback.format_exc()}") from None
     if time.process_time() - began > LIMIT + GRACE:
-        raise Finding(f"it took {time.process_time() - began:.1f} s, with a time limit of {LIMIT:g} s")
+        raise FindingError(f"it took {time.process_time() - began:.1f} s, with a time limit of {LIMIT:g} s")
     ours = [one for one in said if issubclass(one.category, RuntimeWarning) and "random_" not in one.filename]
     if ours:
-        raise Finding(f"a warning from the depths: {ours[0].filename}:{ours[0].lineno}: {ours[0].message}")
+        raise FindingError(f"a warning from the depths: {ours[0].filename}:{ours[0].lineno}: {ours[0].message}")
     return found
 
 

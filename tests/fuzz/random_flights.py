@@ -146,7 +146,8 @@ def _end(rng: np.random.Generator, t0: float) -> Any:
 
 def _sides(rng: np.random.Generator) -> tuple[float | None, float | None]:
     value = round(float(rng.normal()), 2)
-    return [(None, value + 2.0), (value - 2.0, None), (value - 3.0, value + 3.0), (value, value)][int(rng.choice(4, p=[0.4, 0.3, 0.25, 0.05]))]
+    sides = [(None, value + 2.0), (value - 2.0, None), (value - 3.0, value + 3.0), (value, value)]
+    return sides[int(rng.choice(4, p=[0.4, 0.3, 0.25, 0.05]))]
 
 
 def _transcription(rng: np.random.Generator) -> Any:

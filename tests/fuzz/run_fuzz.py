@@ -7,7 +7,7 @@ import sys
 import time
 from collections import Counter
 
-from fuzzing import Finding, attempt_box, attempt_flight
+from fuzzing import FindingError, attempt_box, attempt_flight
 
 
 def main() -> int:
@@ -24,7 +24,7 @@ def main() -> int:
             try:
                 outcome = attempt(seed)
                 outcomes["refused" if outcome.startswith("refused") else outcome] += 1
-            except Finding as finding:
+            except FindingError as finding:
                 findings += 1
                 outcomes["FINDING"] += 1
                 print(f"{attempt.__name__} {seed}: {finding}\n", flush=True)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
-from fuzzing import Finding, _check_flown, attempt_box, attempt_flight
-from random_flights import random_flight
+from fuzzing import FindingError, attempt_box, attempt_flight, check_flown
+from random_flights import PlainPhase, PlainProblem
 from random_terms import numeric, random_term, symbolic
 
-import casadi as ca
-from macs import MACS
-
-FLYING = 7
-"""Seed of a problem that has verified points."""
+from macs import sweep
+from problems import Problem
+from transcription import DFET
 
 
 def test_terms_mean_the_same_to_both():
@@ -22,7 +21,33 @@ def test_terms_mean_the_same_to_both():
         symbols = {name: ca.MX.sym(name) for name in values}
         found = float(ca.Function("f", list(symbols.values()), [ca.MX(symbolic(term, symbols))])(*values.values()))
         ours = numeric(term, values)
-        assert found == pytest.approx(ours, rel=1e-12, abs=1e-300) or not np.isfinite([found, ours]).any()
+        assert found == pytest.approx(ours, rel=1e-12, abs=1e-300) or not np.isfinite(ours), "CasADi may take x / x for 1"
+
+
+def test_other_code_sees_what_a_point_misses():
+    problem = Problem("cart")
+    drive = problem.phase("drive", t0=0.0, tf=(1.0, 5.0))
+    x, u = drive.state("x", bounds=(-5, 5), initial=0.0, final=1.0), drive.control("u", bounds=(-1, 1))
+    drive.dynamics(x=u - 0.1 * x)
+    problem.minimize("time", drive.tf)
+    problem.minimize("effort", drive.integral(u * u))
+    (point, *_), front = (found := sweep(problem, DFET(3, 4), points=3)), found
+    effort = ("square", ("name", "u"))
+
+    def plain(drag: float, effort: tuple = effort, most: float = 1.0) -> PlainProblem:
+        rates = {"x": ("-", ("name", "u"), ("*", ("number", drag), ("name", "x")))}
+        phase = PlainPhase("drive", {"x": (-5.0, 5.0)}, {"u": (-1.0, most)}, rates, {"x": (1.0, 1.0)})
+        return PlainProblem([phase], False, [("time", "minimize", "tf", phase, None), ("effort", "minimize", "integral", phase, effort)])
+
+    assert point.verified
+    check_flown(plain(0.1), point, front)
+    for wrong, words in (
+        (plain(0.2), "misses state drive.x"),
+        (plain(0.1, ("number", 0.5)), "'effort' = "),
+        (plain(0.1, most=0.1), "bounds"),
+    ):
+        with pytest.raises(FindingError, match=words):
+            check_flown(wrong, point, front)
 
 
 @pytest.mark.slow

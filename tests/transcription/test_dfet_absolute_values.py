@@ -125,4 +125,5 @@ def test_candidates_are_scored_by_the_absolute_values_themselves():
 )
 def test_where_large_is_good_they_are_left_as_they_are(state):
     assert transfer(state).compile().phases[0].sized == ()
+    assert DFET(3, 2).transcribe(transfer(state)).problem.phases[0].sizes.size_out(0) == (0, 1)
     assert transfer().compile().phases[0].sized == (0,)

@@ -19,8 +19,8 @@ EVERY = 0.25
 
 
 UNASKED = {"calc_lam_p": False, "no_nlp_grad": True}
-"""Sensitivities to the parameters are not used. They would take longer to derive than some solves take, and fail where rates are no numbers,
-which CasADi prints."""
+"""Sensitivities to the parameters are not used. They would take longer to derive than some solves take, and where rates are no numbers they
+fail, which CasADi prints."""
 
 
 class Watched:
