@@ -122,8 +122,7 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
     """Columns of `Points`, of k entries each, for vectors (k, n) of one NLP."""
     k = len(Z)
     F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
-    with np.errstate(invalid="ignore", over="ignore"):  # states of what violates least may have blown up
-        trajectories = [nlp.unpack(z) for z in Z]
+    trajectories = [nlp.unpack(z) for z in Z]
     return {
         "F": F,
         "decision": Z,

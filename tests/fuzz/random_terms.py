@@ -36,10 +36,18 @@ def symbolic(term: Term, values: Mapping[str, Any]) -> Any:
 
 
 def numeric(term: Term, values: Mapping[str, float]) -> float:
-    """The term as a number; NaN where it has none."""
+    """The term as a number; infinite where that is too large, NaN where it has none.
+
+    Raises
+    ------
+    ZeroDivisionError
+        Where it is divided by zero: CasADi may have taken 0 / x for 0, or x / x for 1.
+    """
     try:
         return float(_evaluated(term, values, NUMERIC))
-    except (ArithmeticError, ValueError):
+    except OverflowError:
+        return math.inf
+    except ValueError:
         return math.nan
 
 

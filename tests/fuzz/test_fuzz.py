@@ -20,8 +20,11 @@ def test_terms_mean_the_same_to_both():
         term, values = random_term(rng, ["a", "b"], 3, 0.3), {"a": float(rng.normal()), "b": float(rng.normal())}
         symbols = {name: ca.MX.sym(name) for name in values}
         found = float(ca.Function("f", list(symbols.values()), [ca.MX(symbolic(term, symbols))])(*values.values()))
-        ours = numeric(term, values)
-        assert found == pytest.approx(ours, rel=1e-12, abs=1e-300) or not np.isfinite(ours), "CasADi may take x / x for 1"
+        try:
+            ours = numeric(term, values)
+        except ZeroDivisionError:
+            continue
+        assert found == pytest.approx(ours, rel=1e-12, abs=1e-300) or np.isnan(ours), "what is taken from itself may be 0 to CasADi"
 
 
 def test_other_code_sees_what_a_point_misses():

@@ -511,6 +511,11 @@ def test_a_lag_that_the_step_cannot_follow_is_refused(scheme, limit):
         type(method)(51, scheme=scheme, steps=int(words[-1].split("=")[1])).transcribe(lag(1.6 * limit / 2))
 
 
+def test_a_lag_that_no_step_in_reach_can_follow_is_refused():
+    with pytest.raises(ValueError, match="too long for 'y', .*; take far shorter ones"):
+        SingleShooting(51).transcribe(lag(1e6))
+
+
 def test_what_may_be_stable_is_not_refused():
     SingleShooting(51).transcribe(lag(2.0, tf=(10.0, 100.0)))  # short flights are
     SingleShooting(6, scheme="euler").transcribe(oscillator())  # grows a little, as Euler's method does

@@ -164,6 +164,7 @@ class _Task:
         moving = self.slope > 0
         return float(np.max((F - self.shift)[moving] / (self.scale * self.slope)[moving]))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def excess(self, F: np.ndarray) -> float:
         """The amount by which F (m,) exceeds hard limits, in scales."""
         over = (F - self.shift) / self.scale
@@ -278,6 +279,7 @@ def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
     return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False, message="it was not begun")
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _task(
     nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None, margin: np.ndarray | None
 ) -> _Task:

@@ -67,8 +67,10 @@ def check_steps(
         finer = np.geomspace(1.0, FINEST, 5000)
         enough = finer[np.abs(scheme.stability(rates[worst] * h / finer)) <= 1.0]
         (count, value), (_, steps) = settings.items()
-        more = "" if phase.name in own else f"{count}={ceil(value * enough[0]) + 1} or more, or "
-        cure = f"{more}steps={ceil(steps * enough[0])}" if len(enough) else "far shorter ones"
+        cure = "far shorter ones"
+        if len(enough):
+            more = "" if phase.name in own else f"{count}={ceil(value * enough[0]) + 1} or more, or "
+            cure = f"{more}steps={ceil(steps * enough[0])}"
         such = ("the longest step", f"there are {n} in all") if phase.name in own else ("each step", f"there are {n}")
         raise ValueError(
             f"{prefix}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate "
