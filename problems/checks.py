@@ -18,9 +18,27 @@ def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
     """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
     if not isinstance(name, str) or not name.strip():
         raise ValueError(f"{place}: the name of a {kind} must be a non-empty string, not {name!r}")
+    check_text(name, f"{place}: the name of a {kind}")
     if name in taken:
         raise ValueError(f"{place}: the name '{name}' is used twice")
     return f"{kind} '{name}' of {place}"
+
+
+def check_text(value: Any, what: str) -> None:
+    """Raise ValueError unless `value` is a text that files can hold, as names and units are written into them."""
+    if not isinstance(value, str):
+        raise ValueError(f"{what} must be a string, not {shown(value)}")
+    wrong = next((character for character in value if character == "\0" or "\ud800" <= character <= "\udfff"), None)
+    if wrong is not None:
+        kind = "a NUL character" if wrong == "\0" else "half of a surrogate pair"
+        text = ascii(value) if len(value) <= 60 else "a long text"
+        raise ValueError(f"{what}, {text}, has {kind}, which no file can hold; all other characters can be used")
+
+
+def unit(value: Any, what: str) -> str:
+    """The unit of what messages call `what`: any text, "" if there is none."""
+    check_text(value, f"the unit of {what}")
+    return str(value)
 
 
 def number(value: Any, what: str) -> float:

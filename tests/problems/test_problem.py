@@ -136,6 +136,20 @@ def test_names_are_words(name):
     refused(lambda: phase.path(name, phase["flap"], upper=1), "descent")
 
 
+@pytest.mark.parametrize(("text", "wrong"), [("a\0b", "NUL"), ("a\ud800b", "surrogate")])
+def test_names_and_units_are_texts_that_a_file_can_hold(text, wrong):
+    problem, phase = glider()
+    refused(lambda: Problem(text), wrong)
+    refused(lambda: problem.phase(text, t0=0, tf=1), "glider", wrong)
+    refused(lambda: problem.phase("landing", t0=0, tf=1, time_unit=text), "landing", wrong)
+    refused(lambda: phase.path(text, phase["flap"], upper=1), "descent", wrong)
+    for name, unit, words in ((text, "", ("name",)), ("new", text, ("unit", "new"))):
+        refused(lambda name=name, unit=unit: problem.parameter(name, bounds=(0, 1), unit=unit), "glider", wrong, *words)
+        refused(lambda name=name, unit=unit: problem.minimize(name, phase.tf, unit=unit), "glider", wrong, *words)
+        refused(lambda name=name, unit=unit: phase.state(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
+        refused(lambda name=name, unit=unit: phase.control(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
+
+
 @pytest.mark.parametrize("name", ["height", "flap", "load", "time", "t0", "tf"])
 def test_a_phase_uses_a_name_once(name):
     _, phase = glider()
