@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -31,7 +30,7 @@ from transcription.inner import NAMED
 from ..batch import file as studyfile
 from . import decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
-from .inputs import check_is_front, check_picture, load_problem
+from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
@@ -61,9 +60,11 @@ def solve(arguments: Namespace) -> int:
     check_target(out)
     check_is_front(out)
     check_picture(arguments.plot)
-    if arguments.plot and Path(arguments.plot).resolve() == out.resolve():
+    if arguments.plot and same_file(arguments.plot, out):
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
-    if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
+    if arguments.checkpoint:
+        check_target(arguments.checkpoint)
+    if arguments.checkpoint and any(same_file(arguments.checkpoint, path) for path in (out, arguments.plot) if path):
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
     with Interrupts() as interrupts:
         with wrong_call_on_value_error():
@@ -104,7 +105,7 @@ def show(arguments: Namespace) -> int:
     check_picture(arguments.plot)
     if arguments.csv:
         check_target(arguments.csv)
-        if Path(arguments.csv).resolve() == Path(arguments.front).resolve():
+        if same_file(arguments.csv, arguments.front):
             raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
     with wrong_call_on_value_error():
         front = Front.load(arguments.front)
@@ -179,11 +180,9 @@ def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_
 def read_preference(path: str) -> dict[str, Any]:
     """What a JSON file says of a preference; see `macs.decisions.to_dict`."""
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise WrongCall(f"--prefer {path}: {error.strerror or error}") from None
+        found = read_json(path)
     except ValueError as error:
-        raise WrongCall(f"--prefer {path} is no JSON: {' '.join(str(error).split())}") from None
+        raise WrongCall(f"--prefer: {error}") from None
     if not isinstance(found, dict):
         raise WrongCall(f'--prefer {path} must have a preference, such as {{"method": "WeightedSum", "settings": {{"weights": ...}}}}')
     return found
