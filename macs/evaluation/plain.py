@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.checks import check_text, shown
+from problems.checks import apart, check_text, shown
 from problems.compiled import Objective, Variable
 from problems.vector import CompiledVectorProblem, real_numbers
 
@@ -149,6 +149,8 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
             raise ValueError(f"bounds: variable '{name}' has ({lower:g}, {upper:g}), finite numbers expected")
         if lower >= upper:
             raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
+        if not apart(lower, upper):
+            raise ValueError(f"bounds: variable '{name}' has ({lower!r}, {upper!r}), which leave nothing to decide")
     return names, limits[:, 0].copy(), limits[:, 1].copy()
 
 

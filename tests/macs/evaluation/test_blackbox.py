@@ -29,6 +29,8 @@ def test_bounds_in_every_form():
     ("bounds", "message"),
     [
         (None, "missing"),
+        ([(0, 1), (0.5, np.nextafter(0.5, 1))], "'x2' has .* leave nothing to decide"),
+        ([(0.0, 5e-324)], "'x1' has .* leave nothing to decide"),
         (5, "bounds: pairs .* expected, .* not 5"),
         ([5, 6], "'x1' has 5, a pair"),
         ({"a\0b": (0, 1)}, "NUL"),
