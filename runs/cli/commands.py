@@ -30,6 +30,7 @@ from transcription.inner import NAMED
 from ..batch import file as studyfile
 from . import decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
+from .fallback import saved
 from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
 
 UNSIMULATED = "none"
@@ -82,19 +83,23 @@ def solve(arguments: Namespace) -> int:
         if interrupts.reason and not len(front) and front.closest is None:
             complain(front.message, "macs solve")
             return INTERRUPTED
-        try:
-            front.save(out)
-        except OSError:
-            # The disk filled up while the search went on: its result is at least shown.
-            print(front.table())
-            raise
+        place, trouble = saved(front, out)
         print(front.table())
         if front.was_simulated.any() and not front.verified.all():
             named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-            print(f"See `macs verify {out}{named}`.")
-        print(f"\nfront saved in {out}")
+            print(f"See `macs verify {place or out}{named}`.")
+        if not trouble:
+            print(f"\nfront saved in {out}")
+        elif place:
+            trouble = f"{trouble}; the front is saved in '{place}' instead"
         if arguments.plot:
-            draw(front, arguments.plot)
+            try:
+                draw(front, arguments.plot)
+            except OSError as error:
+                trouble = "; ".join(filter(None, (trouble, error.strerror or str(error))))
+        if trouble:
+            complain(trouble, "macs solve")
+            return FAILED
         if interrupts.reason:
             return INTERRUPTED
     return DONE if len(front) else FAILED
