@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -53,6 +54,8 @@ CASES: dict[str, tuple[str, str]] = {
 }
 FILE = "_problem_file_"
 """Beginning of the names of modules that are read from files."""
+LARGEST = 2**24
+"""Bytes that a file with a problem may have."""
 
 
 def names() -> tuple[str, ...]:
@@ -114,7 +117,7 @@ def load(name: str, **data: Any) -> Any:
     if problem.default_evaluations is None and is_catalogued(name):
         problem.default_evaluations = DEFAULT_EVALUATIONS
     # A file is found again from another folder.
-    problem.address, problem.data = f"{Path(place).resolve()}:{function_name}" if place.endswith(".py") else name, data
+    problem.address, problem.data = f"{os.path.realpath(place)}:{function_name}" if place.endswith(".py") else name, data
     return problem
 
 
@@ -141,9 +144,12 @@ def _knows_problems(module: ModuleType) -> bool:
 
 
 def _file_module(place: str) -> ModuleType:
-    path = Path(place).resolve()
+    path = Path(os.path.realpath(place))  # which, unlike Path.resolve, does not fail for links in a circle
     if not path.is_file():
-        raise ValueError(f"there is no file '{place}'")
+        # A pipe or a device is not read: it may never end.
+        raise ValueError(f"'{place}' is no ordinary file" if os.path.lexists(place) else f"there is no file '{place}'")
+    if path.stat().st_size > LARGEST:
+        raise ValueError(f"'{place}' has {path.stat().st_size} bytes, a file with a problem at most {LARGEST}")
     name = f"{FILE}{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -13,14 +13,35 @@ import numpy as np
 
 from .compiled import Limit, Variable
 
+NARROWEST, SMALLEST = 1e-12, 1e-300
+"""The width of an interval, as a part of its larger end, and by itself, up to which it is one value; see `apart`."""
+
 
 def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
     """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
     if not isinstance(name, str) or not name.strip():
         raise ValueError(f"{place}: the name of a {kind} must be a non-empty string, not {name!r}")
+    check_text(name, f"{place}: the name of a {kind}")
     if name in taken:
         raise ValueError(f"{place}: the name '{name}' is used twice")
     return f"{kind} '{name}' of {place}"
+
+
+def check_text(value: Any, what: str) -> None:
+    """Raise ValueError unless `value` is a text that files can hold, as names and units are written into them."""
+    if not isinstance(value, str):
+        raise ValueError(f"{what} must be a string, not {shown(value)}")
+    wrong = next((character for character in value if character == "\0" or "\ud800" <= character <= "\udfff"), None)
+    if wrong is not None:
+        kind = "a NUL character" if wrong == "\0" else "half of a surrogate pair"
+        text = ascii(value) if len(value) <= 60 else "a long text"
+        raise ValueError(f"{what}, {text}, has {kind}, which no file can hold; all other characters can be used")
+
+
+def unit(value: Any, what: str) -> str:
+    """The unit of what messages call `what`: any text, "" if there is none."""
+    check_text(value, f"the unit of {what}")
+    return str(value)
 
 
 def number(value: Any, what: str) -> float:
@@ -39,7 +60,7 @@ def number(value: Any, what: str) -> float:
 
 
 def interval(value: Any, what: str) -> tuple[float, float]:
-    """A finite pair (lower, upper), lower <= upper."""
+    """A finite pair (lower, upper), lower <= upper; one value where they are not `apart`."""
     try:
         lower, upper = value
     except (TypeError, ValueError):
@@ -47,7 +68,15 @@ def interval(value: Any, what: str) -> tuple[float, float]:
     lower, upper = number(lower, f"the lower end of {what}"), number(upper, f"the upper end of {what}")
     if lower > upper:
         raise ValueError(f"{what}: an empty interval, {lower:g} > {upper:g}")
-    return lower, upper
+    return lower, upper if apart(lower, upper) else lower
+
+
+def apart(lower: float, upper: float) -> bool:
+    """Whether two ends of an interval are far enough apart to be told from each other.
+
+    Where they are not, rounding alone leaves the interval, and no solver finds its way inside: it is one value.
+    """
+    return math.isinf(upper - lower) or upper - lower > max(NARROWEST * max(abs(lower), abs(upper)), SMALLEST)
 
 
 def fixed_or_interval(value: Any, what: str) -> tuple[float, float]:
@@ -67,11 +96,11 @@ def within(inner: tuple[float, float], outer: tuple[float, float], what: str) ->
 
 
 def intersection(first: tuple[float, float], second: tuple[float, float], what: str) -> tuple[float, float]:
-    """The intersection of two intervals; an error if it is empty."""
+    """The intersection of two intervals; an error if it is empty by more than rounding."""
     lower, upper = max(first[0], second[0]), min(first[1], second[1])
-    if lower > upper:
+    if lower > upper and apart(upper, lower):
         raise ValueError(f"{what}: nothing lies both in ({first[0]:g}, {first[1]:g}) and in ({second[0]:g}, {second[1]:g})")
-    return lower, upper
+    return lower, upper if apart(lower, upper) else lower
 
 
 def positive(value: Any, what: str) -> float:
@@ -99,6 +128,7 @@ def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Lim
     high = math.inf if upper is None else number(upper, f"the upper limit of {what}")
     if low > high:
         raise ValueError(f"{what}: an empty interval, {low:g} > {high:g}")
+    high = high if apart(low, high) else low
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
     default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
     return Limit(name, low, high, scale(given_scale, default, what))

@@ -38,6 +38,7 @@ class Phase:
     ) -> None:
         self.name = name
         self._problem, self._parameters = problem, parameters
+        checks.check_text(time_unit, f"phase '{name}': time_unit")
         self._time_unit = time_unit
         self._t0_range = checks.fixed_or_interval(t0, f"phase '{name}': t0")
         self._tf_range = checks.fixed_or_interval(tf, f"phase '{name}': tf")
@@ -92,7 +93,7 @@ class Phase:
         for word, value in (("initial", initial), ("final", final)):
             end = limits if value is None else checks.fixed_or_interval(value, f"the {word} value of {what}")
             ends.append(checks.within(end, limits, f"the {word} value of {what}"))
-        self._states[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0], what))
+        self._states[name] = Variable(name, *limits, checks.unit(unit, what), checks.scale(scale, limits[1] - limits[0], what))
         self._initial[name], self._final[name] = ends
         return self._new_symbol(name)
 
@@ -112,7 +113,8 @@ class Phase:
         what = self._new_name("control", name)
         limits = checks.interval(bounds, f"the bounds of {what}")
         length = checks.period(period, limits, what)
-        self._controls[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0] or 1.0, what), length)
+        factor = checks.scale(scale, limits[1] - limits[0] or 1.0, what)
+        self._controls[name] = Variable(name, *limits, checks.unit(unit, what), factor, length)
         return self._new_symbol(name)
 
     def dynamics(self, **rates: Any) -> None:

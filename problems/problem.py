@@ -105,7 +105,7 @@ class Problem:
         """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase."""
         what = checks.new_name("parameter", name, self._parameters, f"problem '{self.name}'")
         limits = checks.interval(bounds, f"the bounds of {what}")
-        self._parameters[name] = Variable(name, *limits, unit, checks.scale(scale, limits[1] - limits[0] or 1.0, what))
+        self._parameters[name] = Variable(name, *limits, checks.unit(unit, what), checks.scale(scale, limits[1] - limits[0] or 1.0, what))
         self._symbols[name] = ca.MX.sym(name)
         return self._symbols[name]
 
@@ -200,7 +200,7 @@ class Problem:
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
         what = checks.new_name("objective", name, self._objectives, f"problem '{self.name}'")
         factor = None if scale is None else checks.scale(scale, 1.0, what)
-        self._objectives[name] = Objective(name, unit, sense, factor), self._expression(expr, what)
+        self._objectives[name] = Objective(name, checks.unit(unit, what), sense, factor), self._expression(expr, what)
 
     def _expression(self, value: Any, what: str) -> ca.MX:
         known = [*self._symbols.values(), *(symbol for phase in self._phases.values() for symbol in phase._quantity_symbols())]

@@ -30,6 +30,22 @@ Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """`rows(X: (n, d)) -> (objectives (n, m) in the user's senses, values (n, c) that the limits bound)`."""
 
 
+def real_numbers(values: Any) -> np.ndarray:
+    """A copy, as floats, of what a user's function returned. Masked values are NaN: an evaluation that failed.
+
+    Raises TypeError or ValueError for anything but real numbers; a complex number is none, even if its imaginary part is 0.
+    """
+    if isinstance(values, np.ma.MaskedArray) or (
+        isinstance(values, list | tuple) and any(isinstance(one, np.ma.MaskedArray) for one in values)
+    ):
+        values = np.ma.array(values)
+        if not np.iscomplexobj(values):
+            values = values.astype(float).filled(np.nan)
+    if np.iscomplexobj(np.asarray(values)):
+        raise TypeError("complex numbers")
+    return np.array(values, dtype=float)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class CompiledVectorProblem:
     """A vector problem: what a search needs to know of a function without trajectories.

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import checks
 from .compiled import Limit, Objective, Variable
-from .vector import CompiledVectorProblem
+from .vector import CompiledVectorProblem, real_numbers
 
 Outputs = Callable[[np.ndarray], Mapping[str, Any]]
 Kind = TypeVar("Kind", bound=Outputs)
@@ -23,7 +23,8 @@ class VectorProblem:
     The function takes a batch of rows, an array X (n, d) with a column for each variable in the order in which they were stated, and
     returns a dict with an array (n,) for each objective and constraint by its name, in the user's units and senses. Rows come as an array,
     so that `h, l = X.T` names them and numerical code takes them as they are; results go by name, so that they cannot be confused, and an
-    error says which one is wrong. A row with NaN in it is a failed evaluation, not an error. The same row must always give the same values.
+    error says which one is wrong. A row with NaN or a masked value in it is a failed evaluation, not an error. The same row must always
+    give the same values.
 
     Every mistake that can be seen at once raises a ValueError that names it.
 
@@ -83,7 +84,8 @@ class VectorProblem:
         lower, upper = checks.interval(bounds, f"the bounds of {what}")
         if lower == upper:
             raise ValueError(f"the bounds of {what} leave nothing to decide: {lower:g} on both sides")
-        self._variables[name] = Variable(name, lower, upper, unit, upper - lower, checks.period(period, (lower, upper), what))
+        length = checks.period(period, (lower, upper), what)
+        self._variables[name] = Variable(name, lower, upper, checks.unit(unit, what), upper - lower, length)
 
     def minimize(self, name: str, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be minimised; `scale` is the difference in it that counts as one where objectives are compared, by default
@@ -105,7 +107,7 @@ class VectorProblem:
         sizes = [abs(side) for side in (limit.lower, limit.upper) if np.isfinite(side)]
         if scale is None and (len(sizes) == 1 or limit.lower == limit.upper):
             limit = Limit(name, limit.lower, limit.upper, sizes[0] or 1.0)
-        self._constraints[name] = limit, unit
+        self._constraints[name] = limit, checks.unit(unit, what)
 
     def function(self, function: Kind) -> Kind:
         """Say what computes objectives and constraints: a decorator, see the class. Returns the function as it is."""
@@ -144,7 +146,7 @@ class VectorProblem:
 
     def _objective(self, name: str, unit: str, sense: str, scale: float | None) -> None:
         what = self._new_output("objective", name)
-        self._objectives[name] = Objective(name, unit, sense, None if scale is None else checks.scale(scale, 1.0, what))
+        self._objectives[name] = Objective(name, checks.unit(unit, what), sense, None if scale is None else checks.scale(scale, 1.0, what))
 
     def _new_output(self, kind: str, name: Any) -> str:
         """Objectives and constraints share their names, which are the keys of what the function returns."""
@@ -183,10 +185,7 @@ class NamedRows:
     def _column(self, name: str, values: Any, count: int) -> np.ndarray:
         what = f"{self.place}: what its function returned for '{name}'"
         try:
-            column = np.asarray(values)
-            if np.iscomplexobj(column):
-                raise TypeError
-            column = np.array(column, dtype=float)
+            column = real_numbers(values)
         except (TypeError, ValueError):
             raise ValueError(f"{what} must be an array of real numbers, not {checks.shown(values)}") from None
         if column.shape != (count,):

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import apart, check_text, shown
 from problems.compiled import Objective, Variable
-from problems.vector import CompiledVectorProblem
+from problems.vector import CompiledVectorProblem, real_numbers
 
 SENSES = ("minimize", "maximize")
 
@@ -30,7 +31,7 @@ def plain_problem(
     Parameters
     ----------
     function : callable or pymoo Problem
-        `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN is a failed evaluation.
+        `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN or a masked value is a failed evaluation.
     bounds : sequence of d pairs, pair of arrays (d,), or dict of pairs by name; None for a pymoo problem
         Two sequences of more than two numbers each are (lower, upper); all else is a list of pairs.
     constraints : callable, optional
@@ -124,7 +125,12 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     if bounds is None:
         raise ValueError("bounds: missing")
     names = tuple(str(name) for name in bounds) if isinstance(bounds, Mapping) else None
-    pairs = list(bounds.values()) if isinstance(bounds, Mapping) else list(bounds)
+    for name in names or ():
+        check_text(name, "bounds: the name of a variable")
+    try:
+        pairs = list(bounds.values() if isinstance(bounds, Mapping) else bounds)
+    except TypeError:
+        raise ValueError(f"bounds: pairs (lower, upper) expected, or a mapping of them by name, not {shown(bounds)}") from None
     if not pairs:
         raise ValueError("bounds: empty")
     if names is None and len(pairs) == 2 and all(np.ndim(side) == 1 and len(side) > 2 for side in pairs):
@@ -143,6 +149,8 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
             raise ValueError(f"bounds: variable '{name}' has ({lower:g}, {upper:g}), finite numbers expected")
         if lower >= upper:
             raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
+        if not apart(lower, upper):
+            raise ValueError(f"bounds: variable '{name}' has ({lower!r}, {upper!r}), which leave nothing to decide")
     return names, limits[:, 0].copy(), limits[:, 1].copy()
 
 
@@ -152,15 +160,17 @@ def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:
         return None
     if isinstance(labels, str) or not all(isinstance(label, str) for label in labels):
         raise ValueError(f"{name}: must be a sequence of strings, one for each objective, not {labels!r}")
+    for label in labels:
+        check_text(label, f"{name}: one")
     return tuple(labels)
 
 
 def _rows(what: str, values: Any, count: int) -> np.ndarray:
     """Copy (count, k) of the values that a user's function returned for `count` points; (count,) counts as one column."""
     try:
-        array = np.array(values, dtype=float)
+        array = real_numbers(values)
     except (TypeError, ValueError):
-        raise ValueError(f"{what} must be an array of numbers, not {type(values).__name__}") from None
+        raise ValueError(f"{what} must be an array of real numbers, not {shown(values)}") from None
     if array.shape == (count,):
         array = array[:, None]
     if array.ndim != 2 or len(array) != count:

@@ -186,7 +186,7 @@ def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:
 
 
 def _phase_differences(one: PhaseTrajectory, two: PhaseTrajectory) -> dict[str, float]:
-    span = [max(abs(two.t0), abs(two.tf), two.tf - two.t0)]
+    span = [max(abs(two.t0), abs(two.tf), two.tf - two.t0) or 1.0]  # a phase without duration may lie at 0
     states, controls = two.state_variables, two.control_variables
     same_bases = (one.state.basis, one.control.basis) == (two.state.basis, two.control.basis)
     return {

@@ -10,6 +10,7 @@ import errno
 import hashlib
 import os
 import stat
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from uuid import uuid4
@@ -44,17 +45,18 @@ def check_target(path: str | PathLike[str]) -> None:
 def write_whole(path: str | PathLike[str], content: bytes) -> None:
     """Replace a file by `content`, or raise OSError and leave everything as it was.
 
-    A symbolic link stays, and the file that it leads to is replaced. A file that is replaced keeps its permissions.
+    A symbolic link stays, and the file that it leads to is replaced. A file that is replaced keeps its permissions, and its owner and group
+    where the user may give files to them.
     """
-    target, mode = _target(path)
+    target, found = _target(path)
     temporary = target.with_name(f".{uuid4().hex}.part")
     try:
         with temporary.open("xb") as file:
+            if found is not None:  # before there is anything in it that others might not read
+                _made_alike(temporary, found)
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        if mode is not None:
-            temporary.chmod(mode)
         temporary.replace(target)
     except OSError as error:
         raise OSError(error.errno, f"cannot write '{path}': {error.strerror or error}") from error
@@ -62,11 +64,27 @@ def write_whole(path: str | PathLike[str], content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _target(path: str | PathLike[str]) -> tuple[Path, int | None]:
-    """The file that writing `path` replaces, and its permissions; None if it does not exist yet."""
+def _made_alike(path: Path, other: os.stat_result) -> None:
+    """Give a file owner, group and permissions of another."""
+    if hasattr(os, "chown"):
+        # Others than root may only give a file to a group of theirs.
+        for owner in (other.st_uid, -1):
+            with suppress(OSError):
+                os.chown(path, owner, other.st_gid)
+                break
+    path.chmod(stat.S_IMODE(other.st_mode))  # last, as chown takes some of them away
+
+
+def _target(path: str | PathLike[str]) -> tuple[Path, os.stat_result | None]:
+    """The file that writing `path` replaces, and what it is; None if it does not exist yet."""
     found = None
     try:
         target = Path(os.path.realpath(path))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"cannot write '{path}': the working folder is no longer there") from None
+    except ValueError as error:
+        raise OSError(errno.EINVAL, f"cannot write '{path}': {error}") from error  # a NUL character
+    try:
         found = target.stat()
     except (FileNotFoundError, NotADirectoryError):
         pass
@@ -85,7 +103,7 @@ def _target(path: str | PathLike[str]) -> tuple[Path, int | None]:
         raise PermissionError(f"cannot write '{path}': the file is write-protected")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise PermissionError(f"cannot write '{path}': the folder '{target.parent}' is not writable")
-    return target, None if found is None else stat.S_IMODE(found.st_mode)
+    return target, found
 
 
 MARK = b"\0MACS SHA-256\r\n\0"

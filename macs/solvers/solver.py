@@ -243,7 +243,7 @@ class Solver(SearchMethod):
         Parameters
         ----------
         function : callable or pymoo Problem
-            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)`; a row with all G <= 0 is feasible, a row with NaN is a failed evaluation.
+            `function(X: (n, d)) -> F: (n, m)`, or `(F, G)`; a row with all G <= 0 is feasible, one with NaN a failed evaluation.
         bounds : pairs, pair of arrays, or mapping
             d pairs (lower, upper); two arrays (lower, upper) of length d > 2; or {name: pair}. Not needed for a pymoo Problem.
         evaluations : int, optional

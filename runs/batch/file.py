@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from macs.io.atomic import read_whole
 from problems.checks import unknown
 
 from ..data.addresses import check_trusted
@@ -15,6 +17,8 @@ from ..data.schema import check_known, errors_begin_with
 from ..measures.references import reference_addresses
 
 STUDIES = Path(__file__).parents[1] / "studies"
+LARGEST = 2**24
+"""Bytes that a study file may have."""
 
 
 def names() -> list[str]:
@@ -47,7 +51,7 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
     path = _find(source)
     with errors_begin_with(str(source)):
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = tomllib.loads(read_whole(path, LARGEST).decode())
         except OSError as error:
             raise ValueError(f"cannot be read: {error.strerror or error}") from error
         except UnicodeDecodeError as error:
@@ -78,7 +82,7 @@ def _addresses(data: Mapping[str, Any]) -> list[str]:
 def _find(source: str | PathLike[str]) -> Path:
     path = Path(source)
     if path.suffix == ".toml":
-        if not path.is_file():
+        if not os.path.lexists(path):
             raise ValueError(f"there is no file '{source}'")
         return path
     if str(source) not in names():

@@ -30,11 +30,12 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from macs.front import Front
-from macs.io.atomic import write_whole
+from macs.fronts.files import LARGEST as LARGEST_FRONT
+from macs.io.atomic import read_whole, write_whole
 from macs.io.text import duration, text_table
 
 from ..data.addresses import load_front
-from ..data.schema import Count, Natural, Positive, checked, errors_begin_with, from_record, to_record
+from ..data.schema import Count, Natural, Positive, checked, errors_begin_with, read_record, to_record
 from ..execution.samples import History
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
 from ..measures.simulation_record import SimulationRecord
@@ -206,7 +207,7 @@ class Store:
         if not path.is_dir():
             raise ValueError(f"there is no folder '{out}'" if not path.exists() else f"'{out}' is not a folder")
         try:
-            data = from_record(record.read_bytes())
+            data = read_record(record)
             if data["format"] != FORMAT:
                 raise ValueError("it is not the record of a study")
             if data["version"] != VERSION:
@@ -251,7 +252,7 @@ class Store:
             store = cls.open(path)
             store.check(definition)
             return store
-        if path.exists() and not path.is_dir():
+        if os.path.lexists(path) and not path.is_dir():
             raise ValueError(f"'{path}' is not a folder")
         others = sorted(one.name for one in path.iterdir() if not one.name.startswith(".")) if path.exists() else []
         if others:
@@ -334,7 +335,7 @@ def _record(path: Path) -> RunRecord:
     if not path.exists():
         return RunRecord()
     with errors_begin_with(f"its record '{path}' is damaged"):
-        return checked(from_record(path.read_bytes()), RunRecord)
+        return checked(read_record(path), RunRecord)
 
 
 def _check_front(path: Path, record: RunRecord) -> None:
@@ -342,7 +343,7 @@ def _check_front(path: Path, record: RunRecord) -> None:
     loaded."""
     if record.status == MISSING:
         Front.load(path)
-    elif crc32(path.read_bytes()) != record.front:
+    elif crc32(read_whole(path, LARGEST_FRONT)) != record.front:
         raise ValueError(f"'{path}' is damaged: its content is not what was written")
 
 
@@ -380,12 +381,14 @@ def locked(path: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        by = f", {owner.read_text(encoding='utf-8')}" if owner.exists() else ""
+        by = ""
+        with suppress(OSError):
+            by = f", {read_whole(owner, 1000).decode(errors='replace')}"
         raise ValueError(f"'{path.parent}' is being written by another process{by}") from None
     try:
         # In a file of its own, which can be read while the lock is taken. It is for the message alone, so a full disk is no error.
         with suppress(OSError):
-            owner.write_text(f"{os.getpid()} on {socket.gethostname()}", encoding="utf-8")
+            write_whole(owner, f"{os.getpid()} on {socket.gethostname()}".encode())
         yield
     finally:
         lock.release()

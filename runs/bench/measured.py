@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from macs.io.atomic import write_whole
 from macs.io.text import text_table
 
 from ..report.tables import short
@@ -63,9 +65,10 @@ def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:
 
 def save(path: str | Path, measured: Sequence[tuple[str, Row]]) -> None:
     """Write a CSV file: one number a line, with the benchmark, the case and the contender that it is of."""
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["benchmark", "case", "contender", "quantity", "repetition", "value"])
-        for bench, row in measured:
-            for quantity, values in row.values.items():
-                writer.writerows([bench, row.case, row.who, quantity, i, repr(value)] for i, value in enumerate(values))
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["benchmark", "case", "contender", "quantity", "repetition", "value"])
+    for bench, row in measured:
+        for quantity, values in row.values.items():
+            writer.writerows([bench, row.case, row.who, quantity, i, repr(value)] for i, value in enumerate(values))
+    write_whole(path, text.getvalue().encode())

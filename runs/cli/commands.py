@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -31,7 +30,8 @@ from transcription.inner import NAMED
 from ..batch import file as studyfile
 from . import decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
-from .inputs import check_is_front, check_picture, load_problem
+from .fallback import saved
+from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
@@ -61,9 +61,11 @@ def solve(arguments: Namespace) -> int:
     check_target(out)
     check_is_front(out)
     check_picture(arguments.plot)
-    if arguments.plot and Path(arguments.plot).resolve() == out.resolve():
+    if arguments.plot and same_file(arguments.plot, out):
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
-    if arguments.checkpoint and Path(arguments.checkpoint).resolve() in [Path(path).resolve() for path in (out, arguments.plot) if path]:
+    if arguments.checkpoint:
+        check_target(arguments.checkpoint)
+    if arguments.checkpoint and any(same_file(arguments.checkpoint, path) for path in (out, arguments.plot) if path):
         raise WrongCall(f"--checkpoint {arguments.checkpoint} would be overwritten by the result")
     with Interrupts() as interrupts:
         with wrong_call_on_value_error():
@@ -81,19 +83,23 @@ def solve(arguments: Namespace) -> int:
         if interrupts.reason and not len(front) and front.closest is None:
             complain(front.message, "macs solve")
             return INTERRUPTED
-        try:
-            front.save(out)
-        except OSError:
-            # The disk filled up while the search went on: its result is at least shown.
-            print(front.table())
-            raise
+        place, trouble = saved(front, out)
         print(front.table())
         if front.was_simulated.any() and not front.verified.all():
             named = "" if is_catalogued(problem.address) else f" --problem {arguments.problem}"
-            print(f"See `macs verify {out}{named}`.")
-        print(f"\nfront saved in {out}")
+            print(f"See `macs verify {place or out}{named}`.")
+        if not trouble:
+            print(f"\nfront saved in {out}")
+        elif place:
+            trouble = f"{trouble}; the front is saved in '{place}' instead"
         if arguments.plot:
-            draw(front, arguments.plot)
+            try:
+                draw(front, arguments.plot)
+            except OSError as error:
+                trouble = "; ".join(filter(None, (trouble, error.strerror or str(error))))
+        if trouble:
+            complain(trouble, "macs solve")
+            return FAILED
         if interrupts.reason:
             return INTERRUPTED
     return DONE if len(front) else FAILED
@@ -104,7 +110,7 @@ def show(arguments: Namespace) -> int:
     check_picture(arguments.plot)
     if arguments.csv:
         check_target(arguments.csv)
-        if Path(arguments.csv).resolve() == Path(arguments.front).resolve():
+        if same_file(arguments.csv, arguments.front):
             raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
     with wrong_call_on_value_error():
         front = Front.load(arguments.front)
@@ -179,11 +185,9 @@ def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_
 def read_preference(path: str) -> dict[str, Any]:
     """What a JSON file says of a preference; see `macs.decisions.to_dict`."""
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise WrongCall(f"--prefer {path}: {error.strerror or error}") from None
+        found = read_json(path)
     except ValueError as error:
-        raise WrongCall(f"--prefer {path} is no JSON: {' '.join(str(error).split())}") from None
+        raise WrongCall(f"--prefer: {error}") from None
     if not isinstance(found, dict):
         raise WrongCall(f'--prefer {path} must have a preference, such as {{"method": "WeightedSum", "settings": {{"weights": ...}}}}')
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +18,7 @@ from macs.decisions.dialogue_file import is_dialogue
 from macs.front import Front
 from macs.fronts.front_plot import save_picture
 from macs.fronts.pictures.style import label
-from macs.io.atomic import check_target, read_whole
+from macs.io.atomic import check_target
 from macs.io.text import text_table
 from problems import Problem
 from problems.catalogue import is_catalogued
@@ -26,10 +26,8 @@ from problems.checks import unknown
 from problems.compiled import Objective
 
 from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
-from .inputs import check_is_front, check_picture, load_problem
+from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
 
-LARGEST = 2**20
-"""Bytes that a file with a preference may have."""
 PROMPT = "decide> "
 HELP = """\
 show                                      ranges, the present choice, what it costs, and the history
@@ -74,7 +72,7 @@ def _check_call(arguments: Namespace) -> None:
     targets = {kind: getattr(arguments, kind) for kind in KINDS if getattr(arguments, kind)}
     for kind, path in targets.items():
         _check_target(kind, path, arguments.front, f"--{kind} ")
-    if len({Path(path).resolve() for path in targets.values()}) < len(targets):
+    if len({os.path.realpath(path) for path in targets.values()}) < len(targets):
         raise WrongCall(f"{' and '.join(f'--{kind}' for kind in targets)} name the same file")
     if (arguments.to is not None or arguments.giving) and not arguments.improve:
         raise WrongCall("--to and --giving say more about --improve NAME")
@@ -88,7 +86,7 @@ def _check_target(kind: str, path: str, front: str, option: str) -> None:
     """Raise what is wrong with a file that is to be written, before anything is."""
     check_target(path)
     file = Path(path)
-    if file.resolve() == Path(front).resolve() and not (kind == "json" and is_dialogue(front)):
+    if same_file(path, front) and not (kind == "json" and is_dialogue(front)):
         raise WrongCall(f"{option}{path} would overwrite what the choice is made from")
     if kind == "out":
         check_is_front(file, option)
@@ -308,14 +306,7 @@ def _reference(dialogue: Dialogue, text: str) -> None:
 
 
 def _prefer_file(dialogue: Dialogue, path: str) -> None:
-    try:
-        data = json.loads(read_whole(path, LARGEST))
-    except FileNotFoundError:
-        raise ValueError(f"there is no file '{path}'") from None
-    except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
-        raise ValueError(f"{path} is not JSON") from None
+    data = read_json(path)
     try:
         dialogue.prefer(from_dict(data))
     except ValueError as error:

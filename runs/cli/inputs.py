@@ -1,17 +1,21 @@
-"""What several commands are given: problems, files that are to be written."""
+"""What several commands are given: problems, JSON files, files that are to be written."""
 
 from __future__ import annotations
 
+import json
+import os
 import traceback
 from pathlib import Path
 from typing import Any
 
 import problems
-from macs.io.atomic import check_target
+from macs.io.atomic import check_target, read_whole
 
 from .answers import WrongCall
 
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
+LARGEST = 2**20
+"""Bytes that a JSON file of a preference may have."""
 
 
 def load_problem(address: str, **data: Any) -> Any:
@@ -28,9 +32,26 @@ def load_problem(address: str, **data: Any) -> Any:
 
 def _place(error: BaseException, address: str) -> str:
     """The line of the user's file in which an error arose; "" if there is none."""
-    path = Path(address.rpartition(":")[0]).resolve()
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == path]
-    return f" (line {lines[-1]} of {path.name})" if lines else ""
+    path = os.path.realpath(address.rpartition(":")[0])
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if os.path.realpath(frame.filename) == path]
+    return f" (line {lines[-1]} of {Path(path).name})" if lines else ""
+
+
+def read_json(path: str) -> Any:
+    """The content of a JSON file. Raises ValueError, in one line, if it cannot be read, is no JSON, or no ordinary file."""
+    try:
+        return json.loads(read_whole(path, LARGEST))
+    except FileNotFoundError:
+        raise ValueError(f"there is no file '{path}'") from None
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise ValueError(f"{path} is not JSON") from None
+
+
+def same_file(first: str | Path, second: str | Path) -> bool:
+    """Whether two paths lead to the same file, which need not exist. Links in a circle lead to themselves."""
+    return os.path.realpath(first) == os.path.realpath(second)
 
 
 def check_is_front(path: Path, option: str = "--out ") -> None:

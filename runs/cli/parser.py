@@ -31,7 +31,8 @@ examples:
   macs study status out/goddard-table3
   macs bench inner --quick
 
-exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing), 2 the call was wrong, 130 ended by Ctrl-C"""
+exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
+was wrong, 130 ended by Ctrl-C"""
 
 
 BENCH = """\

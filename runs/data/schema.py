@@ -12,16 +12,22 @@ import sys
 import types
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 from zlib import crc32
 
 import msgspec
 from msgspec import Meta
 
+from macs.io.atomic import read_whole
 from problems.checks import unknown
 
 LONGEST = 80
 """Characters of a value in a message."""
+
+
+LARGEST_RECORD = 2**28
+"""Bytes that the file of a record may have."""
 
 
 LARGEST = sys.float_info.max
@@ -187,6 +193,11 @@ def from_record(data: bytes) -> Any:
     if record["crc32"] != _checksum(record["content"]):
         raise ValueError("its content does not match its checksum")
     return record["content"]
+
+
+def read_record(path: Path) -> Any:
+    """The content of the file of a record. Raises OSError if it cannot be read or is no ordinary file, ValueError if it is no record."""
+    return from_record(read_whole(path, LARGEST_RECORD))
 
 
 def _checksum(content: Any) -> int:

@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 from macs.io.atomic import write_whole
 from macs.search.rounds import PLANNED
 
-from ..data.schema import checked, from_record, to_record
+from ..data.schema import checked, read_record, to_record
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
 NUMBER = 30
@@ -103,7 +103,7 @@ def _read(path: Path | None) -> dict[str, list[Any]] | None:
     if path is None or not path.exists():
         return None
     try:
-        columns = checked(from_record(path.read_bytes()), History)
+        columns = checked(read_record(path), History)
         if columns.keys() != History.__annotations__.keys():
             raise ValueError(f"it has {', '.join(columns)}")
     except (OSError, ValueError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -17,6 +18,7 @@ from msgspec import Meta
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.style import label
+from macs.io.atomic import read_whole
 from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
 from problems.compiled import Objective
@@ -33,6 +35,10 @@ ReferenceKey = Annotated[
     str | dict[str, str] | None,
     Meta(description="'union', 'truth', the name of a case, a file, or one of these by problem"),
 ]
+
+
+LARGEST = 2**28
+"""Bytes that a table may have."""
 
 
 def union(fronts: Sequence[Points]) -> Points:
@@ -157,8 +163,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
         return front
     if not goals:
         raise ValueError(f"'{path}' is a table: to read it, state the objectives that it is of")
-    with Path(path).open(newline="", encoding="utf-8-sig") as file:
-        lines = [(i, [cell.strip() for cell in row]) for i, row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row)]
+    lines = [(i, [cell.strip() for cell in row]) for i, row in enumerate(_table(path), 1) if any(cell.strip() for cell in row)]
     if not lines:
         raise ValueError(f"'{path}' is empty")
     headed = not _is_number(lines[0][1][0])
@@ -174,6 +179,18 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
             raise ValueError(f"'{path}', line {number}: {', '.join(map(repr, cells))} should be {len(goals)} finite numbers")
         rows.append([float(cell) for cell in cells])
     return foreign(np.array(rows).reshape(len(rows), len(goals)), goals, name=Path(path).stem)
+
+
+def _table(path: str | PathLike[str]) -> list[list[str]]:
+    """The rows of a CSV file. Raises what `read` says."""
+    try:
+        return list(csv.reader(io.StringIO(read_whole(path, LARGEST).decode("utf-8-sig"), newline="")))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"there is no file '{path}'") from None
+    except OSError as error:
+        raise ValueError(f"'{path}' cannot be read: {error.strerror or error}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"'{path}' is no table: {error}") from error
 
 
 def _columns(header: Sequence[str], goals: Sequence[Objective], path: str | PathLike[str]) -> tuple[list[int], int | None]:

@@ -136,6 +136,20 @@ def test_names_are_words(name):
     refused(lambda: phase.path(name, phase["flap"], upper=1), "descent")
 
 
+@pytest.mark.parametrize(("text", "wrong"), [("a\0b", "NUL"), ("a\ud800b", "surrogate")])
+def test_names_and_units_are_texts_that_a_file_can_hold(text, wrong):
+    problem, phase = glider()
+    refused(lambda: Problem(text), wrong)
+    refused(lambda: problem.phase(text, t0=0, tf=1), "glider", wrong)
+    refused(lambda: problem.phase("landing", t0=0, tf=1, time_unit=text), "landing", wrong)
+    refused(lambda: phase.path(text, phase["flap"], upper=1), "descent", wrong)
+    for name, unit, words in ((text, "", ("name",)), ("new", text, ("unit", "new"))):
+        refused(lambda name=name, unit=unit: problem.parameter(name, bounds=(0, 1), unit=unit), "glider", wrong, *words)
+        refused(lambda name=name, unit=unit: problem.minimize(name, phase.tf, unit=unit), "glider", wrong, *words)
+        refused(lambda name=name, unit=unit: phase.state(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
+        refused(lambda name=name, unit=unit: phase.control(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
+
+
 @pytest.mark.parametrize("name", ["height", "flap", "load", "time", "t0", "tf"])
 def test_a_phase_uses_a_name_once(name):
     _, phase = glider()
@@ -234,3 +248,27 @@ def test_names_may_hold_spaces_and_any_letters():
     phase.path("q̇ ≤ 1", x, upper=1)
     problem.minimize("Δ v'\"", phase.final(x))
     assert problem.compile().fingerprint
+
+
+def test_bounds_that_rounding_cannot_tell_apart_are_one_value():
+    def pair(value):
+        return value, math.nextafter(value, INF)
+
+    problem, phase = glider(tf=pair(3.0))
+    refused(lambda: phase.state("speed", bounds=pair(5.0)), "speed", "one value only")
+    phase.control("trim", bounds=pair(0.1))
+    problem.parameter("mass", bounds=pair(7.0))
+    phase.path("load", phase["flap"], lower=pair(0.5)[0], upper=pair(0.5)[1])
+    problem.constraint("fuel", phase.tf, lower=3.0, upper=math.nextafter(3.0, INF))
+    compiled = problem.compile()
+    (own,) = compiled.phases
+    ranges = [own.tf, next(v for v in own.controls if v.name == "trim"), compiled.parameters[-1], own.paths[-1], compiled.limits[-1]]
+    assert [(one.lower, one.scale) for one in ranges] == [(3.0, 1.0), (0.1, 1.0), (7.0, 1.0), (0.5, 1.0), (3.0, 1.0)]
+    assert all(one.lower == one.upper for one in ranges)
+
+
+def test_times_that_durations_narrow_to_one_value_are_fixed():
+    """Within (0.3, 5), a start at 0.1 and a duration of 0.2 leave 0.1 + 0.2 alone, which is more than 0.3 by rounding."""
+    problem, _ = glider(t0=0.1, tf=(0.3, 5), duration=(0.2, math.nextafter(0.2, INF)))
+    (own,) = problem.compile().phases
+    assert own.tf.lower == own.tf.upper and own.tf.scale == 1.0

@@ -35,7 +35,7 @@ def test_a_preference_on_the_command_line(tmp_path, capsys):
     ("text", "solver", "words"),
     [
         (None, "macs", "there is no file|No such file"),
-        ("{", "macs", "is no JSON"),
+        ("{", "macs", "is not JSON"),
         ("[1]", "macs", "must have a preference"),
         ('{"method": "Wishes"}', "macs", "'Wishes'"),
         (json.dumps(to_dict(WeightedSum({"f1": 1.0}))), "macs", "'f1'"),

@@ -228,6 +228,35 @@ def test_stiff_dynamics_have_their_methods():
     assert simulated(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
 
 
+def test_what_is_too_stiff_for_an_explicit_method_is_simulated_by_an_implicit_one(monkeypatch):
+    """x' = a (u - x), which follows u within 1/a."""
+    monkeypatch.setattr(arcs, "MOST_CALLS", 2000)
+    nlp = DFET(2, 1).transcribe(linear(a=-1e5, b=1e5))
+    for rows in (1, 3):
+        z = np.tile(nlp.first_guess(np.full((1, len(nlp.free)), 0.4)), (rows, 1))
+        for check in simulate_all(nlp.problem, [nlp.unpack(one) for one in z]):
+            assert check.trajectory["run"].states[-1, 0] == pytest.approx(0.4, abs=1e-6)
+
+
+@pytest.mark.parametrize(("a", "finite"), [(300.0, True), (1000.0, False)])
+def test_an_unstable_equation_on_too_long_elements_is_feasible_there_and_infinite_when_simulated(a, finite):
+    """On elements of length h the method of two stages multiplies the state by R(ah), which tends to 1, and the exact solution by e^(ah).
+    So the mesh believes in what the simulation cannot follow: e^700 is the largest number there is."""
+    nlp = DFET(2, 1).transcribe(linear(a=a, b=1.0))
+    z = nlp.propagate(nlp.first_guess(np.full((1, len(nlp.free)), 0.4)))
+    check = simulated(nlp, z[0])
+    assert nlp.evaluate(z)[1][0] < 1e-6 and np.isfinite(check.max_defect) == finite and check.max_defect > 1e100
+
+
+def linear(a: float, b: float) -> Problem:
+    problem = Problem("linear")
+    phase = problem.phase("run", t0=0, tf=1)
+    x = phase.state("x", bounds=(-1, 1), initial=0.01)
+    phase.dynamics(x=a * x + b * phase.control("u", bounds=(-0.5, 0.5)))
+    problem.minimize("end", phase.final(x))
+    return problem
+
+
 @pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
 def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
     """x' = -1/x reaches 0 at t = 1/2, where there is nothing more to integrate; or nothing from the start."""

@@ -103,7 +103,7 @@ def phase_contacts(statement: CompiledPhase, phase: PhaseTrajectory, parameters:
     s = np.array([phase.t0, phase.tf, *parameters])
     x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
     paths = paths_and_peaks(statement, x, u, times.ravel(), s)[0].reshape(*times.shape, len(statement.paths))
-    places = (times - phase.t0) / (phase.tf - phase.t0)
+    places = _relative(times, phase)
     found = {f"state {v.name}": contacts(places, states[:, :, i], v.lower, v.upper) for i, v in enumerate(statement.states)}
     return found | {f"path {v.name}": contacts(places, paths[:, :, i], v.lower, v.upper) for i, v in enumerate(statement.paths)}
 
@@ -210,9 +210,14 @@ def with_knots(mesh: PhaseMesh, places: Sequence[float], constant: Mapping[str, 
     return PhaseMesh(tuple(edges), order, order - LESS if first else mesh.control_order, tuple(moving[:-1]), held)
 
 
+def _relative(times: np.ndarray, phase: PhaseTrajectory) -> np.ndarray:
+    """Times as parts of a phase; 0 where it has no duration."""
+    return (times - phase.t0) / ((phase.tf - phase.t0) or 1.0)
+
+
 def _samples(phase: PhaseTrajectory) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Of each control with bounds: places (N, k), relative to the phase, and its values there, as fractions of the way between them."""
-    edges = (phase.control.edges - phase.t0) / (phase.tf - phase.t0)
+    edges = _relative(phase.control.edges, phase)
     places, values = edges[:-1, None] + 0.5 * (1.0 + TAU) * np.diff(edges)[:, None], phase.controls_on_elements(TAU)
     bounded = [(i, v) for i, v in enumerate(phase.control_variables) if v.span > 0 and not v.period]
     return {v.name: (places, (values[:, :, i] - v.lower) / v.span) for i, v in bounded}

@@ -23,10 +23,12 @@ from .trajectory import PhaseTrajectory
 EXPLICIT = ("RK23", "RK45", "DOP853")
 METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
+STIFF = "Radau"
+"""The method for arcs on which an explicit one has used up `MOST_CALLS`."""
 MODERATE = 12
 """Highest degree of controls that are evaluated as sums of powers."""
 MOST_CALLS = 200_000
-"""Evaluations of the dynamics on one element after which the integration counts as broken down."""
+"""Evaluations of the dynamics on one element after which an integration by one method counts as broken down."""
 EVERY = 100
 """Evaluations of the dynamics after which an integration asks whether to end early: some hundredths of a second."""
 GRACE = 1.0
@@ -100,7 +102,12 @@ class Arcs:
         groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
         while groups:
             group = groups.pop()
-            values = self._some(group)._integrated(y[group], rtol, atol, method) if len(group) else None
+            arcs = self._some(group)
+            values = arcs._integrated(y[group], rtol, atol, method) if len(group) else None
+            if values is None and len(group) == 1 and method in EXPLICIT and arcs._calls[0] > MOST_CALLS:
+                # Stiff: the steps of an explicit method are as short as its fastest decay, those of an implicit one as the solution lets.
+                arcs._calls[0] = 0
+                values = arcs._integrated(y[group], rtol, atol, STIFF)
             if values is not None:
                 found[group] = values
             elif len(group) > 1:
@@ -119,7 +126,9 @@ class Arcs:
         share = np.sqrt(n)
         options = {"rtol": max(rtol / share, 3e-14), "atol": np.tile(atol / share, n), "t_eval": DENSE}
         try:
-            solution = solve_ivp(self._rates, (-1.0, 1.0), y.ravel(), method=method, **options)
+            # What grows beyond all numbers is a break down, which is reported as such, and no warning of numpy's.
+            with np.errstate(over="ignore", invalid="ignore"):
+                solution = solve_ivp(self._rates, (-1.0, 1.0), y.ravel(), method=method, **options)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):
             # The implicit methods raise where rates are no numbers; so do ours after too many evaluations.
             return None

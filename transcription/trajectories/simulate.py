@@ -23,7 +23,8 @@ class Simulation:
     ----------
     defect : mapping
         `defect[phase][state]`: largest difference from the transcription at the ends of its elements, divided by the span of the state's
-        bounds; infinite where the integration broke down.
+        bounds; infinite where the integration broke down. Implicit transcriptions stay bounded on elements that are far too long for an
+        unstable equation, x' = a x with a large a: its simulation grows as e^(a t), beyond all numbers where a t is above 700.
     violation : float
         Largest scaled residual of bounds of states and controls, final values, path constraints, links and constraints of the simulated
         trajectory, sampled densely.

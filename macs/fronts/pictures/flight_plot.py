@@ -201,7 +201,8 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
     figure.supxlabel(label("time", unit), fontsize=9)
     ax = grid[0]
     first, last = trajectory.phases[0].t0, max(phase.tf for phase in trajectory.phases)
-    ax.set_xlim(first - 0.015 * (last - first), last + 0.015 * (last - first))
+    margin = 0.015 * (last - first) or 1.0  # phases without duration are seen, too
+    ax.set_xlim(first - margin, last + margin)
     if len(trajectory) > 1:
         from matplotlib.lines import Line2D
 

@@ -29,6 +29,11 @@ def test_bounds_in_every_form():
     ("bounds", "message"),
     [
         (None, "missing"),
+        ([(0, 1), (0.5, np.nextafter(0.5, 1))], "'x2' has .* leave nothing to decide"),
+        ([(0.0, 5e-324)], "'x1' has .* leave nothing to decide"),
+        (5, "bounds: pairs .* expected, .* not 5"),
+        ([5, 6], "'x1' has 5, a pair"),
+        ({"a\0b": (0, 1)}, "NUL"),
         ([], "empty"),
         ({"mass": (2, 1)}, "'mass' has lower 2 >= upper 1"),
         ([(0, 1), (1, 1)], "'x2' has lower 1 >= upper 1"),
@@ -52,6 +57,8 @@ def test_bounds_that_cannot_be_meant(bounds, message):
         ({"names": ["a"], "senses": ["minimize"] * 2}, "senses has 2, 1 expected"),
         ({"names": ["a", "a"]}, "has a name twice"),
         ({"names": []}, "names has 0"),
+        ({"names": ["a", "b\0"]}, "names: .* NUL"),
+        ({"units": ["m", "\ud800"]}, "units: .* surrogate"),
         ({"constraints": 3}, "constraints: must be callable"),
         ({"tolerance": -1.0}, "tolerance"),
     ],
@@ -68,7 +75,10 @@ def test_other_arguments_that_cannot_be_meant(arguments, message):
     [
         (lambda X: two(X)[:1], r"shape \(1, 2\) for 3 points"),
         (lambda X: 7.0, r"shape \(\) for 3 points"),
-        (lambda X: ["a"] * len(X), "must be an array of numbers"),
+        (lambda X: ["a"] * len(X), "must be an array of real numbers"),
+        (lambda X: two(X) + 1j, "function: the objectives must be an array of real numbers"),
+        (lambda X: np.ma.masked_array(two(X) + 0j, mask=False), "function: the objectives must be an array of real numbers"),
+        (lambda X: (two(X), X + 0j), "function: the constraints must be an array of real numbers"),
         (lambda X: (two(X), two(X)[:2]), "constraints have shape"),
         (lambda X: np.empty((len(X), 0)), "returned 0"),
     ],
@@ -136,3 +146,15 @@ def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
     circle = boxed(OnCircle())
     assert circle.lower.tolist() == [-1, -1]
     assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation.tolist() == [0.0, 0.75, 0.5]
+
+
+@pytest.mark.parametrize("as_list", [False, True])
+def test_a_masked_value_is_a_failed_evaluation(as_list):
+    def function(X):
+        F = np.ma.masked_array(two(X), mask=[[False, False], [True, False], [False, False]])
+        return list(F) if as_list else F
+
+    box = boxed(function, [(0, 1)], constraints=lambda X: np.ma.masked_array(X - 2.0, mask=[[False], [False], [True]]))
+    result = box.evaluate(np.array([[0.0], [0.5], [1.0]]))
+    assert result.status.tolist() == ["converged", "failed", "failed"]
+    assert np.isnan(result.F[1:]).all()

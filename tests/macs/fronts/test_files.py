@@ -241,6 +241,35 @@ def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
     assert path.stat().st_mode & 0o777 == 0o640 and len(Front.load(path)) == 2
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+def test_a_file_that_is_replaced_keeps_its_owner_and_group(tmp_path):
+    path = tmp_path / "front.nc"
+    flights(1).save(path)
+    os.chown(path, 4321, 1234)
+    path.chmod(0o640)
+    flights(2).save(path)
+    found = path.stat()
+    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (4321, 1234, 0o640) and len(Front.load(path)) == 2
+
+
+def test_a_file_is_never_readable_by_more_than_the_one_that_it_replaces(tmp_path, monkeypatch):
+    path, modes = tmp_path / "front.nc", []
+    flights(1).save(path)
+    path.chmod(0o600)
+    sync = os.fsync
+    monkeypatch.setattr("os.fsync", lambda number: (modes.append(os.fstat(number).st_mode & 0o777), sync(number)))
+    flights(2).save(path)
+    assert modes == [0o600]
+
+
+def test_a_working_folder_that_is_gone_is_one_error(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(FileNotFoundError, match=r"cannot write 'front\.nc': the working folder is no longer there"):
+        flights(1).save("front.nc")
+
+
 def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path):
     (tmp_path / "real").mkdir()
     link = tmp_path / "front.nc"

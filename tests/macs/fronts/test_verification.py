@@ -10,6 +10,7 @@ from synthetic_fronts import black_box, flights
 import problems
 from macs import MACS, Front
 from macs.fronts.verification import verify
+from problems import Problem
 from transcription import DFET, parse
 
 
@@ -101,3 +102,24 @@ def test_objectives_that_only_the_mesh_believes_are_found():
 def test_statuses_and_violations_that_were_touched_up_are_found(front):
     assert all(not check.ok for check in verify(altered(front, violation=np.full(len(front), 123.0)), tolerance=1))
     assert all(not check.ok for check in verify(altered(front, status=np.full(len(front), "failed")), tolerance=1))
+
+
+@pytest.mark.parametrize("scheme", ["dfet:2x2", "radau:3x2", "shooting:5"])
+@pytest.mark.filterwarnings("error")
+def test_a_phase_without_duration_verifies(tmp_path, scheme):
+    """The trajectory whose phase begins and ends at 0 is its own simulation."""
+    problem = Problem("wait")
+    phase = problem.phase("wait", t0=0.0, tf=(0.0, 2.0))
+    x, u = phase.state("x", bounds=(-5, 5), initial=0), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=u - x * phase.time)
+    problem.minimize("time", phase.tf)
+    problem.maximize("x", phase.final(x))
+    start = np.zeros((1, len(parse(scheme).nlp(problem.compile()).variables)))
+    front = MACS(agents=4, archive=4, refine=False).solve(problem, parse(scheme), evaluations=8, seed=1, start=start)
+    point = front[int(np.argmin(front.F[:, 0]))]
+    assert point.trajectory["wait"].tf == 0.0 and point.verified
+    again = point.simulate()
+    assert again.max_defect == again.violation == 0.0 and again.objectives == point.objectives
+    front.save(tmp_path / "front.nc")
+    assert verify(Front.load(tmp_path / "front.nc", problem), tolerance=1e-3)[point.index].ok
+    point.plot()

@@ -1,0 +1,92 @@
+"""Paths that are no ordinary files, where the command line reads or writes: one line, at once."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from problems import load
+from runs.cli import main
+from runs.measures.references import read
+
+KINDS = ("pipe", "device", "folder", "circle of links")
+SOLVE = ("solve", "four_bar_truss", "--seed", "1", "--evaluations", "40")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def odd(name, kind):
+    """Make a path that is no ordinary file; its name."""
+    if kind == "pipe":
+        os.mkfifo(name)
+    elif kind == "device":
+        Path(name).symlink_to("/dev/zero")
+    elif kind == "folder":
+        Path(name).mkdir()
+    else:
+        Path(name).symlink_to(name)
+    return name
+
+
+def refused(capsys, *call):
+    assert main(list(call)) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("odd.py", ("solve", "odd.py:build")),
+        ("odd.json", (*SOLVE, "--prefer", "odd.json", "--out", "front.nc")),
+        ("odd.toml", ("study", "run", "odd.toml")),
+        ("odd.nc", ("show", "odd.nc")),
+        ("odd.nc", ("verify", "odd.nc")),
+        ("odd.json", ("decide", "odd.json")),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value[0],
+)
+def test_what_is_read_is_an_ordinary_file(capsys, kind, name, call):
+    odd(name, kind)
+    line = refused(capsys, *call)
+    assert name in line and any(why in line for why in ("no ordinary file", "Is a directory", "symbolic links"))
+    assert not Path("front.nc").exists()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_record_of_a_study_is_an_ordinary_file(capsys, kind):
+    Path("study").mkdir()
+    Path("study/study.json").symlink_to(Path.cwd() / odd("odd", kind))
+    for action in ("status", "report"):
+        assert "'study' cannot be read" in refused(capsys, "study", action, "study")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("option", ["--out", "--plot", "--checkpoint"])
+def test_what_is_written_is_an_ordinary_file(capsys, kind, option):
+    odd("odd.png", kind)
+    given = {"--out": "front.nc"} | {option: "odd.png"}
+    line = refused(capsys, *SOLVE, *(word for pair in given.items() for word in pair))
+    assert "cannot write 'odd.png'" in line
+    assert not Path("front.nc").exists()
+
+
+def test_the_folder_of_a_study_is_no_circle_of_links(capsys):
+    odd("study", "circle of links")
+    assert "'study' is not a folder" in refused(capsys, "study", "run", "aerocapture-front", "--quick", "--out", "study")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_table_is_an_ordinary_file(kind):
+    with pytest.raises(ValueError, match=r"'odd\.csv' cannot be read"):
+        read(odd("odd.csv", kind), load("four_bar_truss").compile().goals)
+
+
+def test_a_file_with_a_problem_has_a_size(capsys):
+    with Path("large.py").open("wb") as file:
+        file.truncate(2**30)
+    assert "'large.py' has 1073741824 bytes" in refused(capsys, "solve", "large.py:build")
