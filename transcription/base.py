@@ -306,11 +306,11 @@ class NLP(Deriving):
         lower, upper, scale = self._limits
         residuals = np.hstack([Z, g])
         # Overflow shows in the results; warnings would add nothing.
-        with np.errstate(invalid="ignore", over="ignore"):
+        with np.errstate(invalid="ignore"):
             below = lower - residuals
             residuals -= upper
             np.maximum(residuals, below, out=residuals)
-            residuals /= scale
+        residuals /= scale
         return residuals
 
     @cached_property

@@ -14,6 +14,8 @@ from contextvars import ContextVar, Token
 from types import TracebackType
 from typing import Any, Self, TextIO
 
+import numpy as np
+
 from .interrupts import Interrupts
 
 EVERY = 10.0
@@ -202,10 +204,16 @@ class Steps(Display):
         self._interrupts.check()
 
 
+def numbers_may_blow_up() -> np.errstate:
+    """A context of work on trajectories, some of which are far from feasible: statuses and violations say what is no number there, and
+    warnings of numpy would add nothing."""
+    return np.errstate(over="ignore", invalid="ignore", divide="ignore")
+
+
 @contextmanager
 def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[StatusLine, Interrupts]]:
     """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
-    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts:
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, numbers_may_blow_up():
         yield status, interrupts
 
 

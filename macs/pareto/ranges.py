@@ -42,7 +42,6 @@ def nearest(point: np.ndarray, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     return np.argsort(np.linalg.norm(normalised(F - point, zero, ranges), axis=1), kind="stable")
 
 
-@np.errstate(over="ignore")  # a single objective may be beyond all others
 def normalised(F: np.ndarray, ideal: np.ndarray, nadir: np.ndarray) -> np.ndarray:
     """F (..., m) scaled so that the ideal point is at 0 and the nadir at 1; an objective with zero range is only shifted."""
     span = nadir - ideal

@@ -27,7 +27,7 @@ from ..front import Front
 from ..fronts.builders import no_points, trajectory_points, vector_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
-from ..io.console import StatusLine
+from ..io.console import StatusLine, numbers_may_blow_up
 from ..io.interrupts import Interrupts
 from ..refinement.search_mesh import search_transcription
 from .method import SearchMethod
@@ -154,7 +154,7 @@ class Solver(SearchMethod):
         self.check_goals(compiled.goals)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
-        with Interrupts(time_limit) as interrupts:
+        with Interrupts(time_limit) as interrupts, numbers_may_blow_up():
             try:
                 if transcription is None:
                     with StatusLine(progress) as show:

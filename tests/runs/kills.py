@@ -8,11 +8,15 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import re
 import signal
+import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -138,15 +142,86 @@ def _children(pid: int) -> list[int]:
         return []
 
 
+class Cluster:
+    """A scheduler of Dask and its workers, processes of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._count = folder, 0
+        self._environment = {**os.environ, "PYTHONPATH": os.pathsep.join(str(Path(part).resolve()) for part in sys.path)}
+        self.scheduler = self._start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        said, ends = folder / "0.log", time.monotonic() + 60
+        while not (found := re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())):
+            assert time.monotonic() < ends, said.read_text()
+            time.sleep(0.05)
+        self.address = found[1]
+        self.workers = [self.worker(), self.worker()]
+
+    def worker(self) -> subprocess.Popen:
+        """One more worker."""
+        return self._start("dask_worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+
+    def _start(self, *call: str) -> subprocess.Popen:
+        log = (self._folder / f"{self._count}.log").open("w")
+        self._count += 1
+        command = [sys.executable, "-m", "distributed.cli." + call[0], *call[1:]]
+        return subprocess.Popen(command, stderr=log, stdout=log, cwd=self._folder, env=self._environment)
+
+
+@contextmanager
+def running_cluster() -> Iterator[Cluster]:
+    """A cluster with two workers, gone at the end."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Cluster(Path(folder))
+        try:
+            yield made
+        finally:
+            for process in (*made.workers, made.scheduler):
+                process.kill()
+                process.wait()
+
+
+def kill_workers(kills: int, rng: np.random.Generator) -> int:
+    """Kill workers of a cluster while it makes a study, each replaced by another; the numbers are those of this machine alone."""
+    from runs.execution.workers import cluster
+
+    done = 0
+    with tempfile.TemporaryDirectory() as folder, running_cluster() as made:
+        expected = fronts(study().run(Path(folder) / "here", jobs=2))
+        while done < kills:
+            ended = threading.Event()
+
+            def killer(ended: threading.Event = ended) -> None:
+                nonlocal done
+                while not ended.wait(rng.uniform(0.2, 3.0)) and done < kills:
+                    which = int(rng.integers(2))
+                    made.workers[which].kill()
+                    made.workers[which].wait()
+                    made.workers[which] = made.worker()
+                    done += 1
+
+            thread = threading.Thread(target=killer)
+            thread.start()
+            out = Path(folder) / f"study {done}"
+            try:
+                with cluster(made.address) as executor:
+                    study().run(out, executor=executor)
+            finally:
+                ended.set()
+                thread.join()
+            with cluster(made.address) as executor:  # runs that lost their workers too often
+                assert fronts(study().run(out, executor=executor)) == expected
+    return done
+
+
 def main() -> int:
-    """Kill solves and studies; an assertion fails where anything differs."""
+    """Kill solves, studies and workers; an assertion fails where anything differs."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=100, help="number of kills, half of them of solves")
+    parser.add_argument("--kills", type=int, default=100, help="number of kills: of solves, studies and workers, as many of each")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     rng = np.random.default_rng(arguments.seed)
-    for kill in (kill_solves, kill_studies):
-        print(f"{kill.__name__}: {kill(arguments.kills // 2, rng)} kills, and the same numbers", flush=True)
+    for kill in (kill_solves, kill_studies, kill_workers):
+        print(f"{kill.__name__}: {kill(-(-arguments.kills // 3), rng)} kills, and the same numbers", flush=True)
     return 0
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import cache
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells, vector, with_peak
 
-from problems import load
+from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, NLP, Collocation, MultipleShooting
 from transcription.inner import inner_solver
@@ -297,3 +298,16 @@ def test_an_objective_is_not_lost_in_the_scale_of_an_explosion_elsewhere():
     assert nlp_scales(nlp)[0] > 1e50
     solved = scalarize(nlp, start, reference=np.zeros(1), weights=np.ones(1))
     assert solved.status == "converged" and solved.F[0] == pytest.approx(0.1330957, rel=1e-5)
+
+
+def test_where_a_peak_is_infinite_no_solve_begins():
+    problem = Problem("logarithm")
+    phase = problem.phase("p", t0=0.0, tf=1.0)
+    x, u = phase.state("x", bounds=(-1, 1), initial=0.0), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=u)
+    problem.minimize("largest", phase.peak(ca.log(x)))
+    nlp = DFET(2, 1).transcribe(problem)
+    start = nlp.tighten(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
+    assert start.min() == -np.inf
+    solved = scalarized.scalarize(nlp, start, reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status == "failed" and not solved.begun and not solved.clocked

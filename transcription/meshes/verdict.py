@@ -191,8 +191,7 @@ class Verdict:
             controls, sums = np.zeros((2, len(states)))
             # That controls are not optimal, no simulation sees.
             if wanted.confirmed:
-                with np.errstate(invalid="ignore", over="ignore"):
-                    controls = phase.weight * phase.tail**2 * count / wanted.settled
+                controls = phase.weight * phase.tail**2 * count / wanted.settled
             if not self.missed_by_elements <= SAFETY * wanted.settled:
                 sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
             found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))

@@ -164,7 +164,6 @@ class _Task:
         moving = self.slope > 0
         return float(np.max((F - self.shift)[moving] / (self.scale * self.slope)[moving]))
 
-    @np.errstate(over="ignore", invalid="ignore")
     def excess(self, F: np.ndarray) -> float:
         """The amount by which F (m,) exceeds hard limits, in scales."""
         over = (F - self.shift) / self.scale
@@ -231,6 +230,8 @@ def scalarize(
         task = _task(nlp, start, reference, weights, ceiling, margin)
     except Stopped:  # while derivatives were built
         return not_begun(nlp, start)
+    if not np.isfinite(start).all():  # a peak of what is infinite there; IPOPT would not begin
+        return replace(not_begun(nlp, start), status=FAILED, clocked=False)
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
@@ -279,7 +280,6 @@ def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
     return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False, message="it was not begun")
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def _task(
     nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None, margin: np.ndarray | None
 ) -> _Task:

@@ -99,8 +99,7 @@ def equilibrated(nlp: NLP, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(ROUNDS):
         for scales, index, power in ((rows, i, 0.5), (columns, j, -0.5)):
             largest = np.zeros(len(scales))
-            with np.errstate(over="ignore"):  # derivatives may be of any size; scales are clipped
-                np.maximum.at(largest, index, sizes * columns[j] / rows[i])
+            np.maximum.at(largest, index, sizes * columns[j] / rows[i])
             scales *= np.where(largest > 0, largest, 1.0) ** power
     columns = np.clip(columns, LEAST_SCALE * nlp.scale, nlp.scale)
     return columns, np.clip(rows, ROW_SCALES[0] * nlp.g_scale, ROW_SCALES[1] * nlp.g_scale)

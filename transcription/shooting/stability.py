@@ -112,7 +112,5 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) 
             if not np.isfinite(matrix).all():
                 return []
             rates, vectors = np.linalg.eig(matrix)
-            with np.errstate(over="ignore"):  # bounds may be next to each other
-                parts = np.abs(vectors) / span[:, None]
-            found.append((rates, [phase.states[i].name for i in np.argmax(parts, axis=0)]))
+            found.append((rates, [phase.states[i].name for i in np.argmax(np.abs(vectors) / span[:, None], axis=0)]))
     return found

@@ -55,7 +55,6 @@ class PiecewisePolynomial:
         """Values on element `j` at local coordinates `tau` in [-1, 1], shape (len(tau), k): its own polynomial also at both ends."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients[j]
 
-    @np.errstate(over="ignore", invalid="ignore")  # states of what is far from feasible may have blown up: results show it
     def on_elements(self, tau: np.ndarray) -> np.ndarray:
         """The same on every element, shape (N, len(tau), k)."""
         return basis_matrix(self.basis, self.coefficients.shape[1] - 1, tau) @ self.coefficients

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 import signal
+import warnings
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from macs import MACS, NSGA2, Progress
+from macs import MACS, NSGA2, Progress, sweep
 from macs.evaluation.evaluator import Counts
 from macs.refinement.search_mesh import Chosen
 from macs.solvers.solver import Solver
 from problems import Problem, load
 from problems.compiled import CompiledProblem
-from transcription import DFET
+from transcription import DFET, SingleShooting
 from transcription.inner import Ipopt
 from transcription.stopping import Stopped
 
@@ -206,3 +208,18 @@ def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_o
     monkeypatch.setattr(Solver, "_search_run", record)
     solver.solve(load("goddard"), seed=1)
     assert begun == [mesh if coarse else fine]
+
+
+def test_what_blows_up_in_a_search_is_no_warning():
+    problem = Problem("explosion")
+    phase = problem.phase("p", t0=0.0, tf=10.0)
+    x, u = phase.state("x", bounds=(-1, 1), initial=0.5), phase.control("u", bounds=(0, 1))
+    phase.dynamics(x=x**3 + ca.exp(40 * u * x))
+    problem.minimize("end", phase.final(x) ** 2)
+    problem.minimize("effort", phase.integral(u**2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        for inner in ("propagate", "auto"):
+            front = MACS(agents=4, archive=4).solve(problem, SingleShooting(8), evaluations=40, seed=1, inner=inner)
+            assert front.message
+        sweep(problem, DFET(3, 2), points=3)
