@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class DecomposedState(State):
     ideal : array (m,)
         Best value of each objective so far, as presented to the algorithm.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented"}
 
     ideal: np.ndarray
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,6 +37,8 @@ class ParticleState(State):
     means : array (k, m)
         Mean of the front after each of the last iterations of a swarm that moves, at most `SETTLING` and one.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"velocity": "members d", "means": "k m"}
 
     best: Members
     leaders: Members

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,8 @@ class SwarmState(State):
     velocity : array (n, d)
         In the user's units.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"velocity": "n d"}
 
     best: Members
     leaders: Members

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,8 @@ class RankedState(State):
     crowding : array (n,)
         Crowding distances.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"rank": "members int", "crowding": "members"}
 
     rank: np.ndarray
     crowding: np.ndarray

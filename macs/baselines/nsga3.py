@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class NormalisedState(State):
     extreme_points : array (m, m) or (0, m)
         Points that span the hyperplane; none before the first population.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented", "worst": "presented", "extreme_points": "e presented"}
 
     ideal: np.ndarray
     worst: np.ndarray

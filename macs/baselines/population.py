@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -159,6 +159,8 @@ class Members(Archive):
     degree : array (n,)
         Number by which infeasible points are ranked; see `constraints.degree`.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = Archive.SHAPES | {"degree": "n"}
 
     degree: np.ndarray
 

@@ -49,6 +49,11 @@ class Bilevel(Evaluator):
             self.has_gradients = False
 
     @property
+    def sizes(self) -> dict[str, int]:
+        """See `Evaluator.sizes`."""
+        return super().sizes | {"D": len(self.nlp.lower)}
+
+    @property
     def goals(self) -> tuple[Objective, ...]:
         """See `Evaluator.goals`."""
         return self.nlp.problem.goals

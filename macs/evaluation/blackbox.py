@@ -50,6 +50,11 @@ class BlackBox(Evaluator):
         return self.m_known
 
     @property
+    def sizes(self) -> dict[str, int]:
+        """See `Evaluator.sizes`; the number of objectives is compared by `resume`, whose error says where it is from."""
+        return {"d": len(self.free), "D": len(self.free)}
+
+    @property
     def goals(self) -> tuple[Objective, ...]:
         """See `Evaluator.goals`."""
         return self.problem.goals or default_goals(self.m)

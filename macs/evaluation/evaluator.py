@@ -166,6 +166,11 @@ class Evaluator(ABC):
         return Box(self.lower, self.upper, self.period > 0.0)
 
     @property
+    def sizes(self) -> dict[str, int]:
+        """Dimensions that are known: "d" free variables, "m" objectives; implementations add "D" entries of a full vector."""
+        return {"d": len(self.free)} | ({} if self.m_known is None else {"m": self.m_known})
+
+    @property
     def goals(self) -> tuple[Objective, ...]:
         """The m objectives, in the user's units and senses; needed by searches with a preference only."""
         raise NotImplementedError(f"{type(self).__name__} does not name its objectives")

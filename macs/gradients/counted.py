@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,6 +22,8 @@ class PolishLog:
     Z, F, violation, status : arrays (k, D), (k, m), (k,), (k,)
         Results in the order of the solves; see `Evaluation`.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"Z": "k D", "F": "k m", "violation": "k", "status": "k str"}
 
     archive: Archive
     Z: np.ndarray

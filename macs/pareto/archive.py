@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -39,6 +39,8 @@ class Archive:
     violation : array (n,)
         Largest scaled residual of any constraint.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"Z": "n D", "F": "n m", "violation": "n"}
 
     Z: np.ndarray
     F: np.ndarray

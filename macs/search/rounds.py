@@ -8,6 +8,7 @@ front, with straight lines between its points, by more than a tolerance. All dec
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from moocore import hypervolume
@@ -73,6 +74,8 @@ class Rounds:
     stopped : str
         Why the search is at its end; empty as long as it goes on.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"front": "k m", "extent": "m"}
 
     finished: int
     end: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,6 +42,10 @@ class Agents:
     direction : array (n,) of int
         Row, in the pool of directions, of the scalar sub-problem of the agent; -1 if it has none.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "Z": "n D", "F": "n m", "violation": "n", "velocity": "n d", "rho": "n", "contractions": "n int", "direction": "n int",
+    }  # fmt: skip
 
     Z: np.ndarray
     F: np.ndarray
@@ -121,6 +126,12 @@ class SearchState:
     rounds : Rounds, optional
         Of a search without a number of evaluations.
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "effort": "w 4", "alike": "m bool",
+        "in_vain": "v 2m",
+    }  # fmt: skip
+    INDICES: ClassVar[dict[str, str]] = {"agents.direction": "directions"}
 
     agents: Agents
     archive: Archive

@@ -25,6 +25,7 @@ from ..io.labelled import document
 from . import checkpoint_file
 from .method import SearchMethod
 from .packing import pack, unpack
+from .shapes import check_shapes
 
 SECONDS, SHARE = 1.0, 20.0
 """The time between two writes is at least so many seconds, and at least so many times what the last write took."""
@@ -81,6 +82,8 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         The class of its state is the one that its `makes_state` is annotated to return.
     belongs : mapping
         Everything but the seed that decides the results of the run, as data.
+    sizes : mapping, optional
+        Dimensions of the run that are known: "m" objectives, "d" free variables, "D" entries of a full vector; see `shapes`.
 
     Attributes
     ----------
@@ -95,11 +98,14 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         If the class of the solver's state is not known.
     """
 
-    def __init__(self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any], sizes: Mapping[str, int] | None = None
+    ) -> None:
         self.path, self.failure = path, ""
         self._state_class, self._solver = _state_class(solver), type(solver).__name__
         self._belongs = _read_json(document(dict(belongs)))
         self._versions = [versions()]
+        self._sizes = sizes or {}
         self._waiting: tuple[dict[str, Any], dict[str, np.ndarray]] | None = None
         self._written, self._took = time.perf_counter(), 0.0
 
@@ -140,6 +146,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
                 raise ValueError(f"belongs to another run: {'; '.join(differences)}")
             state = unpack(header["state"], self._state_class, arrays, "state")
             _check_points(state)
+            self._check_shapes(state)
             known = unpack(header["versions"], list[dict[str, str]], arrays, "versions")
             if arrays:
                 raise TypeError(f"{min(arrays)} is unknown")
@@ -155,7 +162,12 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         arrays: dict[str, np.ndarray] = {}
         trees = {"run": pack(kept, Kept, arrays, "run"), "state": pack(state, self._state_class, arrays, "state")}
         _check_points(state)
+        self._check_shapes(state)
         self._waiting = trees, arrays
+
+    def _check_shapes(self, state: Any) -> None:
+        """See `check_shapes`; the objectives of a function that was not evaluated yet are those of the archive."""
+        check_shapes(state, {"m": state.archive.F.shape[1], **self._sizes})
 
     def write_in_time(self) -> None:
         """Write what is not in the file yet, if the last write is long enough ago."""

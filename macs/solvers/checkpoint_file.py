@@ -24,6 +24,8 @@ import numpy as np
 VERSION = 6
 FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
 LONGEST_LINE = 200
+LARGEST = 2**32
+"""Bytes that the archive of a file may have."""
 DOCUMENT = "document"
 """The member of the archive that is JSON, as an array of bytes."""
 
@@ -62,7 +64,9 @@ def read(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
         found = Path(path).stat().st_size - len(line)
         if found != size:
             raise ValueError(f"is damaged: it should have {size} bytes after its first line, but has {found}")
-        archive = file.read()
+        if size > LARGEST:
+            raise ValueError(f"is no valid checkpoint: it has {size} bytes, more than {LARGEST}")
+        archive = file.read(size)
     if hashlib.sha256(archive).hexdigest() != checksum:
         raise ValueError("is damaged: its content does not match its checksum")
     return _from_archive(archive)

@@ -76,7 +76,7 @@ class SearchRun:
             method says so, or "idle" if nothing was left to evaluate. Without a budget it is "done" instead of "budget", or "ceiling" if
             the largest number of evaluations came first.
         """
-        self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs())
+        self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs(), self.evaluator.sizes)
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
         kept = found[1] if found else Kept(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)
         self._state: Any = found[0] if found else None

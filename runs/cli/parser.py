@@ -17,7 +17,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from .answers import DONE, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
+from ..data.memory import is_memory_error, memory_message
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
 
 EPILOG = """\
 examples:
@@ -143,6 +144,11 @@ def _answer(argv: Sequence[str] | None) -> int:
         return complain(str(error), arguments.parser.prog)
     except OSError as error:
         return complain(error.strerror or str(error), arguments.parser.prog)
+    except (MemoryError, RuntimeError) as error:
+        if not is_memory_error(error):
+            raise
+        complain(memory_message(error), arguments.parser.prog)
+        return FAILED
     return int(code)
 
 

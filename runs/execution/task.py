@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from macs.solvers.checkpoint import Unreadable, keeps
 from problems import load
 
+from ..data.memory import is_memory_error
 from ..measures.simulation_record import SimulationRecord, record
 from .samples import Report, Samples
 
@@ -108,7 +109,7 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
         found = _simulated(task, front)
         return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, simulated=found)
     except Exception as error:
-        status, why = (MEMORY, str(error)) if isinstance(error, MemoryError) else (CRASHED, f"{type(error).__name__}: {error}")
+        status, why = (MEMORY, str(error)) if is_memory_error(error) else (CRASHED, f"{type(error).__name__}: {error}")
         return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
 
 

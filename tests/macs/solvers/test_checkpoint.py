@@ -535,6 +535,33 @@ FORGED = {
     ),
     "rows": (lambda header, arrays: arrays.update({"state.closest.Z": np.zeros((2, 5))}), "state.closest.Z has 2 rows, 0 expected"),
     "columns": (lambda header, arrays: arrays.update({"state.closest.F": np.zeros((0, 3))}), "state.closest.F has 3 columns, 2 expected"),
+    "another rank": (
+        lambda header, arrays: arrays.update({"state.ideal": np.zeros((2, 2))}),
+        "state.ideal is an array .* 2 dim.*; float64 with 1",
+    ),
+    "length": (lambda header, arrays: arrays.update({"state.ideal": np.zeros(3)}), "state.ideal has 3 rows, 2 expected"),
+    "kind": (
+        lambda header, arrays: arrays.update({"state.agents.contractions": np.zeros(len(arrays["state.agents.rho"]))}),
+        "state.agents.contractions is an array of float64 .*; int with 1",
+    ),
+    "precision": (lambda header, arrays: arrays.update({"state.nadir": np.zeros(2, np.float32)}), "state.nadir is an array of float32"),
+    "agents": (lambda header, arrays: arrays.update({"state.agents.velocity": np.zeros((1, 5))}), "state.agents.velocity has 1 rows"),
+    "no dimension": (lambda header, arrays: arrays.update({"state.agents.rho": np.array(1.0)}), "state.agents.rho is an array .* 0 dim"),
+    "free variables": (
+        lambda header, arrays: arrays.update({"state.experience": np.zeros((3, 4))}),
+        "state.experience has 4 columns, 5 expected",
+    ),
+    "full vectors": (
+        lambda header, arrays: arrays.update(
+            {name: array[:, :4] for name, array in arrays.items() if name.endswith(".Z") and array.ndim == 2}
+        ),
+        "state.agents.Z has 4 columns, 5 expected",
+    ),
+    "effort": (lambda header, arrays: arrays.update({"state.effort": np.zeros((2, 5))}), "state.effort has 5 columns, 4 expected"),
+    "row": (
+        lambda header, arrays: arrays["state.agents.direction"].fill(10**6),
+        "state.agents.direction has numbers outside of the .* rows of state.directions",
+    ),
     "NaN": (lambda header, arrays: arrays["state.archive.F"].fill(np.nan), "state.archive.F has a value that is not finite"),
     "objects": (lambda header, arrays: header["state"].update(rng=3), "state.rng is no generator"),
     "seed": (lambda header, arrays: header["run"].update(seed=-1), "run.seed is -1, a number of at least 0 expected"),

@@ -237,3 +237,12 @@ def test_a_huge_file_is_not_read(file) -> None:
             opened.truncate(10**12)  # sparse: it takes no room on the disk
         with pytest.raises(ValueError, match=r"is damaged|is no checkpoint"):
             read(file)
+
+
+def test_a_huge_file_that_states_its_size_is_not_read(file) -> None:
+    line = f"MACS checkpoint {VERSION}: {10**12} bytes, sha256 {'0' * 64}\n".encode()
+    with file.open("wb") as opened:
+        opened.write(line)
+        opened.truncate(len(line) + 10**12)
+    with pytest.raises(ValueError, match=r"it has 1000000000000 bytes, more than 4294967296"):
+        read(file)
