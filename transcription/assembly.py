@@ -12,7 +12,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Link, Variable
 
 from .base import NLP, Profile, Transcription
 from .numerics.batched import Batched, expanded
@@ -43,6 +43,9 @@ class Assembly:
         self.problem = problem
         self.layout = Layout()
         self._joined: list[tuple[int, int, float, str]] = []
+        self._links_into: list[list[Link]] = [[] for _ in problem.phases]
+        for link in problem.links:
+            self._links_into[link.second].append(link)
         self.parameters = np.array([self.layout.add(v, free=True) for v in problem.parameters], dtype=int)
         self._writers: dict[int, PhaseWriter] = {}
         for i in problem.order_in_time:
@@ -251,9 +254,7 @@ class Assembly:
         phase = self.problem.phases[i]
         prefix = f"{phase.name}."
         shared: dict[str, int] = {}
-        for link in self.problem.links:
-            if link.second != i:
-                continue
+        for link in self._links_into[i]:
             before = self._writers[link.first]
             finals = {v.name: int(slot) for v, slot in zip(before.phase.states, before.ends.final, strict=True)}
             for name, slot in [("t0", before.ends.tf), *((state, finals[state]) for state in link.states)]:

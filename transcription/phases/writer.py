@@ -98,7 +98,7 @@ class Rows:
     @property
     def count(self) -> int:
         """Number of rows."""
-        return sum(expression.numel() for expression in self.expressions)
+        return len(self.labels)
 
     @property
     def propagated_equations(self) -> ca.MX:
