@@ -21,7 +21,7 @@ from .phases.guess import along
 from .phases.layout import Layout
 from .phases.pointwise import Parts, Pointwise
 from .phases.reduced import Reduced
-from .phases.writer import Ends, PhaseWriter, Rows
+from .phases.writer import Ends, PhaseWriter, Rows, filled
 from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
@@ -174,9 +174,7 @@ class Assembly:
         if not self.layout.hidden:
             return expanded(function)
         z = ca.MX.sym("z", len(self.layout.variables))
-        extended = self.layout.extended_symbol(z)
-        for writer in self._writers.values():
-            extended = writer.fill(extended)
+        extended = filled(list(self._writers.values()), self.layout.extended_symbol(z))
         values = function.call([extended[: z.numel() + self.layout.hidden]])
         return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
 

@@ -241,7 +241,7 @@ class PhaseWriter(ABC):
         """(extended vector, multipliers of dynamics, path constraints on states alone, others, peaks and integrals) -> derivatives by the
         extended vector of the Lagrangian's terms of dynamics and integrals, of those that make costates jump, and of the others."""
         extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
-        written = self.write(self.fill(extended), rows)
+        written = self.write(filled([self], extended), rows)
         g, name = ca.vertcat(*rows.expressions), self.phase.name
         paths = ca.vertcat(ca.MX(0, 1), *(g[one] for one in rows.samples.get((name, "path"), ())))
         columns = [g[rows.dynamics[name]], paths, paths, ca.vec(written.peak_samples.T), written.integrals]
@@ -250,9 +250,10 @@ class PhaseWriter(ABC):
         outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_states + of_peaks, mixed)]
         return ca.Function("by_states", [extended, *symbols], outputs)
 
-    def fill(self, extended: ca.MX) -> ca.MX:
-        """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
-        return extended
+    def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
+        """Slots (k,) of the phase's hidden quantities, and these as a column (k, 1): they follow from the variables. Most methods have
+        none."""
+        return np.empty(0, dtype=int), ca.MX(0, 1)
 
     def guess(self, extended: np.ndarray) -> None:
         """Fill in the states of extended vectors (k, ...), whose times, parameters, controls and initial states are set."""
@@ -385,3 +386,11 @@ class PhaseWriter(ABC):
             control_variables=phase.controls,
             path_limits=phase.paths,
         )
+
+
+def filled(writers: Sequence[PhaseWriter], extended: ca.MX) -> ca.MX:
+    """An extended symbol with the hidden quantities of these phases, of all at once: a copy of the whole vector for each phase would cost
+    the square of their number."""
+    slots, values = zip(*(writer.hidden(extended) for writer in writers), strict=True)
+    every = np.concatenate(slots)
+    return writers[0].layout.replaced(extended, every, ca.vertcat(*values)) if len(every) else extended
