@@ -391,6 +391,6 @@ class PhaseWriter(ABC):
 def filled(writers: Sequence[PhaseWriter], extended: ca.MX) -> ca.MX:
     """An extended symbol with the hidden quantities of these phases, of all at once: a copy of the whole vector for each phase would cost
     the square of their number."""
-    slots, values = zip(*(writer.hidden(extended) for writer in writers), strict=True)
-    every = np.concatenate(slots)
-    return writers[0].layout.replaced(extended, every, ca.vertcat(*values)) if len(every) else extended
+    hidden = [writer.hidden(extended) for writer in writers]
+    slots = np.concatenate([own for own, _ in hidden])
+    return writers[0].layout.replaced(extended, slots, ca.vertcat(*(values for _, values in hidden))) if len(slots) else extended
