@@ -103,6 +103,7 @@ class Assembly:
             widen=self.widened,
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
             adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
+            dense=sum(writer.dense for writer in self._declared),
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 

@@ -146,6 +146,8 @@ class PhaseWriter(ABC):
         Whether fast propagation, and `sensitivity`, can be written in C.
     wide : bool
         Whether `propagate` takes several extended vectors side by side.
+    dense : int
+        About how many derivatives of rows by controls there are because states depend on all controls before them; 0 where it is sparse.
     affine : bool
         Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
         variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
@@ -155,6 +157,7 @@ class PhaseWriter(ABC):
     magnitudes: np.ndarray = np.empty(0, dtype=int)
     compilable: bool = False
     wide: bool = False
+    dense: int = 0
     affine: bool = False
 
     def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:

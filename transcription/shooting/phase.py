@@ -57,6 +57,9 @@ class ShootingPhase(PhaseWriter):
         self.magnitudes = self.S.ravel()
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
         self.compilable, self.wide = step.symbolic, step.plain
+        # In each shot, a row depends on half of the shot's controls in the mean.
+        rows = self.R.size + self.Y.size + self.W.size
+        self.dense = rows * int((self.U >= 0).sum()) // (2 * len(self.R))
 
     def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
         """See `PhaseWriter.hidden`."""
