@@ -22,6 +22,7 @@ from transcription import DFET
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
+from transcription.nlp.dense import refuse_dense
 from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped
@@ -283,6 +284,7 @@ class _Job:
         """Work on this transcription from now on, with what is known of the ends on another mesh."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)
+        refuse_dense(self.nlp)
         known = [beginning(self._terms.start, self.nlp), beginning(ends, self.nlp, guess=False)]
         given = [Z for Z in known if Z is not None]
         self.solver = MultistartSolver(self.nlp, np.vstack(given) if given else None, self._terms.count, self._rng, self.solves)

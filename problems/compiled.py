@@ -9,6 +9,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from heapq import heappop, heappush
 from typing import Any
 
 import casadi as ca
@@ -85,6 +86,23 @@ class Link:
     first: int
     second: int
     states: tuple[str, ...]
+
+
+def in_time(count: int, links: Sequence[Link]) -> list[int]:
+    """Indices of so many phases, each after those that lead into it; otherwise as declared. Links must not close a circle."""
+    after: list[list[int]] = [[] for _ in range(count)]
+    awaited = [0] * count
+    for link in links:
+        after[link.first].append(link.second)
+        awaited[link.second] += 1
+    ready, order = [i for i in range(count) if not awaited[i]], []
+    while ready:
+        order.append(heappop(ready))
+        for i in after[order[-1]]:
+            awaited[i] -= 1
+            if not awaited[i]:
+                heappush(ready, i)
+    return order
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,11 +186,7 @@ class CompiledProblem(Deriving):
     @property
     def order_in_time(self) -> list[int]:
         """Indices of the phases, each after those that lead into it; otherwise as declared."""
-        order: list[int] = []
-        while len(order) < len(self.phases):
-            waiting = (i for i in range(len(self.phases)) if i not in order)
-            order.append(next(i for i in waiting if all(link.first in order for link in self.links if link.second == i)))
-        return order
+        return in_time(len(self.phases), self.links)
 
     @cached_property
     def fingerprint(self) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 
 from . import checks
-from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, vector_function
+from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, in_time, vector_function
 from .peaks import with_sizes
 from .phase import Phase
 from .sanity import check_numbers
@@ -217,21 +217,36 @@ def _common(first: Phase, second: Phase) -> tuple[str, ...]:
 
 
 def _narrowed(phases: list[CompiledPhase], links: list[Link]) -> list[CompiledPhase]:
-    """The phases with the ranges of their times and boundary states narrowed by durations and links; an error if nothing is left."""
+    """The phases with the ranges of their times and boundary states narrowed by durations and links; an error if nothing is left.
+
+    Along the links forward and back, until nothing changes: what narrows one phase is known to all that follow, or precede it, at once.
+    """
+    place = {i: k for k, i in enumerate(in_time(len(phases), links))}
+    forward = sorted(links, key=lambda link: (place[link.first], place[link.second]))
     for _ in range(len(phases) + 1):
-        for link in links:
-            first, second = phases[link.first], phases[link.second]
-            what = f"the link from phase '{first.name}' to phase '{second.name}'"
-            joint = checks.intersection((first.tf.lower, first.tf.upper), (second.t0.lower, second.t0.upper), f"{what}, time")
-            final, initial = list(first.final), list(second.initial)
-            names = [[state.name for state in phase.states] for phase in (first, second)]
-            for name in link.states:
-                i, j = names[0].index(name), names[1].index(name)
-                final[i] = initial[j] = checks.intersection(final[i], initial[j], f"{what}, state '{name}'")
-            phases[link.first] = replace(first, tf=_ranged(first.tf, joint), final=tuple(final))
-            phases[link.second] = replace(second, t0=_ranged(second.t0, joint), initial=tuple(initial))
+        before = list(phases)
+        for link in (*forward, *reversed(forward)):
+            for i, phase in zip((link.first, link.second), _joined(phases[link.first], phases[link.second], link.states), strict=True):
+                phases[i] = _with_times_narrowed(phase)
         phases = [_with_times_narrowed(phase) for phase in phases]
+        if all(new is old for new, old in zip(phases, before, strict=True)):
+            break
     return phases
+
+
+def _joined(first: CompiledPhase, second: CompiledPhase, states: tuple[str, ...]) -> tuple[CompiledPhase, CompiledPhase]:
+    """Two phases with the ranges of what a link joins narrowed to what both allow; the same ones where they are so already."""
+    what = f"the link from phase '{first.name}' to phase '{second.name}'"
+    joint = checks.intersection((first.tf.lower, first.tf.upper), (second.t0.lower, second.t0.upper), f"{what}, time")
+    final, initial = list(first.final), list(second.initial)
+    places = [{state.name: i for i, state in enumerate(phase.states)} for phase in (first, second)]
+    for name in states:
+        i, j = places[0][name], places[1][name]
+        final[i] = initial[j] = checks.intersection(final[i], initial[j], f"{what}, state '{name}'")
+    return (
+        _changed(first, tf=_ranged(first.tf, joint), final=tuple(final)),
+        _changed(second, t0=_ranged(second.t0, joint), initial=tuple(initial)),
+    )
 
 
 def _with_times_narrowed(phase: CompiledPhase) -> CompiledPhase:
@@ -241,7 +256,12 @@ def _with_times_narrowed(phase: CompiledPhase) -> CompiledPhase:
     start = checks.intersection((t0.lower, t0.upper), (end[0] - longest, end[1] - shortest), what)
     if end[1] <= start[0]:
         raise ValueError(f"phase '{phase.name}' has no duration: t0 is at least {start[0]:g} and tf at most {end[1]:g}")
-    return replace(phase, t0=_ranged(t0, start), tf=_ranged(tf, end))
+    return _changed(phase, t0=_ranged(t0, start), tf=_ranged(tf, end))
+
+
+def _changed(phase: CompiledPhase, **values: Any) -> CompiledPhase:
+    """A phase with these values; itself where it has them."""
+    return phase if all(getattr(phase, name) == value for name, value in values.items()) else replace(phase, **values)
 
 
 def _ranged(variable: Variable, limits: tuple[float, float]) -> Variable:

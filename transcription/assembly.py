@@ -12,7 +12,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Link, Variable
 
 from .base import NLP, Profile, Transcription
 from .numerics.batched import Batched, expanded
@@ -21,7 +21,7 @@ from .phases.guess import along
 from .phases.layout import Layout
 from .phases.pointwise import Parts, Pointwise
 from .phases.reduced import Reduced
-from .phases.writer import Ends, PhaseWriter, Rows
+from .phases.writer import Ends, PhaseWriter, Rows, filled
 from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
@@ -43,6 +43,9 @@ class Assembly:
         self.problem = problem
         self.layout = Layout()
         self._joined: list[tuple[int, int, float, str]] = []
+        self._links_into: list[list[Link]] = [[] for _ in problem.phases]
+        for link in problem.links:
+            self._links_into[link.second].append(link)
         self.parameters = np.array([self.layout.add(v, free=True) for v in problem.parameters], dtype=int)
         self._writers: dict[int, PhaseWriter] = {}
         for i in problem.order_in_time:
@@ -100,6 +103,7 @@ class Assembly:
             widen=self.widened,
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
             adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
+            dense=sum(writer.dense for writer in self._declared),
             parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
@@ -171,9 +175,7 @@ class Assembly:
         if not self.layout.hidden:
             return expanded(function)
         z = ca.MX.sym("z", len(self.layout.variables))
-        extended = self.layout.extended_symbol(z)
-        for writer in self._writers.values():
-            extended = writer.fill(extended)
+        extended = filled(list(self._writers.values()), self.layout.extended_symbol(z))
         values = function.call([extended[: z.numel() + self.layout.hidden]])
         return expanded(ca.Function(function.name(), [z], values, function.name_in(), function.name_out()))
 
@@ -251,9 +253,7 @@ class Assembly:
         phase = self.problem.phases[i]
         prefix = f"{phase.name}."
         shared: dict[str, int] = {}
-        for link in self.problem.links:
-            if link.second != i:
-                continue
+        for link in self._links_into[i]:
             before = self._writers[link.first]
             finals = {v.name: int(slot) for v, slot in zip(before.phase.states, before.ends.final, strict=True)}
             for name, slot in [("t0", before.ends.tf), *((state, finals[state]) for state in link.states)]:

@@ -177,6 +177,9 @@ class NLP(Deriving):
         limits of states have multipliers; if `swept` (a keyword), everywhere.
     measure : callable
         () -> `quantities`.
+    dense : int
+        About how many derivatives of rows by free variables there are because states depend on all controls before them; 0 where
+        derivatives are sparse.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
     """
@@ -201,6 +204,7 @@ class NLP(Deriving):
     widen: Callable[[NLP], NLP]
     adjoint: Callable[..., dict[str, Adjoint]]
     measure: Callable[[], ca.Function]
+    dense: int = 0
     parts: Parts | None = None
 
     def __repr__(self) -> str:

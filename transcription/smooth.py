@@ -7,6 +7,7 @@ candidates are much alike, and none is useful. A guessed profile and smooth devi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from problems.checks import check_positive, short_repr
 from problems.problem import Problem
 
 from .base import NLP, Transcription
+
+MANY, FINE = 1000, 50
+"""Places of a profile from which on values are interpolated; places between which that is done, in each length: it is exact to 1e-7."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,28 @@ class Smooth:
         for profile in nlp.profiles:
             columns = profile.columns
             middle = np.where(np.isfinite(guess[columns]), guess[columns], 0.5 * (lower + upper)[columns])
-            X[:, columns] = middle + self.spread * span[columns] * (noise[:, columns] @ smoothing(profile.places, self.length).T)
+            X[:, columns] = middle + self.spread * span[columns] * smoothed(noise[:, columns], profile.places, self.length)
         wrapped = lower + np.mod(X - lower, span)
         return np.where(nlp.period[nlp.free] > 0.0, wrapped, np.clip(X, lower, upper))
 
 
-def smoothing(places: np.ndarray, length: float) -> np.ndarray:
-    """A matrix (k, k) that makes smooth values of unit variance at `places` (k,) of independent ones."""
-    weights = np.exp(-(((places[:, None] - places) / length) ** 2))
+def smoothed(noise: np.ndarray, places: np.ndarray, length: float) -> np.ndarray:
+    """Smooth values (c, k) of unit variance at `places` (k,), from independent ones (c, k).
+
+    At many places they are interpolated between as many as suffice for the length: the matrix would grow with the square of their number.
+    """
+    count = ceil(FINE / length)
+    if len(places) <= max(MANY, count):
+        return noise @ smoothing(places, length).T
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    grid = np.linspace(0.0, 1.0, count + 1)
+    spline: np.ndarray = CubicSpline(grid, noise @ smoothing(places, length, grid).T, axis=1)(places)
+    return spline
+
+
+def smoothing(places: np.ndarray, length: float, at: np.ndarray | None = None) -> np.ndarray:
+    """A matrix (a, k) that makes smooth values of unit variance `at` some places (a,), by default the same, of independent ones at
+    `places` (k,)."""
+    weights = np.exp(-((((places if at is None else at)[:, None] - places) / length) ** 2))
     return weights / np.linalg.norm(weights, axis=1, keepdims=True)

@@ -8,6 +8,7 @@ from problems.compiled import Objective
 from problems.peaks import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
+from transcription.nlp.dense import refuse_dense
 from transcription.nlp.scalarized import scalarize
 from transcription.smooth import Smooth
 
@@ -44,8 +45,9 @@ class Bilevel(Evaluator):
         self.counts = Counts()
         try:
             refuse_peaks(nlp.problem)
+            refuse_dense(nlp)
             self.has_gradients = True
-        except ValueError:  # for example a peak that is maximised: the search uses no derivatives
+        except ValueError:  # for example a peak that is maximised, or too many derivatives: the search uses none
             self.has_gradients = False
 
     @property

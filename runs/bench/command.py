@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from macs.io.interrupts import Stopped
 
-from . import density, fronts, inner, methods, passages, peers, population, prefer, search, standard, study
+from . import density, fronts, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
 
 BENCHMARKS = {
@@ -19,6 +19,7 @@ BENCHMARKS = {
     "peers": peers,
     "population": population,
     "prefer": prefer,
+    "scale": scale,
     "search": search,
     "standard": standard,
     "study": study,
@@ -30,7 +31,8 @@ SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
     """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
 
-    Returns whether no two verified optima of one problem disagree: what no noise explains.
+    Returns whether no two verified optima of one problem disagree, which no noise explains, and no cost grows faster than linearly, which
+    little does: exponents do not depend on the speed of the machine.
     """
     measured: list[tuple[str, Row]] = []
     for kind in kinds:
@@ -45,7 +47,8 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
     if path:
         save(path, measured)
         print(f"values in {path}")
-    return not methods.disagreements([row for kind, row in measured if kind == "methods"])
+    of = {kind: [row for one, row in measured if one == kind] for kind in ("methods", "scale")}
+    return not methods.disagreements(of["methods"]) and not scale.superlinear(of["scale"])
 
 
 def _run(kind: str, rows: list[Row], quick: bool) -> bool:
@@ -60,6 +63,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
         "prefer": lambda: prefer.bench_prefer(rows, QUICK_SEEDS if quick else SEEDS, quick),
+        "scale": lambda: scale.bench_scale(rows, scale.QUICK if quick else scale.FULL),
         "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
         "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),
         "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),

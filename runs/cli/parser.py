@@ -47,14 +47,15 @@ passages    the boundary value problem of aerocapture by our solver and its tabl
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations
+scale       how time and memory grow with elements, nodes, phases, variables, points and agents: exponents beside the limit of 1.1
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
-machine proves little; but it is 1 where methods find different optima, both verified. Ctrl-C prints the values measured so far.
-MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner benchmark and that of populations show
-both."""
+machine proves little; but it is 1 where methods find different optima, both verified, and where a cost grows faster than linearly. Ctrl-C
+prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
+benchmark and that of populations show both."""
 
 
 DECIDE = """\
@@ -277,7 +278,10 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
     bench.add_argument(
-        "what", metavar="density|inner|methods|peers|population|search|standard|study", nargs="?", help="which one (default: all)"
+        "what",
+        metavar="density|front|inner|methods|passages|peers|population|prefer|scale|search|standard|study",
+        nargs="?",
+        help="which one (default: all)",
     )
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"

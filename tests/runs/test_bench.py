@@ -23,6 +23,7 @@ from runs.bench import command, density, fronts, inner, methods, passages, popul
 from runs.bench.cases import BATCH, INNER
 from runs.bench.fronts.contest import as_good
 from runs.bench.measured import Row, short
+from runs.bench.scale.series import SERIES
 from runs.cli import main
 from transcription import DFET
 
@@ -66,6 +67,8 @@ def small(monkeypatch):
     monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
     monkeypatch.setattr(command.passages, "QUICK", passages.Effort(rounds=1, coefficients=2, rows=20))
     monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
+    monkeypatch.setattr(command.scale.growth.bench_scale, "__defaults__", ((replace(SERIES[0], quick=(4, 8, 12)),),))
+    monkeypatch.setattr(command.scale.growth, "ASKED", 99.0)
     monkeypatch.setattr(command.inner, "INNER", SMALL[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", goddard.reference, 40, 40, "at least 0.999"),))
@@ -270,7 +273,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--quick", "--csv", str(path)]) == 0
     said = capsys.readouterr()
-    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "PASSAGES", "POPULATIONS", "PREFERENCES", "SEARCHES")
+    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "PASSAGES", "POPULATIONS", "PREFERENCES", "GROWTH", "SEARCHES")
     places = [said.out.index(words) for words in (*titles, "PUBLISHED PROBLEMS", "STUDIES", f"values in {path}")]
     assert places == sorted(places)
     assert "asked at least 1.7 times as fast" in said.out and "asked at most 5 % beyond" in said.out
@@ -287,6 +290,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
         "peers",
         "population",
         "prefer",
+        "scale",
         "search",
         "standard",
         "study",
@@ -327,7 +331,7 @@ def test_an_interrupt_ends_the_steps():
     [
         (
             ["bench", "studies"],
-            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, search"],
+            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, scale, search"],
         ),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),

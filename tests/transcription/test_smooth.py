@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from macs import MACS, MOPSO, NSGA2
 from problems import Problem
 from transcription import DFET, Smooth
-from transcription.smooth import smoothing
+from transcription.smooth import smoothed, smoothing
 
 MESHES = [DFET(20, 2), DFET(20, 2, basis="bernstein"), DFET(4, 3, mesh={"climb": ((0.0, 0.1, 0.15, 0.6, 1.0), 5)})]
 
@@ -99,6 +101,27 @@ def test_the_generator_is_the_only_source_of_chance() -> None:
 def test_settings_that_make_no_sense(settings) -> None:
     with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
         Smooth(**settings)
+
+
+def test_profiles_at_many_places_are_those_of_the_whole_matrix() -> None:
+    """They are interpolated, also where places lie close to each other, and are no different."""
+    rng = np.random.default_rng(0)
+    places = np.sort(np.concatenate([np.linspace(0.0, 1.0, 1200), 0.3 + 0.01 * rng.random(800)]))
+    noise = rng.standard_normal((3, len(places)))
+    for length in (0.05, 0.2, 3.0):
+        assert np.allclose(smoothed(noise, places, length), noise @ smoothing(places, length).T, rtol=0, atol=1e-6)
+    few = places[::4]
+    assert np.array_equal(smoothed(noise[:, ::4], few, 0.2), noise[:, ::4] @ smoothing(few, 0.2).T)
+
+
+def test_profiles_at_many_places_take_memory_in_proportion() -> None:
+    peaks = []
+    for count in (4000, 8000):
+        tracemalloc.start()
+        smoothed(np.zeros((1, count)), np.linspace(0.0, 1.0, count), 0.2)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 2.3 * peaks[0]
 
 
 # Solvers that begin with them

@@ -12,6 +12,7 @@ from __future__ import annotations
 from problems.derived import remembered
 
 from ..base import NLP
+from ..nlp.dense import too_dense
 from ..numerics.batched import work
 
 PASSES, FIXED, ENTRY = 6, 70_000, 22
@@ -41,4 +42,5 @@ def newton_step(nlp: NLP) -> float:
 @remembered
 def _iteration(nlp: NLP) -> float:
     """Instructions that take as long as an iteration of IPOPT."""
-    return PASSES * work(nlp.functions) + FIXED + ENTRY * nlp.functions.jac_sparsity(1, 0).nnz()
+    entries = nlp.dense if too_dense(nlp) else nlp.functions.jac_sparsity(1, 0).nnz()
+    return PASSES * work(nlp.functions) + FIXED + ENTRY * entries

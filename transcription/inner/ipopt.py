@@ -11,6 +11,7 @@ from problems.checks import check_choice, check_count, check_positive
 from problems.derived import remembered
 
 from ..base import FAILED, NLP, TIMEOUT
+from ..nlp.dense import refuse_dense
 from ..nlp.scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
 from ..nlp.watched import Watched
 from ..numerics.batched import expanded
@@ -101,6 +102,7 @@ class Ipopt(InnerSolver):
 @remembered
 def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[Watched, np.ndarray, np.ndarray]:
     """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
+    refuse_dense(nlp)
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
     z = origin(nlp) + y * nlp.scale
     _, g = nlp.functions(z)

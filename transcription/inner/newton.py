@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
+from ..nlp.dense import refuse_dense
 from ..phases.reduced import Propagated, Reduced
 from ..stopping import stopping
 from .base import InnerResult, InnerSolver, scored, started
@@ -132,6 +133,7 @@ class _Going:
     """
 
     def __init__(self, nlp: NLP, start: np.ndarray, exact: int) -> None:
+        refuse_dense(nlp)
         (k, _), free, self.reduced = start.shape, nlp.free, nlp.reduced
         self.exact = np.full(k, exact)
         self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)

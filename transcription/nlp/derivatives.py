@@ -10,6 +10,7 @@ import numpy as np
 from problems.derived import remembered
 
 from ..base import NLP
+from .dense import refuse_dense
 from .from_points import FromPoints, kind_of
 from .pieces import jacobian, weighted_hessian
 
@@ -19,7 +20,8 @@ DENSE = 0.25
 
 @remembered
 def gradients(nlp: NLP) -> ca.Function:
-    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g)."""
+    """z -> (dF/dz (m, n), dg/dz (r, n), both sparse, F, g). Raises ValueError where they are too many; see `refuse_dense`."""
+    refuse_dense(nlp)
     whole = _from_points(nlp)
     if whole is not None:
         z, values = whole.z, whole.gradients()
@@ -32,7 +34,8 @@ def gradients(nlp: NLP) -> ca.Function:
 
 @remembered
 def objective_gradients(nlp: NLP) -> ca.Function:
-    """z -> dF/dz (m, n), sparse."""
+    """z -> dF/dz (m, n), sparse. Raises as `gradients`."""
+    refuse_dense(nlp)
     whole = _from_points(nlp)
     if whole is not None:
         return ca.Function("slopes", [whole.z], whole.gradients()[:1], ["z"], ["dF"])
@@ -42,7 +45,8 @@ def objective_gradients(nlp: NLP) -> ca.Function:
 
 @remembered
 def hessian(nlp: NLP) -> ca.Function:
-    """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse."""
+    """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse. Raises as `gradients`."""
+    refuse_dense(nlp)
     whole, sizes = _from_points(nlp), {"of_F": len(nlp.problem.goals), "of_g": len(nlp.g_scale)}
     if whole is not None:
         z, (of_F, of_g) = whole.z, (ca.MX.sym(name, size) for name, size in sizes.items())

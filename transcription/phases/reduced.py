@@ -12,7 +12,7 @@ from problems.derived import Deriving, remembered
 
 from ..numerics.batched import Batched
 from .layout import Layout
-from .writer import PhaseWriter
+from .writer import PhaseWriter, filled
 
 SOLVED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
@@ -157,8 +157,7 @@ class Reduced(Deriving):
         of it."""
         z = ca.MX.sym("z", len(self._layout.variables))
         extended, S, finals = self._layout.extended_symbol(z), ca.MX(self._layout.seeds()), []
-        for writer in self._writers:
-            extended = writer.fill(extended)
+        extended = filled(self._writers, extended)
         known = extended[: z.numel() + self._layout.hidden]
         for writer in self._writers:
             S, final = writer.sensitivity(extended, S, interior=interior)

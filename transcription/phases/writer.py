@@ -98,7 +98,7 @@ class Rows:
     @property
     def count(self) -> int:
         """Number of rows."""
-        return sum(expression.numel() for expression in self.expressions)
+        return len(self.labels)
 
     @property
     def propagated_equations(self) -> ca.MX:
@@ -146,6 +146,8 @@ class PhaseWriter(ABC):
         Whether fast propagation, and `sensitivity`, can be written in C.
     wide : bool
         Whether `propagate` takes several extended vectors side by side.
+    dense : int
+        About how many derivatives of rows by controls there are because states depend on all controls before them; 0 where it is sparse.
     affine : bool
         Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
         variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
@@ -155,6 +157,7 @@ class PhaseWriter(ABC):
     magnitudes: np.ndarray = np.empty(0, dtype=int)
     compilable: bool = False
     wide: bool = False
+    dense: int = 0
     affine: bool = False
 
     def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
@@ -241,7 +244,7 @@ class PhaseWriter(ABC):
         """(extended vector, multipliers of dynamics, path constraints on states alone, others, peaks and integrals) -> derivatives by the
         extended vector of the Lagrangian's terms of dynamics and integrals, of those that make costates jump, and of the others."""
         extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
-        written = self.write(self.fill(extended), rows)
+        written = self.write(filled([self], extended), rows)
         g, name = ca.vertcat(*rows.expressions), self.phase.name
         paths = ca.vertcat(ca.MX(0, 1), *(g[one] for one in rows.samples.get((name, "path"), ())))
         columns = [g[rows.dynamics[name]], paths, paths, ca.vec(written.peak_samples.T), written.integrals]
@@ -250,9 +253,10 @@ class PhaseWriter(ABC):
         outputs = [ca.densify(ca.gradient(one, extended)) for one in (dynamics + integrals, of_states + of_peaks, mixed)]
         return ca.Function("by_states", [extended, *symbols], outputs)
 
-    def fill(self, extended: ca.MX) -> ca.MX:
-        """An extended symbol with the phase's hidden quantities, which follow from the variables. Most methods have none."""
-        return extended
+    def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
+        """Slots (k,) of the phase's hidden quantities, and these as a column (k, 1): they follow from the variables. Most methods have
+        none."""
+        return np.empty(0, dtype=int), ca.MX(0, 1)
 
     def guess(self, extended: np.ndarray) -> None:
         """Fill in the states of extended vectors (k, ...), whose times, parameters, controls and initial states are set."""
@@ -385,3 +389,11 @@ class PhaseWriter(ABC):
             control_variables=phase.controls,
             path_limits=phase.paths,
         )
+
+
+def filled(writers: Sequence[PhaseWriter], extended: ca.MX) -> ca.MX:
+    """An extended symbol with the hidden quantities of these phases, of all at once: a copy of the whole vector for each phase would cost
+    the square of their number."""
+    hidden = [writer.hidden(extended) for writer in writers]
+    slots = np.concatenate([own for own, _ in hidden])
+    return writers[0].layout.replaced(extended, slots, ca.vertcat(*(values for _, values in hidden))) if len(slots) else extended

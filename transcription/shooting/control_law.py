@@ -16,6 +16,9 @@ from ..phases.mesh import PhaseMesh
 
 FORGOTTEN = 1e-17
 """Weights of a spline by its values, where the largest are 1, that count as 0: they fall by a factor of 3.7 a node."""
+PIECES, NEAR = 512, 48
+"""Pieces of a spline whose weights are found at a time, and nodes on both sides that have a part in them: over so many, also of pieces
+that grow by a tenth each, they fall below 1e-20."""
 DEGREES = {"constant": 0, "linear": 1, "spline": 3}
 
 
@@ -85,10 +88,10 @@ class ControlLaw:
                 values = ca.horzcat(U[:, :-1], *right)
         else:
             values = unwrapped_law(U, phase) if self.kind == "spline" else U
-        return values @ ca.DM(csc_matrix(self._on_steps(steps)))
+        return values @ ca.DM(self._on_steps(steps))
 
-    def _on_steps(self, steps: np.ndarray) -> np.ndarray:
-        """Matrix (descriptions, N (degree + 1)) of the coefficients on the steps by what describes the pieces between two nodes."""
+    def _on_steps(self, steps: np.ndarray) -> csc_matrix:
+        """Sparse matrix (descriptions, N (degree + 1)) of the coefficients on the steps by what describes the pieces between two nodes."""
         nodes, last = self.pieces.places, self.pieces.elements
         middle = 0.5 * (steps[1:] + steps[:-1])
         piece = np.clip(np.searchsorted(nodes, middle * last, side="right") - 1, 0, last - 1)[:, None]
@@ -97,9 +100,37 @@ class ControlLaw:
         place = np.where(np.abs(place - np.round(place)) < 1e-12, np.round(place), place).ravel()
         piece = np.repeat(piece, self.degree + 1)
         if self.kind == "spline":
-            from scipy.interpolate import CubicSpline  # slow to import
+            return _spline_weights(nodes, piece, place)
+        column = np.arange(len(piece))
+        if self.kind == "constant":
+            return _without_zeros(np.ones(len(piece)), piece, column, (last, len(piece)))
+        # The values at the left ends of all pieces, then those at their right ends.
+        both = np.concatenate([piece, last + piece])
+        return _without_zeros(np.concatenate([1.0 - place, place]), both, np.tile(column, 2), (2 * last, len(piece)))
 
-            weights = CubicSpline(nodes, np.eye(last + 1))(nodes[piece] + place * np.diff(nodes)[piece]).T
-            return np.where(np.abs(weights) < FORGOTTEN, 0.0, weights)
-        inside = np.arange(last)[:, None] == piece
-        return inside * 1.0 if self.kind == "constant" else np.vstack([inside * (1.0 - place), inside * place])
+
+def _spline_weights(nodes: np.ndarray, piece: np.ndarray, place: np.ndarray) -> csc_matrix:
+    """Sparse matrix (nodes, k) of the values of a spline by those at its nodes, in these pieces and at these places in them, (k,).
+
+    Some pieces at a time, by the spline through the nodes near them: what a node farther away has a part in is less than `FORGOTTEN`.
+    """
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    last, found = len(nodes) - 1, []
+    for first in np.unique(piece // PIECES) * PIECES:
+        column = np.flatnonzero((piece >= first) & (piece < first + PIECES))
+        low, high = max(first - NEAR, 0), min(first + PIECES + NEAR, last) + 1
+        spline = CubicSpline(nodes[low:high], np.eye(high - low))
+        own = piece[column]
+        weights = spline(nodes[own] + place[column] * np.diff(nodes)[own])
+        row, node = np.nonzero(np.abs(weights) >= FORGOTTEN)
+        found.append((weights[row, node], low + node, column[row]))
+    weights, node, column = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return _without_zeros(weights, node, column, (len(nodes), len(piece)))
+
+
+def _without_zeros(values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> csc_matrix:
+    """A sparse matrix of entries (k,), without those that are 0."""
+    matrix = csc_matrix((values, (row, column)), shape=shape)
+    matrix.eliminate_zeros()
+    return matrix

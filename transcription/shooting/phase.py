@@ -57,11 +57,14 @@ class ShootingPhase(PhaseWriter):
         self.magnitudes = self.S.ravel()
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
         self.compilable, self.wide = step.symbolic, step.plain
+        # In each shot, a row depends on half of the shot's controls in the mean.
+        rows = self.R.size + self.Y.size + self.W.size
+        self.dense = rows * int((self.U >= 0).sum()) // (2 * len(self.R))
 
-    def fill(self, extended: ca.MX) -> ca.MX:
-        """See `PhaseWriter.fill`."""
+    def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
+        """See `PhaseWriter.hidden`."""
         states, integrals, samples = zip(*self._propagated_shots(extended), strict=True)
-        return self._filled(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
+        return self._hidden(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         """See `PhaseWriter.write`."""
@@ -252,7 +255,7 @@ class ShootingPhase(PhaseWriter):
         nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
         extended = ca.MX.sym("extended", self.layout.total)
         y, samples = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
-        filled = self._filled(extended, y[:nx, :], y[nx:, -1], samples)
+        filled = self.layout.replaced(extended, *self._hidden(extended, y[:nx, :], y[nx:, -1], samples))
         filled = self.layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
         return ca.Function("after", [extended, y, samples], [ca.densify(filled), ca.densify(y[:nx, -1])])
 
@@ -260,14 +263,14 @@ class ShootingPhase(PhaseWriter):
         """States, and integrals of nothing yet."""
         return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1))
 
-    def _filled(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> ca.MX:
-        """With the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples."""
+    def _hidden(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> tuple[np.ndarray, ca.MX]:
+        """Slots and values of the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples."""
         if len(self.W) > samples.shape[1]:
             samples = ca.horzcat(samples, self.step.at_end(states[:, -1], *self._inputs(extended, self.mesh.steps - 1)))
         at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
         right = states[:, (self._shots[1:] - 1).tolist()]
         slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W)])
-        return self.layout.replaced(extended, slots, ca.veccat(right, at_nodes, q, samples))
+        return slots, ca.veccat(right, at_nodes, q, samples)
 
     @cached_property
     def _outer(self) -> list[ca.DM]:

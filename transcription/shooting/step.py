@@ -152,7 +152,8 @@ class StepMesh:
     def of(cls, intervals: int, steps: int, nodes: np.ndarray) -> StepMesh:
         """`intervals` equal ones of `steps` equal steps each; a step across one of the nodes of controls becomes two."""
         whole = np.linspace(0.0, 1.0, intervals * steps + 1)
-        apart = np.abs(nodes[:, None] - whole).min(axis=1) > SAME
+        right = np.clip(np.searchsorted(whole, nodes), 1, len(whole) - 1)
+        apart = np.minimum(np.abs(nodes - whole[right - 1]), np.abs(nodes - whole[right])) > SAME
         places = np.sort(np.concatenate([whole, nodes[apart]]))
         return cls(places, np.searchsorted(places, whole[::steps]))
 

@@ -1,0 +1,59 @@
+"""Series in processes of their own, whose peak memory is then theirs: `python -m runs.bench.scale.child REPEATS NAME:SIZES ...`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from multiprocessing import get_context
+
+from .series import SERIES, Series
+
+ENOUGH = 2.0
+"""Seconds of work at one size after which it is not repeated."""
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Measure series one after the other, each in a process that begins as a copy of this one: so that modules are imported once."""
+    repeats, *tasks = arguments
+    os.environ["MACS_COMPILE"] = "0"  # a compiler is a process of its own, and its time not proportional to anything
+    for task in tasks:
+        name, sizes = task.split(":")
+        series = next(one for one in SERIES if one.name == name)
+        process = get_context("fork").Process(target=measure, args=(series, [int(size) for size in sizes.split(",")], int(repeats)))
+        process.start()
+        process.join()
+
+
+def measure(series: Series, sizes: Sequence[int], repeats: int) -> None:
+    """Print a line of JSON for each size: name, size, least CPU seconds of the repetitions, and MB of the peak so far above the
+    beginning."""
+    begin = peak()
+    series.prepare(sizes[0])()  # whatever is made once is made
+    for size in sizes:
+        print(json.dumps([series.name, size, least(series, size, repeats), peak() - begin]), flush=True)
+
+
+def least(series: Series, size: int, repeats: int) -> float:
+    """The least CPU seconds of so many repetitions, fewer where they take long."""
+    times: list[float] = []
+    while len(times) < repeats and sum(times) < ENOUGH:
+        work = series.prepare(size)
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return min(times)
+
+
+def peak() -> float:
+    """Peak memory of this process, MB."""
+    import resource  # not on every system
+
+    # Kilobytes, but bytes on a Mac.
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,116 @@
+"""Exponents of growth: slopes of time and memory over size, both on logarithmic scales, beside the asked limit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from macs.io.console import Steps
+
+from ..apart import lines_apart
+from ..measured import Column, Row, short, table
+from .series import SERIES, Series
+
+ASKED = 1.1
+"""Largest exponent of what grows linearly: caches, and what is measured, make some hundredths of it."""
+FITTED = 3
+"""The fit is over so many of the largest sizes, where the cost that does not grow matters least."""
+LEAST = 16.0
+"""MB by which a process must have grown between the first and the last of these sizes, for its memory to say anything: blocks of the
+allocator are that large."""
+KINDS = {"time": "seconds", "memory": "MB"}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Rounds; repetitions of each size in a round, of which the quickest counts; whether sizes are the quick ones, and all series of a
+    round have one step of progress; seconds that a step may take."""
+
+    rounds: int = 3
+    repeats: int = 3
+    quick: bool = False
+    limit: float = 600.0
+
+
+FULL, QUICK = Effort(), Effort(rounds=1, repeats=2, quick=True)
+
+
+def bench_scale(rows: list[Row], effort: Effort, series: Sequence[Series] = SERIES) -> None:
+    """Measure all series; `rows` are filled as values become known, also if `Stopped` ends it."""
+    sizes = {one.name: one.quick if effort.quick else one.sizes for one in series}
+    found = {one.name: Row(one.name, one.unit) for one in series if sizes[one.name]}
+    apart = [list(found)] if effort.quick else [[name] for name in found]
+    with Steps("growth", effort.rounds * len(apart)) as steps:
+        for i in range(effort.rounds):
+            for names in apart:
+                steps.begin(f"{', '.join(names) if len(names) < 2 else f'{len(names)} series'}, round {i + 1}")
+                tasks = [f"{name}:{','.join(map(str, sizes[name]))}" for name in names]
+                lines, _ = lines_apart("runs.bench.scale.child", (str(effort.repeats), *tasks), effort.limit, steps)
+                measured = [json.loads(line) for line in lines]
+                for name in names:
+                    add_round(found[name], sizes[name], [one[1:] for one in measured if one[0] == name])
+                rows += [found[name] for name in names if i == 0]
+
+
+def add_round(row: Row, sizes: Sequence[int], measured: Sequence[tuple[int, float, float]]) -> None:
+    """Add what one process measured, (size, seconds, MB) each, and the exponents; a series that did not reach its last size has none, and
+    is noted as unfinished."""
+    for size, seconds, memory in measured:
+        row.add(**{f"seconds at {size}": seconds, f"MB at {size}": memory})
+    if len(measured) < len(sizes):
+        row.add(unfinished=1.0)
+        return
+    count, seconds, memory = np.array(measured, dtype=float)[-FITTED:].T
+    row.add(size=count[-1], seconds=seconds[-1], MB=memory[-1], time=exponent(count, seconds))
+    if memory[-1] - memory[0] >= LEAST:
+        row.add(memory=exponent(count, memory))
+
+
+def exponent(sizes: np.ndarray, costs: np.ndarray) -> float:
+    """The power of the size with which costs grow: the slope of a straight line through their logarithms; costs of 0 count as tiny."""
+    return float(np.polyfit(np.log(sizes), np.log(np.maximum(costs, 1e-6)), 1)[0])
+
+
+def superlinear(rows: Sequence[Row]) -> list[str]:
+    """What grows faster than asked by the median of its exponents, or did not come to its end, as texts."""
+    found = [
+        f"{row.case}: {kind} grows with the power {row.of(kind):.2f} of {row.who}"
+        for row in rows
+        for kind in KINDS
+        if row.values.get(kind) and row.of(kind) > ASKED
+    ]
+    return found + [f"{row.case}: it did not come to its end" for row in rows if row.values.get("unfinished")]
+
+
+def report(rows: Sequence[Row]) -> str:
+    """The measured values, and the limit."""
+    wrong = superlinear(rows)
+    times = [row.of("time") for row in rows if row.values.get("time")]
+    lines = [
+        "GROWTH: CPU time and peak memory of work at sizes that double, each series in a process of its own. Exponents: the power of the",
+        f"size with which they grow over the {FITTED} largest sizes, 1 for a cost that is proportional to it. Memory: above that of a",
+        f"process with all modules; no exponent where it grows by less than {LEAST:g} MB.",
+        "",
+        table(rows, COLUMNS),
+        "",
+        f"exponents: asked at most {ASKED:g} each, by the median, measured {max(times, default=np.nan):.2f} of time at most, "
+        f"{'MISSED' if wrong else 'met'}",
+        *wrong,
+    ]
+    return "\n".join(lines)
+
+
+def _exponents(kind: str) -> Column:
+    return (kind, "exponent", lambda row: row.spread(kind))
+
+
+COLUMNS: tuple[Column, ...] = (
+    ("largest", "size", lambda row: f"{row.of('size'):g}" if row.values.get("size") else "-"),
+    ("seconds", "there", lambda row: short(row.of("seconds"))),
+    ("MB", "there", lambda row: short(row.of("MB"))),
+    _exponents("time"),
+    _exponents("memory"),
+)

@@ -1,0 +1,87 @@
+"""The benchmark of growth on tiny sizes: what it measures, fits and says; never how fast anything is."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from runs.bench import command, scale
+from runs.bench.measured import Row
+from runs.bench.scale import child, growth
+from runs.bench.scale.chains import masses, ride
+from runs.bench.scale.series import SERIES
+from runs.cli import main
+
+TINY = {"elements": (4, 8, 12), "nodes": (4, 8, 12), "intervals": (4, 8, 12), "phases": (1, 2, 3), "masses": (1, 2, 3)}
+TINY |= {"points": (2, 3, 4), "agents": (4, 6, 8)}
+FEW = tuple(replace(one, quick=TINY[one.unit]) for one in SERIES if one.name in ("set-up, single shooting", "front loaded"))
+
+
+@pytest.mark.parametrize("one", SERIES, ids=lambda one: one.name)
+def test_every_series_does_its_work(one):
+    for size in TINY[one.unit][:2]:
+        assert one.prepare(size)() is not None
+    for sizes in (one.sizes, one.quick):
+        assert not sizes or (len(sizes) >= growth.FITTED and (np.diff(sizes) > 0).all())
+
+
+def test_problems_have_the_size_that_is_asked_for():
+    assert len(ride(3).compile().phases) == 3 and len(ride(3).compile().links) == 2
+    assert len(masses(3).compile().phases[0].states) == 6
+
+
+def test_exponents_are_those_of_powers():
+    sizes = np.array([10.0, 20.0, 40.0])
+    assert growth.exponent(sizes, 3.0 * sizes**1.5) == pytest.approx(1.5)
+    row = Row("work", "things")
+    growth.add_round(row, (5, 10, 20, 40), [(5, 9.0, 0.0), (10, 1.0, 20.0), (20, 2.0, 40.0), (40, 4.0, 80.0)])
+    assert row.of("time") == pytest.approx(1.0) and row.of("memory") == pytest.approx(1.0) and row.of("size") == 40
+    growth.add_round(row, (10, 20, 40), [(10, 1.0, 1.0), (20, 2.0, 2.0), (40, 4.0, 4.0)])
+    assert len(row.values["time"]) == 2 and len(row.values["memory"]) == 1  # a few MB say nothing
+
+
+def test_what_grows_faster_than_asked_is_named():
+    rows = [
+        Row("first", "nodes", {"time": [1.0, 1.05, 3.0], "memory": [1.0]}),
+        Row("second", "nodes", {"time": [1.9, 2.0, 2.1]}),
+        Row("third", "points", {"time": [0.5], "memory": [1.5]}),
+        Row("fourth", "points", {"unfinished": [1.0]}),
+    ]
+    assert scale.superlinear(rows[:1]) == []
+    assert scale.superlinear(rows) == [
+        "second: time grows with the power 2.00 of nodes",
+        "third: memory grows with the power 1.50 of points",
+        "fourth: it did not come to its end",
+    ]
+    text = scale.report(rows)
+    assert "exponents: asked at most 1.1 each, by the median, measured 2.00 of time at most, MISSED" in text
+    assert all(len(line) <= 140 for line in text.splitlines())
+    assert "at most, met" in scale.report(rows[:1])
+
+
+def test_a_repetition_is_prepared_anew():
+    made = []
+
+    def prepare(size):
+        made.append(size)
+        return lambda: None
+
+    one = replace(SERIES[0], prepare=prepare)
+    assert child.least(one, 7, 3) >= 0.0 and made == [7, 7, 7]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
+def test_the_command(capsys, monkeypatch):
+    """Tiny sizes in processes of their own; the exit code follows the exponents."""
+    monkeypatch.setattr(growth.bench_scale, "__defaults__", (FEW,))
+    monkeypatch.setattr(growth, "ASKED", 99.0)
+    assert main(["bench", "scale", "--quick"]) == 0
+    text = capsys.readouterr().out
+    assert "GROWTH" in text and all(one.name in text for one in FEW) and "met" in text
+    monkeypatch.setattr(growth, "ASKED", -99.0)
+    assert main(["bench", "scale", "--quick"]) == 1
+    assert "MISSED" in capsys.readouterr().out
+    assert "scale" in command.KINDS
