@@ -13,6 +13,7 @@ from problems import load
 from problems.cases import goddard, orbit_rise
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
+from runs.measures.indicators import hypervolume_at
 from runs.measures.references import foreign
 from transcription import DFET
 
@@ -185,3 +186,16 @@ def test_fronts_against_what_the_user_sees(case):
     assert hypervolume(front, truth) == hypervolume(front.F, truth * signs)
     assert hypervolume(truth, front) == hypervolume(truth * signs, front.F)
     assert igd(front, front) < 1e-12 and additive_epsilon(front, front) == 0.0
+
+
+def test_a_volume_up_to_a_point_is_in_the_units_and_senses_of_the_user():
+    """From (1 s, 9 m/s) to (5 s, 2 m/s) it is 4 by 7, and from (3 s, 10 m/s) 2 by 1 more; a point that failed adds nothing."""
+    goals = (Objective("time", "s"), Objective("speed", "m/s", "maximize"))
+    status = ["converged", "converged", "infeasible"]
+    front = Front(F=[[1.0, -9.0], [3.0, -10.0], [0.0, -20.0]], decision=[[]] * 3, violation=[0, 0, 1], status=status, goals=goals)
+    assert hypervolume_at(front, (5.0, 2.0)) == pytest.approx(4 * 7 + 2 * 1)
+    assert hypervolume_at(front, (5.0, 9.5)) == pytest.approx(2 * 0.5)
+    assert hypervolume_at(front, (0.5, 2.0)) == hypervolume_at(front[front.status == "infeasible"], (5.0, 2.0)) == 0.0
+    assert hypervolume_at(np.array([[1.0, -9.0], [3.0, -10.0]]), (5.0, -2.0)) == pytest.approx(30.0)
+    with pytest.raises(ValueError, match="point: 3 numbers, but 2 objectives: time, speed"):
+        hypervolume_at(front, (1.0, 2.0, 3.0))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.pareto.archive import Archive, insert, pair_energies, spread
+from macs.pareto.archive import Archive, insert, least_violated, pair_energies, reach, spread
 from macs.pareto.dominance import dominates, extremes
 
 
@@ -137,3 +137,43 @@ def test_surfaces_are_covered_evenly_with_their_ends(m, least):
         assert all((corner == archive.F).all(axis=1).any() for corner in np.eye(m))
     assert spreads[None] > least
     assert spreads[None] > spreads[2.0]
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.0, 1), (1.0, 1), (1.001, 0), (5.0, 0), (100.0, 0)])
+def test_what_violates_by_more_than_the_tolerance_stays_out(share, count):
+    assert len(offer(empty(2), [[0.0, 0.0]], violation=[share * 1e-6])) == count
+
+
+@pytest.mark.parametrize(("count", "m"), [(2, 2), (9, 2), (16, 3)])
+@pytest.mark.parametrize("exponent", [2.0, 3.0, 8.0])
+def test_the_energy_of_a_pair_is_the_inverse_power_of_its_distance_in_spacings(exponent, count, m):
+    """Of two opposite corners of a box, in its ranges, the square of the distance is m; with `count` points the spacing is that of as many
+    in a unit of length, or of area."""
+    F = np.array([np.zeros(m), 10.0 ** np.arange(m)])
+    spacing = count ** (-1.0 / (m - 1))
+    energies = pair_energies(F, exponent, count)
+    assert energies[0, 1] == energies[1, 0] == pytest.approx((np.sqrt(m) / spacing) ** -exponent)
+    assert energies[0, 0] == energies[1, 1] == 0.0
+
+
+@pytest.mark.parametrize(("m", "varying", "exponent"), [(2, 2, 2.0), (3, 2, 2.0), (3, 3, 8.0), (5, 4, 8.0)])
+def test_the_exponent_is_two_for_curves_and_eight_for_surfaces_unless_it_is_given(m, varying, exponent):
+    F = np.random.default_rng(0).random((6, m))
+    F[:, varying:] = 1.0
+    assert reach(F, None) == exponent and reach(F, 5.0) == 5.0
+    assert np.array_equal(pair_energies(F), pair_energies(F, exponent))
+
+
+def test_factors_stretch_distances_by_their_geometric_mean():
+    F = quarter_circle(5)
+    plain, stretched = pair_energies(F, 2.0), pair_energies(F, 2.0, factors=np.array([1.0, 4.0, 1.0, 9.0, 1.0]))
+    assert stretched[0, 1] == pytest.approx(plain[0, 1] / 4.0)
+    assert stretched[1, 3] == pytest.approx(plain[1, 3] / 36.0)
+    assert stretched[0, 2] == pytest.approx(plain[0, 2])
+
+
+def test_the_least_violated_point_is_the_first_of_those_that_violate_least():
+    closest = Archive(np.array([[1.0]]), np.array([[5.0, 5.0]]), np.array([0.3]))
+    offered = np.array([[2.0], [3.0], [4.0]]), np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    assert least_violated(closest, *offered, np.array([0.4, 0.2, 0.2])).Z.tolist() == [[3.0]]
+    assert least_violated(closest, *offered, np.array([0.4, 0.3, 0.5])).Z.tolist() == [[1.0]]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.pareto.directions import draw, pool, simplex_lattice, tchebycheff
+from macs.pareto.directions import best_points, draw, pool, simplex_lattice, tchebycheff
 from macs.pareto.ranges import normalised
 
 
@@ -69,3 +69,23 @@ def test_scalarisation_never_prefers_a_dominated_point(m, seed):
     worse = better + rng.random(m)
     for direction in pool(m, 20):
         assert tchebycheff(better, direction, np.zeros(m), np.ones(m)) <= tchebycheff(worse, direction, np.zeros(m), np.ones(m))
+
+
+def test_scalarisation_is_the_largest_weighted_objective_and_no_sum():
+    """From the ideal (1, 10) to the nadir (5, 50) the point (3, 20) is (1/2, 1/4)."""
+    ideal, nadir, F = np.array([1.0, 10.0]), np.array([5.0, 50.0]), np.array([3.0, 20.0])
+    assert tchebycheff(F, np.array([0.6, 0.8]), ideal, nadir) == pytest.approx(0.3)
+    assert tchebycheff(F, np.array([0.2, 0.8]), ideal, nadir) == pytest.approx(0.2)
+    assert tchebycheff(F, np.array([0.0, 1.0]), ideal, nadir) == pytest.approx(0.25)
+    assert tchebycheff(-F, np.array([0.0, 1.0]), -F, nadir) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("rows", [0.1, 0.5, 0.9])
+def test_every_point_of_a_front_that_bends_away_from_the_ideal_is_best_for_a_direction(rows):
+    """Of a quarter of a circle about the nadir; a weighted sum is least at one of its ends, whatever the weights."""
+    angle = np.linspace(0.0, np.pi / 2, 101)
+    F = np.column_stack([np.sin(angle), np.cos(angle)])
+    row = int(100 * rows)
+    weights = 1.0 / F[row]
+    assert best_points(F, weights[None] / np.linalg.norm(weights), np.zeros(2), np.ones(2)).tolist() == [row]
+    assert (F @ weights).argmin() in (0, 100)
