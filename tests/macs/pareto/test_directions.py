@@ -188,6 +188,8 @@ def test_too_few_individuals_for_their_directions_are_refused():
 
 
 def test_the_cheapest_pairs_come_first():
-    rows, columns = pair_up(np.array([[3, 2, 9], [1, 4, 9]]))
+    costs = np.array([[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]])
+    rows, columns = pair_up(costs)
     assert rows.tolist() == [1, 0] and columns.tolist() == [0, 1]
+    assert costs.tolist() == [[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]]
     assert [len(side) for side in pair_up(np.empty((0, 3)))] == [0, 0]
