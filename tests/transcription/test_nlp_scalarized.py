@@ -254,9 +254,9 @@ def test_what_is_solved_to_ipopt_but_not_feasible_says_by_how_much(monkeypatch: 
 
 
 def well() -> Problem:
-    """One objective, least where a parameter is 1."""
+    """One objective, least where a parameter is 1, and 3 there."""
     problem = still("well")
-    problem.minimize("depth", (problem.parameter("p", bounds=(-2, 2)) - 1.0) ** 2)
+    problem.minimize("depth", 3.0 + (problem.parameter("p", bounds=(-2, 2)) - 1.0) ** 2)
     return problem
 
 
@@ -273,7 +273,7 @@ def test_what_misses_by_more_than_the_tolerance_has_not_converged(monkeypatch: p
     else:
         monkeypatch.setattr(NLP, "evaluate", lambda self, Z: (evaluate(self, Z)[0], np.full(len(Z), share * 1e-4)))
     solved = solve(nlp, [0.0] * m, [1.0] * m, start, tolerance=1e-4)
-    assert solved.status == status and close(solved, [0.0] if m == 1 else [0.25, 0.25], 1e-3)
+    assert solved.status == status and close(solved, [3.0] if m == 1 else [0.25, 0.25], 1e-3)
 
 
 def test_without_persistence_the_first_way_has_all_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
