@@ -189,3 +189,72 @@ def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():
     for own, other in ((1.0, 16.0), (16.0, 1.0)):
         energies = pair_energies(F, own)
         assert energies[np.ix_(kept[own], kept[own])].sum() < energies[np.ix_(kept[other], kept[other])].sum()
+
+
+@given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
+def test_no_exchange_of_one_point_for_another_lowers_the_energy(m, seed, begun):
+    """But for the best of each objective, which stay."""
+    F = np.abs(np.random.default_rng(seed).normal(size=(15, m))) + 0.01
+    F = 1.0 - F / np.linalg.norm(F, axis=1, keepdims=True)
+    members = np.isin(np.arange(15), np.random.default_rng(seed).choice(15, 6, replace=False)) if begun else None
+    chosen = spread(F, 6, members)
+    assert chosen.sum() == 6
+    energies = pair_energies(F, None, 6)
+    least = energies[np.ix_(chosen, chosen)].sum()
+    for out in np.setdiff1d(np.flatnonzero(chosen), extremes(F)):
+        for new in np.flatnonzero(~chosen):
+            other = chosen.copy()
+            other[[out, new]] = False, True
+            assert energies[np.ix_(other, other)].sum() >= least * (1.0 - 1e-8)
+
+
+class Wish:
+    """Wants some rows, and distances as they are, or those of the first half of a front twice as small as they are."""
+
+    def __init__(self, rows, dense=False):
+        self.rows, self.dense = np.array(rows), dense
+
+    def factors(self, front, points):
+        return np.where(self.dense & (points[:, 0] < 0.5), 2.0, 1.0)
+
+    def anchors(self, front):
+        return self.rows
+
+
+def test_what_a_guide_wants_kept_takes_half_of_the_places_at_most_and_the_most_important_first():
+    F = quarter_circle(101)
+    for limit, kept in ((3, 0), (4, 0), (5, 1), (6, 1), (8, 2), (10, 3)):
+        chosen, wish = spread(F, limit, guide=Wish([51, 52, 53, 54])), np.array([51, 52, 53, 54])
+        assert chosen.sum() == limit and chosen[[0, 100]].all()
+        assert chosen[wish[:kept]].all() and not chosen[wish[kept:]].any()
+
+
+def test_points_are_denser_where_a_guide_stretches_distances():
+    """Of many points, twice as dense where distances count twice."""
+    F = np.column_stack([np.linspace(0.0, 1.0, 401), np.linspace(1.0, 0.0, 401)])
+    for guide, share in ((None, 0.5), (Wish([], dense=True), 2.0 / 3.0)):
+        chosen = insert(empty(2), np.zeros((401, 1)), F, np.zeros(401), limit=61, tolerance=0.0, exponent=8.0, guide=guide)
+        assert (chosen.F[:, 0] < 0.5).mean() == pytest.approx(share, abs=0.05)
+
+
+def test_columns_stay_together():
+    one = Archive(np.array([[1.0], [2.0]]), np.array([[1.0, 4.0], [2.0, 3.0]]), np.array([0.0, 1e-7]))
+    two = Archive(np.array([[3.0], [4.0]]), np.array([[5.0, 0.0], [6.0, -1.0]]), np.array([0.5, 0.25]))
+    assert [column.tolist() for column in one.columns()] == [[[1.0], [2.0]], [[1.0, 4.0], [2.0, 3.0]], [0.0, 1e-7]]
+    both = one.joined(two)
+    assert both.Z.ravel().tolist() == [1, 2, 3, 4] and both.F[2].tolist() == [5, 0] and both.violation.tolist() == [0, 1e-7, 0.5, 0.25]
+    some = both.take(np.array([3, 0]))
+    assert some.Z.ravel().tolist() == [4, 1] and some.F.tolist() == [[6, -1], [1, 4]] and some.violation.tolist() == [0.25, 0]
+    same = Archive.of(both, np.array([False, True, False, True]))
+    assert same.Z.ravel().tolist() == [2, 4] and same.F.tolist() == [[2, 3], [6, -1]] and same.violation.tolist() == [1e-7, 0.25]
+    mixed = one.replaced(np.array([False, True]), two)
+    assert mixed.Z.ravel().tolist() == [1, 4] and mixed.F.tolist() == [[1, 4], [6, -1]] and mixed.violation.tolist() == [0, 0.25]
+    assert repr(one) == "<Archive: 2 points, 2 objectives>" and repr(one.take(np.array([0]))) == "<Archive: 1 point, 2 objectives>"
+
+
+def test_points_of_the_old_archive_come_first_and_all_columns_of_the_new_ones_are_kept():
+    archive = offer(empty(2), [[1.0, 2.0]])
+    found = insert(archive, np.array([[7.0], [8.0]]), np.array([[0.0, 3.0], [2.0, 2.5]]), np.array([1e-7, 0.0]), limit=10, tolerance=1e-6)
+    assert found.F.tolist() == [[1.0, 2.0], [0.0, 3.0]] and found.Z.ravel().tolist() == [0.0, 7.0]
+    assert found.violation.tolist() == [0.0, 1e-7]
+    assert insert(found, np.zeros((1, 1)), np.zeros((1, 2)), np.ones(1), limit=10, tolerance=1e-6) is found
