@@ -5,7 +5,6 @@ import dataclasses
 import casadi as ca
 import numpy as np
 import pytest
-from carts import cart, points, slowed
 from synthetic_fronts import black_box, flights
 
 import problems
@@ -109,34 +108,3 @@ def test_objectives_that_only_the_mesh_believes_are_found():
 def test_statuses_and_violations_that_were_touched_up_are_found(front):
     assert all(not check.ok for check in verify(altered(front, violation=np.full(len(front), 123.0)), tolerance=1))
     assert all(not check.ok for check in verify(altered(front, status=np.full(len(front), "failed")), tolerance=1))
-
-
-# What a simulation finds, against what is known
-
-
-@pytest.mark.parametrize(("share", "good"), [(1.05, True), (0.95, False), (0.4, False)])
-def test_what_only_the_simulated_trajectory_violates_is_found(share, good):
-    """The control, of values 2, 2 and 1 at Gauss points, is a parabola that exceeds its bound 2 between the first two by an eighth: by a
-    sixteenth of the span of the bounds. The point is feasible at its nodes, and its states and objectives are exact."""
-    front = points(cart(), [2.0, 2.0, 1.0], method=DFET(1, 2))
-    (check,) = verify(front, tolerance=share * 0.0625)
-    assert check.simulated == pytest.approx(0.0625, rel=1e-2) and check.violation < 1e-9 and max(check.defect, check.missed) < 1e-9
-    said = f"simulated, it violates 'bounds of run.u' by {check.simulated:.1e} (tolerance {share * 0.0625:.1e})"
-    assert check.ok is good and check.reasons == (() if good else (said,))
-
-
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
-def test_an_end_that_a_simulation_does_not_reach_is_compared_to_the_tolerance(share, good):
-    """After two seconds x, within [-5, 5], is 0.01 times `share` less than stored."""
-    (check,) = verify(slowed(points(cart(of_objective=1e6), [1.0] * 4), 5e-3 * share), tolerance=1e-3)
-    assert check.defect == pytest.approx(1e-3 * share, rel=1e-6)
-    assert check.reasons[0].startswith("stored controls of phase 'run' differ from the decision vector by")
-    assert check.reasons[1:] == (() if good else (f"simulated, it ends {check.defect:.1e} away (tolerance 1.0e-03)",))
-
-
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
-def test_objectives_that_a_simulation_does_not_give_are_compared_to_the_tolerance(share, good):
-    """The effort 2 u^2, of scale 0.1, changes by 40 times a small part of u: so the end, of span 10, by far less than the tolerance."""
-    (check,) = verify(slowed(points(cart(of_objective=0.1), [1.0] * 4), share * 1e-3 / 40.0), tolerance=1e-3)
-    assert check.missed == pytest.approx(1e-3 * share, rel=1e-4) and check.defect < 2e-5
-    assert check.reasons[1:] == (() if good else (f"simulated, its objectives differ by {check.missed:.1e} (tolerance 1.0e-03)",))
