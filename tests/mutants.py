@@ -79,7 +79,7 @@ def main(wanted: list[str]) -> int:
     shares = {}
     for name, one in modules.items():
         spared = [*settings["spared"], *(item["line"] for item in one.get("equivalent", []))]
-        shares[name] = judged(name, one["tests"], spared)
+        shares[name] = judged(name, [*one["tests"], *(f"--deselect={test}" for test in settings["slow"])], spared)
     few = [name for name, share in shares.items() if share < settings["least"]]
     print(f"below {settings['least']} %: {', '.join(few)}" if few else f"{settings['least']} % or more of the mutants of each are noticed")
     return int(bool(few))
