@@ -66,11 +66,11 @@ def test_the_integrator_is_the_one_that_is_asked_for(monkeypatch):
 # What is stored, against what follows from the decision vector
 
 
-def sled() -> Problem:
+def sled(t0: float = 0.0) -> Problem:
     """x' = u for two seconds beside a wall, with a parameter of scale 3."""
     problem = Problem("sled")
     mass = problem.parameter("mass", bounds=(1.0, 4.0))
-    run = problem.phase("run", t0=0.0, tf=2.0)
+    run = problem.phase("run", t0=t0, tf=t0 + 2.0)
     x = run.state("x", bounds=(-5, 5), initial=0)
     u = run.control("u", bounds=(0, 2))
     run.dynamics(x=u)
@@ -124,6 +124,12 @@ def test_every_part_of_a_trajectory_is_compared_in_its_scale(part):
     assert check.reasons == (f"stored {name} differ from the decision vector by {check.mismatch:.1e}",)
     assert verify(changed(front, part, 0.9e-9 * scale), tolerance=1.0)[0].ok
     assert not verify(changed(front, part, 1.1e-9 * scale), tolerance=1.0)[0].ok
+
+
+@pytest.mark.parametrize(("t0", "scale"), [(-1.0, 2.0), (-5.0, 5.0), (3.0, 5.0), (0.0, 2.0)])
+def test_times_are_compared_in_the_largest_of_them_and_of_the_duration(t0, scale):
+    front = points(sled(t0), [1.0] * 4 + [2.0])
+    assert verify(changed(front, "time", 1e-6), tolerance=1.0)[0].mismatch == pytest.approx(1e-6 / scale, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["state", "control"])
@@ -225,6 +231,25 @@ def test_rows_may_violate_what_is_asked_for_or_what_the_search_allowed(share, go
     (check,) = verify(rows([[1.5 + share * allowed * scale, 0.0]]), tolerance=tolerance)
     assert check.violation == check.simulated == pytest.approx(share * allowed, rel=1e-6)
     assert check.reasons == (() if good else (f"violates 'wall' by {check.violation:.1e} (tolerance {allowed:.0e})",))
+
+
+def test_what_is_as_large_as_the_tolerance_passes():
+    """Objectives of 0, 1/4 and 1, of which the middle one is off by an eighth; and a row half of a scale behind the wall."""
+    front = rows([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
+    off = front.replace(F=front.F + np.array([[0.0, 0.0], [0.125, 0.0], [0.0, 0.0]]))
+    assert [check.missed for check in verify(off, tolerance=0.125)] == [0.0, 0.125, 0.0]
+    assert all(check.ok for check in verify(off, tolerance=0.125)) and verify(off, tolerance=0.125)[1].objectives == 0.125
+    scale = (parabolas().compile().limits or ())[0].scale
+    behind = rows([[1.5 + 0.5 * scale, 0.0]])
+    assert verify(behind, tolerance=0.5)[0].violation == 0.5 and verify(behind, tolerance=0.5)[0].ok
+    assert verify(rows([[1.0, 0.0]], violation=[0.5]), tolerance=0.5)[0].ok
+
+
+def test_the_constraint_that_is_violated_most_is_named():
+    """x may be 1.5, and y 1 of a span of 2."""
+    beyond = rows([[1.6, 1.5], [3.5, 1.1]], violation=[0.25, 2.0])
+    first, second = (check.reasons[-1] for check in verify(beyond, tolerance=1e-3))
+    assert first.startswith("violates 'bounds of y' by 2.5e-01") and second.startswith("violates 'wall' by")
 
 
 @pytest.mark.parametrize(("stored", "good"), [(0.9e-3, True), (1.1e-3, False)])
