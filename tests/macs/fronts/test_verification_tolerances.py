@@ -266,3 +266,16 @@ def test_rows_that_fail_or_are_of_another_problem_are_told():
     others = [Variable("a", -4.0, 4.0), Variable("y", -1.0, 1.0)]
     with pytest.raises(ValueError, match="the variables of the front are not x, y"):
         verify(rows([[1.0, 0.0]], variables=others), tolerance=1e-3)
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+def test_rows_are_marked_by_the_same_tolerances(share, good):
+    """Of the range 1 of the first objective, or of the scale of the wall; the note says so."""
+    front, scale = rows([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), (parabolas().compile().limits or ())[0].scale
+    found = front.replace(F=front.F + np.array([[0.0, 0.0], [1e-3 * share, 0.0], [0.0, 0.0]])).verify(1e-3)
+    assert found.verified.tolist() == [True, good, True] and found.stats["verify"] == 1e-3
+    assert found.notes == ("", "" if good else f"evaluated again, its 'near' differs by {1e-3 * share:.2g} m2", "")
+    behind = rows([[1.5 + 1e-3 * share * scale, 0.0]]).verify(1e-3)
+    assert behind.verified.tolist() == [good]
+    assert behind.notes == ("" if good else f"evaluated again, it violates 'wall' by {1e-3 * share:.1e}",)
+    assert behind.simulated_violation == pytest.approx(1e-3 * share)
