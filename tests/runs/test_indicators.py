@@ -13,6 +13,7 @@ from problems import load
 from problems.cases import goddard, orbit_rise
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
+from runs.measures.indicators import hypervolume_at
 from runs.measures.references import foreign
 from transcription import DFET
 
@@ -185,3 +186,61 @@ def test_fronts_against_what_the_user_sees(case):
     assert hypervolume(front, truth) == hypervolume(front.F, truth * signs)
     assert hypervolume(truth, front) == hypervolume(truth * signs, front.F)
     assert igd(front, front) < 1e-12 and additive_epsilon(front, front) == 0.0
+
+
+def test_a_volume_up_to_a_point_is_in_the_units_and_senses_of_the_user():
+    """From (1 s, 9 m/s) to (5 s, 2 m/s) it is 4 by 7, and from (3 s, 10 m/s) 2 by 1 more; a point that failed adds nothing."""
+    goals = (Objective("time", "s"), Objective("speed", "m/s", "maximize"))
+    status = ["converged", "converged", "infeasible"]
+    front = Front(F=[[1.0, -9.0], [3.0, -10.0], [0.0, -20.0]], decision=[[]] * 3, violation=[0, 0, 1], status=status, goals=goals)
+    assert hypervolume_at(front, (5.0, 2.0)) == pytest.approx(4 * 7 + 2 * 1)
+    assert hypervolume_at(front, (5.0, 9.5)) == pytest.approx(2 * 0.5)
+    assert hypervolume_at(front, (0.5, 2.0)) == hypervolume_at(front[front.status == "infeasible"], (5.0, 2.0)) == 0.0
+    assert hypervolume_at(np.array([[1.0, -9.0], [3.0, -10.0]]), (5.0, -2.0)) == pytest.approx(30.0)
+    with pytest.raises(ValueError, match="point: 3 numbers, but 2 objectives: time, speed"):
+        hypervolume_at(front, (1.0, 2.0, 3.0))
+
+
+def test_with_curve_false_a_reference_is_its_points_alone_however_dense():
+    """Of a straight front with a spacing of 1/100, and of one whose second half has a hundred times as many points."""
+    between, end = np.array([[0.005, 0.995]]), np.array([[0.0, 1.0]])
+    assert gd(between, LINE) == pytest.approx(0.0, abs=1e-14)
+    assert gd(between, LINE, curve=False) == pytest.approx(0.005 * np.sqrt(2))
+    share = np.concatenate([np.linspace(0.0, 0.49, 50), np.linspace(0.5, 1.0, 5000)])
+    uneven = np.column_stack([share, 1.0 - share])
+    # From its end a point at a share t is t sqrt(2) away, and worse by t in one objective.
+    for indicator, unit in ((igd, np.sqrt(2)), (igd_plus, 1.0)):
+        assert indicator(end, uneven) == pytest.approx(0.5 * unit, rel=1e-3)
+        assert indicator(end, uneven, curve=False) == pytest.approx(share.mean() * unit)
+
+
+def test_each_point_has_its_own_distance_from_a_curve():
+    assert gd(np.array([[0.31, 0.71], [0.53, 0.53]]), LINE) == pytest.approx(0.02 * np.sqrt(2))
+
+
+def test_pieces_of_a_reference_count_by_their_lengths():
+    """From 0 to 0.3, and from 0.8 to 1 with many more points: the mean of t is 0.15 on the first, 0.9 on the second."""
+    share = np.concatenate([np.linspace(0.0, 0.3, 31), np.linspace(0.8, 1.0, 1001)])
+    reference = np.column_stack([share, 1.0 - share])
+    assert igd(np.array([[0.0, 1.0]]), reference) == pytest.approx((0.15 * 0.3 + 0.9 * 0.2) / 0.5 * np.sqrt(2), rel=2e-3)
+
+
+def test_two_points_that_are_near_are_a_curve():
+    pairs = np.array([[0.0, 1.0], [0.01, 0.99], [0.99, 0.01], [1.0, 0.0]])
+    assert gd(np.array([[0.005, 0.995]]), pairs) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_a_reference_of_one_point_has_the_unit_one():
+    assert gd(np.array([[2.0, 3.0]]), np.array([[1.0, 1.0]])) == pytest.approx(np.sqrt(5.0))
+    assert hypervolume(np.array([[1.5, 1.5]]), np.array([[1.0, 1.0]])) == pytest.approx(0.6**2)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_array_beside_a_front_is_in_the_senses_of_the_user():
+    """The reference is from (0, 1) to (1, 3), of which the second objective is maximised."""
+    goals = (Objective("cost"), Objective("gain", sense="maximize"))
+    truth = foreign(np.array([[0.0, 1.0], [1.0, 3.0]]), goals)
+    assert gd(np.array([[0.5, 1.0]]), truth) == pytest.approx(0.5)
+    assert hypervolume(np.array([[0.0, 3.0]]), truth) == pytest.approx(1.1 * 1.1)
+    none = np.empty((0, 2))
+    assert np.isnan(gd(none, truth)) and igd(none, truth) == np.inf and hypervolume(none, truth) == 0.0

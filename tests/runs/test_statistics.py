@@ -33,9 +33,18 @@ def test_failed_runs_are_counted_and_last():
     assert none.failures == 2 and np.isnan(none.mean) and np.isnan(none.variance) and none.median == none.best == INF
     one = summarise([7.0])
     assert one.mean == one.median == one.best == 7.0 and np.isnan(one.variance)
+    assert np.isnan(summarise([7.0, NAN]).variance)
     for nonsense in ([], [[1.0]]):
-        with pytest.raises(ValueError, match="at least one number"):
+        with pytest.raises(ValueError, match=r"^the sample must be a list of at least one number"):
             summarise(nonsense)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_quantile_is_infinite_as_soon_as_a_failed_run_has_a_share_in_it():
+    """Half of the way between the second and the third of four, both of which failed; and nothing is said of means of nothing."""
+    s = summarise([NAN, 1.0, INF, NAN])
+    assert (s.lower, s.median, s.upper, s.best, s.worst) == (INF, INF, INF, 1.0, INF)
+    assert (s.mean, summarise([NAN, NAN]).count) == (1.0, 2)
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30))
@@ -49,8 +58,9 @@ def test_holm_by_hand():
     # Sorted 0.01, 0.02, 0.03, 0.04 times 4, 3, 2, 1: 0.04, 0.06, 0.06, 0.04, of which the last may not fall below those before.
     assert holm([0.04, 0.01, 0.03, 0.02]).tolist() == pytest.approx([0.06, 0.04, 0.06, 0.06])
     assert holm([0.5, 0.9]).tolist() == [1.0, 1.0] and holm([0.03]).tolist() == [0.03] and holm([]).tolist() == []
-    with pytest.raises(ValueError, match="between 0 and 1"):
-        holm([0.1, NAN])
+    for nonsense in (NAN, -0.01, 1.01):
+        with pytest.raises(ValueError, match="between 0 and 1"):
+            holm([0.1, nonsense])
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=12))
@@ -104,7 +114,11 @@ def test_pairs_as_scipy_has_them():
 def test_pairs_by_hand():
     # Of the 20 ways to rank three among six, one is this apart, and one the other way round.
     (c,) = pairwise({"a": [1.0, 2.0, 3.0], "b": [4.0, 5.0, 6.0]})
-    assert c.p == pytest.approx(0.1) and c.a12 == 1.0 and c.effect == "large" and "cannot be below 0.1" in c.note
+    assert c.p == pytest.approx(0.1) and c.a12 == 1.0 and c.effect == "large" and c.note == "Too few runs: p cannot be below 0.1."
+    # Of 40 places for a single run two are at the ends: p may be 0.05, and is not called impossible; of 39 it may not.
+    many = np.arange(39.0)
+    assert pairwise({"a": [50.0], "b": many})[0].note == ""
+    assert pairwise({"a": [50.0], "b": many[1:]})[0].note == "Too few runs: p cannot be below 0.051."
 
 
 def test_samples_that_are_alike_do_not_differ():
@@ -113,7 +127,7 @@ def test_samples_that_are_alike_do_not_differ():
     for data in (same, failed):
         assert all(c.p == c.p_holm == 1.0 and c.a12 == 0.5 and c.effect == "negligible" for c in pairwise(data))
         result = overall(data)
-        assert result.p == 1.0 and len(set(result.ranks.values())) == 1
+        assert result.p == 1.0 and result.statistic == 0.0 and len(set(result.ranks.values())) == 1
     assert pairwise({"a": [1.0], "b": [2.0]})[0].p == 1.0
 
 
@@ -145,5 +159,8 @@ def test_what_cannot_be_compared():
         pairwise({"a": [1.0]})
     with pytest.raises(ValueError, match="at least 2 solvers; there are none"):
         overall({})
+    for a, b, name in (([], [1.0], "first"), ([1.0], [], "second")):
+        with pytest.raises(ValueError, match=rf"^the {name} sample must be"):
+            a12(a, b)
     with pytest.raises(ValueError, match="sample of 'b' must be"):
         pairwise({"a": [1.0], "b": []})

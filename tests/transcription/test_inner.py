@@ -340,3 +340,17 @@ def test_a_users_own_inner_solver_is_as_good_as_ours():
     assert len(front) > 0 and front.violation.max() <= 1e-6
     assert front.stats["evaluations"] <= 120 and "Bisection" in front.stats["inner"]
     assert front[0].simulate().max_defect < 1e-9
+
+
+@pytest.mark.parametrize("inner", ["propagate", "none"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+@pytest.mark.parametrize(("share", "status"), [(0.9, "converged"), (1.1, "infeasible"), (4.5, "infeasible")])
+def test_what_misses_by_more_than_the_tolerance_has_not_converged(inner, tolerance, share, status):
+    """x' = u from 0 to 1 in 2: with u = (1 + d) / 2 the end is missed by d, of which the span of the bounds of x is the scale."""
+    level = inner_solver(inner)
+    nlp = DFET(2, 1).transcribe(hop())
+    controls = np.full((1, len(nlp.free)), 0.5 * (1.0 + 20.0 * share * tolerance))
+    whole = nlp.propagate(nlp.guessed(controls))
+    program = level.program(nlp)
+    found = level.solve(program, whole[:, program.free], whole, tolerance=tolerance)
+    assert found.violation[0] == pytest.approx(share * tolerance, rel=1e-6) and found.status.tolist() == [status]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from smooth_problems import compass, corners, nlp_of, shuttle, slide, two_wells, vector, with_peak
+from smooth_problems import compass, corners, nlp_of, shuttle, slide, still, two_wells, vector, with_peak
 
 from problems import Problem, load
 from problems.cases.goddard import reference
@@ -252,6 +252,29 @@ def test_what_is_solved_to_ipopt_but_not_feasible_says_by_how_much(monkeypatch: 
     monkeypatch.setattr(scalarized._Task, "excess", lambda *_: 8.9e-4)
     solved = solve(nlp_of(two_wells()), [0, 0.36], [1, 0])
     assert solved.status == "infeasible" and solved.message == "it ended where limits are exceeded by 8.9e-04 of their scales"
+
+
+def well() -> Problem:
+    """One objective, least where a parameter is 1, and 3 there."""
+    problem = still("well")
+    problem.minimize("depth", 3.0 + (problem.parameter("p", bounds=(-2, 2)) - 1.0) ** 2)
+    return problem
+
+
+@pytest.mark.parametrize("make", [well, two_wells])
+@pytest.mark.parametrize("what", ["violation", "excess"])
+@pytest.mark.parametrize(("share", "status"), [(0.9, "converged"), (1.1, "infeasible"), (4.5, "infeasible")])
+def test_what_misses_by_more_than_the_tolerance_has_not_converged(monkeypatch: pytest.MonkeyPatch, make, what, share, status) -> None:
+    """IPOPT itself misses by far less than the tolerance: here, what it reaches is said to miss by about that."""
+    nlp, evaluate = nlp_of(make()), NLP.evaluate
+    m = len(nlp.problem.goals)
+    start = vector(nlp, p=0.2, q=0.1)
+    if what == "excess":
+        monkeypatch.setattr(scalarized._Task, "excess", lambda *_: share * 1e-4)
+    else:
+        monkeypatch.setattr(NLP, "evaluate", lambda self, Z: (evaluate(self, Z)[0], np.full(len(Z), share * 1e-4)))
+    solved = solve(nlp, [0.0] * m, [1.0] * m, start, tolerance=1e-4)
+    assert solved.status == status and close(solved, [3.0] if m == 1 else [0.25, 0.25], 1e-3)
 
 
 def test_without_persistence_the_first_way_has_all_iterations(monkeypatch: pytest.MonkeyPatch) -> None:

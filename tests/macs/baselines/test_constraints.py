@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.baselines.constraints import by_objectives, excess, feasible_first, objective, penalty, presented
+from macs.baselines.constraints import by_objectives, degree, excess, feasible_first, objective, penalty, presented
 from macs.pareto.dominance import constrained_dominates, dominates
 
 VALUES = st.floats(-1e9, 1e9).map(lambda value: round(value, 3))
@@ -36,3 +37,18 @@ def test_the_three_ways_by_hand():
     assert penalty(F, cv, 10.0)[1][:3].tolist() == [0, 0, 0]
     assert objective(F, cv)[0][:3].tolist() == [[1, 2, 0], [3, 4, 0], [5, 6, 0.5]]
     assert objective(F, cv)[1][:3].tolist() == [0, 0, 0]
+
+
+def test_what_failed_is_violated_infinitely_whichever_of_its_numbers_is_missing():
+    F = np.array([[1.0, 2.0], [np.nan, 2.0], [1.0, 2.0], [1.0, 2.0], [np.inf, 2.0]])
+    violation = np.array([0.5, 0.5, np.nan, np.inf, 0.0])
+    assert excess(F, violation, 1e-6).tolist() == [0.5, np.inf, np.inf, np.inf, np.inf]
+    assert excess(F, violation, 1e-6, np.full(5, 3.0)).tolist() == [3.0, np.inf, np.inf, np.inf, np.inf]
+
+
+def test_a_constraint_that_is_no_number_is_violated_infinitely():
+    violation = np.array([1.0, 1.0, 1.0, np.inf])
+    for name in ("sum", "log"):
+        found = degree(name, violation, lambda: np.array([[np.nan, 0.0], [np.inf, 0.0], [1.0, 1.0], [1.0, 1.0]]), 1e-6)
+        assert found[[0, 1, 3]].tolist() == [np.inf] * 3 and found[2] == pytest.approx(2.0 if name == "sum" else 2.0 * np.log(2.0))
+    assert degree("sum", violation[:1], lambda: np.array([[1e-6, 2e-6]]), 1e-6).tolist() == [2e-6]

@@ -9,14 +9,21 @@ from synthetic_fronts import black_box, flights
 
 import problems
 from macs import MACS, Front
+from macs.fronts.builders import vectors_points
 from macs.fronts.verification import verify
 from problems import Problem
 from transcription import DFET, parse
+from transcription.inner import Projection
 
 
 @pytest.fixture(scope="module")
 def front() -> Front:
-    return MACS(agents=4, archive=4, mesh="fixed").solve(problems.load("goddard"), parse("dfet:4x6"), evaluations=60, seed=1)
+    """Feasible ascents nearest to random controls."""
+    nlp = parse("dfet:4x6").transcribe(problems.load("goddard"))
+    controls = nlp.lower[nlp.free] + np.random.default_rng(0).random((4, len(nlp.free))) * nlp.span[nlp.free]
+    found = Projection().solve(nlp, controls)
+    assert (found.status == "converged").all()
+    return Front.of(vectors_points(nlp, found.z, {"name": "by hand"}, {"tolerance": 1e-6}, optimality=[None] * 4))
 
 
 def altered(front: Front, **changes) -> Front:

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.pareto.archive import Archive, insert, pair_energies, spread
+from macs.pareto.archive import Archive, insert, least_violated, pair_energies, reach, spread
 from macs.pareto.dominance import dominates, extremes
 
 
@@ -137,3 +137,124 @@ def test_surfaces_are_covered_evenly_with_their_ends(m, least):
         assert all((corner == archive.F).all(axis=1).any() for corner in np.eye(m))
     assert spreads[None] > least
     assert spreads[None] > spreads[2.0]
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.0, 1), (1.0, 1), (1.001, 0), (5.0, 0), (100.0, 0)])
+def test_what_violates_by_more_than_the_tolerance_stays_out(share, count):
+    assert len(offer(empty(2), [[0.0, 0.0]], violation=[share * 1e-6])) == count
+
+
+@pytest.mark.parametrize(("count", "m"), [(2, 2), (9, 2), (16, 3)])
+@pytest.mark.parametrize("exponent", [2.0, 3.0, 8.0])
+def test_the_energy_of_a_pair_is_the_inverse_power_of_its_distance_in_spacings(exponent, count, m):
+    """Of two opposite corners of a box, in its ranges, the square of the distance is m; with `count` points the spacing is that of as many
+    in a unit of length, or of area."""
+    F = np.array([np.zeros(m), 10.0 ** np.arange(m)])
+    spacing = count ** (-1.0 / (m - 1))
+    energies = pair_energies(F, exponent, count)
+    assert energies[0, 1] == energies[1, 0] == pytest.approx((np.sqrt(m) / spacing) ** -exponent)
+    assert energies[0, 0] == energies[1, 1] == 0.0
+
+
+@pytest.mark.parametrize(("m", "varying", "exponent"), [(2, 2, 2.0), (3, 2, 2.0), (3, 3, 8.0), (5, 4, 8.0)])
+def test_the_exponent_is_two_for_curves_and_eight_for_surfaces_unless_it_is_given(m, varying, exponent):
+    F = np.random.default_rng(0).random((6, m))
+    F[:, varying:] = 1.0
+    assert reach(F, None) == exponent and reach(F, 5.0) == 5.0
+    assert np.array_equal(pair_energies(F), pair_energies(F, exponent))
+
+
+def test_factors_stretch_distances_by_their_geometric_mean():
+    F = quarter_circle(5)
+    plain, stretched = pair_energies(F, 2.0), pair_energies(F, 2.0, factors=np.array([1.0, 4.0, 1.0, 9.0, 1.0]))
+    assert stretched[0, 1] == pytest.approx(plain[0, 1] / 4.0)
+    assert stretched[1, 3] == pytest.approx(plain[1, 3] / 36.0)
+    assert stretched[0, 2] == pytest.approx(plain[0, 2])
+
+
+def test_the_least_violated_point_is_the_first_of_those_that_violate_least():
+    closest = Archive(np.array([[1.0]]), np.array([[5.0, 5.0]]), np.array([0.3]))
+    offered = np.array([[2.0], [3.0], [4.0]]), np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    assert least_violated(closest, *offered, np.array([0.4, 0.2, 0.2])).Z.tolist() == [[3.0]]
+    assert least_violated(closest, *offered, np.array([0.4, 0.3, 0.5])).Z.tolist() == [[1.0]]
+
+
+def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():
+    """Than what it keeps for another exponent."""
+    points = np.abs(np.random.default_rng(0).standard_normal((60, 3)))
+    F, kept = 1.0 - points / np.linalg.norm(points, axis=1, keepdims=True), {}
+    for exponent in (1.0, 16.0):
+        found = insert(empty(3), np.arange(60.0)[:, None], F, np.zeros(60), limit=20, tolerance=0.0, exponent=exponent)
+        kept[exponent] = found.Z[:, 0].astype(int)
+    for own, other in ((1.0, 16.0), (16.0, 1.0)):
+        energies = pair_energies(F, own)
+        assert energies[np.ix_(kept[own], kept[own])].sum() < energies[np.ix_(kept[other], kept[other])].sum()
+
+
+@given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
+def test_no_exchange_of_one_point_for_another_lowers_the_energy(m, seed, begun):
+    """But for the best of each objective, which stay."""
+    F = np.abs(np.random.default_rng(seed).normal(size=(15, m))) + 0.01
+    F = 1.0 - F / np.linalg.norm(F, axis=1, keepdims=True)
+    members = np.isin(np.arange(15), np.random.default_rng(seed).choice(15, 6, replace=False)) if begun else None
+    chosen = spread(F, 6, members)
+    assert chosen.sum() == 6
+    energies = pair_energies(F, None, 6)
+    least = energies[np.ix_(chosen, chosen)].sum()
+    for out in np.setdiff1d(np.flatnonzero(chosen), extremes(F)):
+        for new in np.flatnonzero(~chosen):
+            other = chosen.copy()
+            other[[out, new]] = False, True
+            assert energies[np.ix_(other, other)].sum() >= least * (1.0 - 1e-8)
+
+
+class Wish:
+    """Wants some rows, and distances as they are, or those of the first half of a front twice as small as they are."""
+
+    def __init__(self, rows, dense=False):
+        self.rows, self.dense = np.array(rows), dense
+
+    def factors(self, front, points):
+        return np.where(self.dense & (points[:, 0] < 0.5), 2.0, 1.0)
+
+    def anchors(self, front):
+        return self.rows
+
+
+def test_what_a_guide_wants_kept_takes_half_of_the_places_at_most_and_the_most_important_first():
+    F = quarter_circle(101)
+    for limit, kept in ((3, 0), (4, 0), (5, 1), (6, 1), (8, 2), (10, 3)):
+        chosen, wish = spread(F, limit, guide=Wish([51, 52, 53, 54])), np.array([51, 52, 53, 54])
+        assert chosen.sum() == limit and chosen[[0, 100]].all()
+        assert chosen[wish[:kept]].all() and not chosen[wish[kept:]].any()
+
+
+def test_points_are_denser_where_a_guide_stretches_distances():
+    """Of many points, twice as dense where distances count twice."""
+    F = np.column_stack([np.linspace(0.0, 1.0, 401), np.linspace(1.0, 0.0, 401)])
+    for guide, share in ((None, 0.5), (Wish([], dense=True), 2.0 / 3.0)):
+        chosen = insert(empty(2), np.zeros((401, 1)), F, np.zeros(401), limit=61, tolerance=0.0, exponent=8.0, guide=guide)
+        assert (chosen.F[:, 0] < 0.5).mean() == pytest.approx(share, abs=0.05)
+
+
+def test_columns_stay_together():
+    one = Archive(np.array([[1.0], [2.0]]), np.array([[1.0, 4.0], [2.0, 3.0]]), np.array([0.0, 1e-7]))
+    two = Archive(np.array([[3.0], [4.0]]), np.array([[5.0, 0.0], [6.0, -1.0]]), np.array([0.5, 0.25]))
+    assert [column.tolist() for column in one.columns()] == [[[1.0], [2.0]], [[1.0, 4.0], [2.0, 3.0]], [0.0, 1e-7]]
+    both = one.joined(two)
+    assert both.Z.ravel().tolist() == [1, 2, 3, 4] and both.F[2].tolist() == [5, 0] and both.violation.tolist() == [0, 1e-7, 0.5, 0.25]
+    some = both.take(np.array([3, 0]))
+    assert some.Z.ravel().tolist() == [4, 1] and some.F.tolist() == [[6, -1], [1, 4]] and some.violation.tolist() == [0.25, 0]
+    same = Archive.of(both, np.array([False, True, False, True]))
+    assert same.Z.ravel().tolist() == [2, 4] and same.F.tolist() == [[2, 3], [6, -1]] and same.violation.tolist() == [1e-7, 0.25]
+    mixed = one.replaced(np.array([False, True]), two)
+    assert mixed.Z.ravel().tolist() == [1, 4] and mixed.F.tolist() == [[1, 4], [6, -1]] and mixed.violation.tolist() == [0, 0.25]
+    assert repr(one) == "<Archive: 2 points, 2 objectives>" and repr(one.take(np.array([0]))) == "<Archive: 1 point, 2 objectives>"
+
+
+def test_points_of_the_old_archive_come_first_and_all_columns_of_the_new_ones_are_kept():
+    archive = offer(empty(2), [[1.0, 2.0]])
+    found = insert(archive, np.array([[7.0], [8.0]]), np.array([[0.0, 3.0], [2.0, 2.5]]), np.array([1e-7, 0.0]), limit=10, tolerance=1e-6)
+    assert found.F.tolist() == [[1.0, 2.0], [0.0, 3.0]] and found.Z.ravel().tolist() == [0.0, 7.0]
+    assert found.violation.tolist() == [0.0, 1e-7]
+    assert insert(found, np.zeros((1, 1)), np.zeros((1, 2)), np.ones(1), limit=10, tolerance=1e-6) is found

@@ -55,6 +55,9 @@ def test_feasible_beats_infeasible_and_less_violation_beats_more(violation, othe
 def test_feasible_points_are_compared_by_objectives_within_the_tolerance():
     assert constrained_dominates(np.zeros(2), np.float64(1e-7), np.ones(2), np.float64(0.0), tolerance=1e-6)
     assert not constrained_dominates(np.zeros(2), np.float64(1e-5), np.ones(2), np.float64(0.0), tolerance=1e-6)
+    for violation, other in ((1e-6, 0.0), (0.0, 1e-6), (1e-6, 1e-6)):  # as much as the tolerance is feasible
+        assert constrained_dominates(np.zeros(2), np.float64(violation), np.ones(2), np.float64(other), tolerance=1e-6)
+        assert not constrained_dominates(np.ones(2), np.float64(violation), np.zeros(2), np.float64(other), tolerance=1e-6)
 
 
 def test_extremes_break_ties_by_the_other_objectives():

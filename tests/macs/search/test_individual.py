@@ -114,3 +114,14 @@ def test_pairs_are_one_to_one_and_begin_with_the_cheapest(seed, rows, columns):
     first, second = pair_up(costs)
     assert len(first) == len(second) == min(rows, columns) == len(set(first)) == len(set(second))
     assert costs[first[0], second[0]] == costs.min()
+
+
+def test_the_difference_of_two_agents_is_weighted_by_F():
+    """Where the third agent is the point itself only the difference is left; with F = 0 the way leads straight to the third."""
+    cube, X = box(3), np.full((4, 3), 0.5)
+    donors = np.stack([X + np.array([0.2, -0.1, 0.05]), X, X])
+    steps = {F: differential(cube, X, donors, F, 1.0, np.random.default_rng(3)) - X for F in (0.25, 0.5, 1.0)}
+    assert np.allclose(steps[1.0], 2.0 * steps[0.5]) and np.allclose(steps[1.0], 4.0 * steps[0.25])
+    assert np.allclose(steps[1.0] / steps[1.0][:, :1], [1.0, -0.5, 0.25]) and (steps[1.0][:, 0] > 0.0).all()
+    straight = differential(cube, X, np.stack([X + 0.3, X, X + np.array([0.1, 0.2, 0.0])]), 0.0, 1.0, np.random.default_rng(3)) - X
+    assert np.allclose(straight[:, 1], 2.0 * straight[:, 0]) and np.allclose(straight[:, 2], 0.0)

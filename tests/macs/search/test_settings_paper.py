@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from boxes import boxed
 
-from macs.pareto.archive import Archive
+from macs.evaluation.evaluator import Evaluation
+from macs.pareto.archive import Archive, pair_energies
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
 from macs.search.social import assign, social_actions
+from macs.search.state import remember
 from macs.search.trials import Trials
 
 
@@ -118,3 +120,37 @@ def test_without_feasible_points_no_agent_moves():
     before = state.agents.Z.copy()
     assign(state, MACS.paper())
     assert np.array_equal(state.agents.Z, before)
+
+
+@pytest.mark.parametrize(("F", "CR"), [(0.5, 0.25), (1.5, 1.0)])
+def test_differential_evolution_takes_its_weight_and_its_probability_from_the_settings(monkeypatch, F, CR):
+    state, individual, *_ = begun(MACS(F=F, CR=CR), lambda X: np.stack([X[:, 0] ** 2] * 2, axis=1))
+    state.agents.F[:] = 0.0  # nothing is better, so that all come to this action
+    used = []
+
+    def differential(box, X, donors, *weights):
+        used.append(weights[:2])
+        return X
+
+    monkeypatch.setattr("macs.search.individual.differential", differential)
+    individual()
+    assert used == [(F, CR)]
+
+
+def test_the_archive_of_a_search_has_the_exponent_of_the_settings():
+    """Of points of a sphere, those that are kept for each of two exponents are the better ones by its own energy."""
+    points = np.abs(np.random.default_rng(0).standard_normal((60, 3)))
+    F = 1.0 - points / np.linalg.norm(points, axis=1, keepdims=True)
+    box, kept = boxed(lambda X: X, [(0, 1)] * 3), {}
+    for exponent in (1.0, 16.0):
+        settings = MACS(agents=4, archive=20, exponent=exponent)
+        state = settings.begin(box, 10, np.random.default_rng(0))
+        state.archive = Archive(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+        remember(state, [Evaluation(F, F, np.zeros(60), np.full(60, "converged"))], settings, box)
+        kept[exponent] = [int(np.flatnonzero((row == F).all(axis=1))[0]) for row in state.archive.F]
+
+    def energy(rows, exponent):
+        return pair_energies(F, exponent)[np.ix_(rows, rows)].sum()
+
+    assert energy(kept[1.0], 1.0) < energy(kept[16.0], 1.0)
+    assert energy(kept[16.0], 16.0) < energy(kept[1.0], 16.0)

@@ -96,3 +96,15 @@ def test_proposals_that_do_not_move_cost_nothing():
     X = trials.positions()
     assert not trials.evaluate_and_accept(np.arange(10), X, X).any()
     assert (state.evaluations, box.counts.evaluations) == (before, before)
+
+
+def test_a_proposal_that_is_only_as_good_for_the_direction_of_its_agent_is_no_success():
+    """The last coordinate does not matter, so that a step along it gives the same objectives; one that is better by little is a success."""
+    _, state, trials = prepared()
+    rows = np.array([2, 5])
+    state.agents.direction[rows] = 0
+    before = state.agents.Z[rows].copy()
+    X = trials.positions(rows)
+    assert not trials.evaluate_and_accept(rows, X, X + np.array([[0.0, 0.1], [0.0, 0.2]])).any()
+    assert np.array_equal(state.agents.Z[rows], before) and not state.agents.velocity[rows].any() and not len(state.experience)
+    assert trials.evaluate_and_accept(rows, X, X + np.array([[-1e-9, 0.1], [0.0, 0.2]])).tolist() == [True, False]

@@ -1,0 +1,240 @@
+"""The folder of a study, with outcomes written by hand: what counts as finished, what is refused, and what the table says."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_fronts import black_box
+
+from macs import NSGA2
+from macs.fronts.files import to_bytes
+from runs import Study
+from runs.batch.store import Store, locked, reason
+from runs.data.schema import from_record, to_record
+from runs.execution.task import Outcome, samples_path
+
+FRONT = black_box(4)
+
+
+@cache
+def content() -> bytes:
+    """Of the file of the front."""
+    return to_bytes(FRONT)
+
+
+def study(**changes) -> Study:
+    given = {"problems": "welded_beam", "solvers": {"small": NSGA2(population=4), "large": NSGA2(population=8)}, "runs": 2, "seed": 1}
+    return Study("by hand", **given | {"evaluations": 60} | changes)
+
+
+@pytest.fixture
+def store(tmp_path: Path):
+    with Store.claim(tmp_path / "out", study().definition()) as claimed:
+        yield claimed
+
+
+def finish(store: Store, number: int = 0, seconds: float = 2.0, **more) -> None:
+    """Keep the outcome of one of all runs."""
+    outcome = Outcome("finished", front=content(), wall_time=seconds, **more)
+    store.keep(list(store.runs())[number], outcome)
+
+
+def test_a_study_that_has_begun_misses_all_of_its_runs(store):
+    runs = list(store.runs())
+    assert [(run.cell.solver, run.number, run.status) for run in runs] == [
+        ("small", 1, "missing"), ("small", 2, "missing"), ("large", 1, "missing"), ("large", 2, "missing"),
+    ]  # fmt: skip
+    assert len({run.seed for run in runs}) == 4 and all(run.seed == run.cell.seed(1, run.number) for run in runs)
+    assert {run.path.name for run in runs} == {"0001.nc", "0002.nc"} and not any(run.path.exists() for run in runs)
+    first = runs[0]
+    assert (first.finished, first.message, first.traceback, first.wall_time, first.history, first.simulated) == (False, "", "", 0.0, {}, {})
+
+
+def test_what_is_kept_is_found_again(store):
+    history = {"evaluations": [30, 60], "elapsed": [1.0, 2.0], "F": [[[1.0, 2.0]], [[0.5, 1.0]]]}
+    finish(store, 1, seconds=3.5, message="as few as that", history=history)
+    run = list(Store.open(store.path).runs())[1]
+    assert (run.status, run.finished, run.wall_time, run.message, run.history) == ("finished", True, 3.5, "as few as that", history)
+    assert np.array_equal(run.front.F, FRONT.F) and run.path.read_bytes() == content()
+    summary = store.summary()
+    assert (summary.name, summary.path, summary.finished, summary.failed, summary.missing) == ("by hand", store.path, 1, 0, 3)
+    assert [len(runs) for runs in summary.cells.values()] == [2, 2] and len(store.summary(1).runs) == 2 and len(store.summary(3).runs) == 6
+
+
+@pytest.mark.parametrize("status", ["crashed", "timeout", "out of memory", "killed"])
+def test_what_failed_has_its_reason_and_no_front(store, status):
+    store.keep(list(store.runs())[2], Outcome(status, message="no air", traceback="line 1", wall_time=1.0))
+    run = list(store.runs())[2]
+    assert (run.status, run.finished, run.message, run.traceback, run.path.exists()) == (status, False, "no air", "line 1", False)
+    summary = store.summary()
+    assert (summary.finished, summary.failed, summary.missing) == (0, 1, 3)
+    lines = str(summary).split("\n")
+    assert lines[0] == "by hand: 0 of 4 runs finished" and lines[-1] == f"run 1 of {run.cell.name}: {status}: no air"
+
+
+def test_a_finished_run_leaves_neither_checkpoint_nor_samples_and_a_failed_one_both(store):
+    run = next(store.runs())
+    checkpoint = store.checkpoint_path(run)
+    assert checkpoint == run.path.with_suffix(".checkpoint").absolute() and checkpoint.parent.is_dir()
+    for path in (checkpoint, samples_path(checkpoint)):
+        path.write_bytes(b"half")
+    store.keep(run, Outcome("timeout"))
+    assert checkpoint.exists() and samples_path(checkpoint).exists()
+    finish(store)
+    assert not checkpoint.exists() and not samples_path(checkpoint).exists()
+
+
+# What is damaged
+
+
+def test_a_front_that_is_not_what_was_written_is_unreadable_and_kept_beside_a_new_one(store):
+    finish(store)
+    run = next(store.runs())
+    damaged = run.path.read_bytes()[:-1] + b"\0"
+    run.path.write_bytes(damaged)
+    found = next(store.runs())
+    assert found.status == "unreadable" and found.message == f"'{run.path}' is damaged: its content is not what was written"
+    assert (store.summary().finished, store.summary().failed, store.summary().missing) == (0, 1, 3)
+    finish(store)
+    assert next(store.runs()).finished and run.path.with_name("0001.nc.unreadable").read_bytes() == damaged
+
+
+def test_a_front_without_a_record_counts_if_it_can_be_read_and_a_record_without_a_front_is_no_run(store):
+    finish(store)
+    run = next(store.runs())
+    record = run.path.with_suffix(".json")
+    content = record.read_bytes()
+    record.unlink()
+    assert next(store.runs()).finished and next(store.runs()).history == {}
+    run.path.write_bytes(b"nothing of the kind")
+    assert next(store.runs()).status == "unreadable"
+    record.write_bytes(content)
+    run.path.unlink()
+    assert next(store.runs()).status == "missing" and next(store.runs()).message == ""
+    record.write_bytes(content.replace(b"2.0", b"3.0"))
+    found = next(store.runs())
+    assert found.status == "unreadable" and found.message.startswith(f"its record '{record}' is damaged")
+
+
+# Which study a folder has
+
+
+def test_the_same_study_may_come_again_with_more_runs_and_never_has_fewer(tmp_path):
+    for runs, latest in ((3, 3), (1, 3), (3, 3), (4, 4)):
+        with Store.claim(tmp_path, study(runs=runs).definition()) as store:
+            assert store.definition["runs"] == latest and store.path == tmp_path
+        again = Store.open(tmp_path)
+        assert again.definition["runs"] == latest and len(list(again.runs())) == 2 * latest and len(list(again.runs(1))) == 2
+
+
+def test_a_folder_that_is_written_is_refused_to_others(store):
+    with pytest.raises(ValueError, match=r"is being written by another process, [0-9]+ on "), Store.claim(store.path, study().definition()):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"seed": 2}, "seed is 1 there and 2 here"),
+        ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
+        ({"solvers": {"small": NSGA2(population=4)}}, "large' is there but not here"),
+        ({"solvers": {"small": NSGA2(population=6), "large": NSGA2(population=8)}}, "population is 4 there and 6 here"),
+    ],
+)
+def test_another_study_is_refused_with_the_first_difference(store, changes, words):
+    other = study(**changes).definition()
+    with pytest.raises(ValueError) as refused:
+        store.check(other)
+    said = str(refused.value)
+    assert said.startswith(f"'{store.path}' contains another study: ") and words in said and said.endswith("; give another folder")
+    store.check(study(runs=7, time_limit=5.0).definition())  # which decides no number
+
+
+def test_cells_that_are_only_here_are_named(tmp_path):
+    with Store.claim(tmp_path, study(solvers={"small": NSGA2(population=4)}).definition()) as store:
+        pass
+    with pytest.raises(ValueError, match="large' is here but not there"):
+        store.check(study().definition())
+
+
+def test_folders_of_something_else_are_refused(tmp_path):
+    definition = study().definition()
+    for name in (".hidden", "b.txt", "a.txt"):
+        (tmp_path / name).write_text("dear", encoding="utf-8")
+    refused = {
+        tmp_path: f"'{tmp_path}' contains no study but other things, 'a.txt' for one; give a folder of its own",
+        tmp_path / "a.txt": f"'{tmp_path / 'a.txt'}' is not a folder",
+    }
+    for out, words in refused.items():
+        with pytest.raises(ValueError) as caught, Store.claim(out, definition):
+            pass
+        assert str(caught.value) == words
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / ".hidden").touch()
+    with Store.claim(tmp_path / "new", definition):
+        pass
+
+
+def test_what_is_no_study_of_this_version_says_so(store):
+    record = store.path / "study.json"
+    content = from_record(record.read_bytes())
+    for changes, words in (
+        ({"format": "a diary"}, "it is not the record of a study"),
+        ({"version": 1}, "another version of MACS wrote it (format 1, not 2): use that version"),
+    ):
+        record.write_bytes(to_record({**content, **changes}))
+        with pytest.raises(ValueError) as refused:
+            Store.open(store.path)
+        assert str(refused.value) == f"'{record}' cannot be read: {words}"
+    record.unlink()
+    for path, words in (
+        (store.path, f"'{store.path}' contains no study: there is no study.json in it"),
+        (store.path / "nowhere", f"there is no folder '{store.path / 'nowhere'}'"),
+        (store.path / ".lock", f"'{store.path / '.lock'}' is not a folder"),
+    ):
+        with pytest.raises(ValueError) as refused:
+            Store.open(path)
+        assert str(refused.value) == words
+
+
+def test_a_record_is_readable_and_written_once(store):
+    text = (store.path / "study.json").read_text(encoding="utf-8")
+    assert json.loads(text)["content"]["study"]["name"] == "by hand" and text.count("\n") > 20
+
+
+# What the table says
+
+
+def test_the_table_counts_each_cell_and_has_the_median_of_its_times(store):
+    finish(store, 0, seconds=10.0)
+    finish(store, 1, seconds=30.0)
+    store.keep(list(store.runs())[2], Outcome("crashed", message="x" * 300, wall_time=99.0))
+    lines = str(store.summary()).split("\n")
+    small, large = next(line for line in lines if "small" in line).split(), next(line for line in lines if " large" in line).split()
+    assert lines[0] == "by hand: 2 of 4 runs finished"
+    assert small[-5:] == ["2", "0", "0", "20", "s"] and large[-4:] == ["0", "1", "1", "-"]
+    assert len(lines[-1]) == 200 and lines[-1].endswith("xxx") and lines[-2] == ""
+
+
+def test_only_the_first_twenty_reasons_are_listed(tmp_path):
+    with Store.claim(tmp_path, study(runs=11).definition()) as store:
+        for count, last in ((20, "run 9 of"), (22, "and 2 more")):
+            for run in list(store.runs())[:count]:
+                store.keep(run, Outcome("crashed"))
+            lines = str(store.summary()).split("\n")
+            assert sum(line.endswith(": crashed") for line in lines) == 20 and lines[-1].startswith(last)
+
+
+def test_reasons():
+    assert reason("crashed", "ValueError: no such thing") == "crashed: ValueError: no such thing" and reason("killed", "") == "killed"
+
+
+def test_a_lock_is_free_again_after_its_context(tmp_path):
+    taken = f"'{tmp_path}' is being written by another process"
+    for _ in range(2):
+        with locked(tmp_path / ".lock"), pytest.raises(ValueError, match=taken), locked(tmp_path / ".lock"):
+            pass
