@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint mutants clean
+.PHONY: run test test-slow lint mutants fuzz kills clean
 
 run: $(READY)
 	mkdir -p out
@@ -25,6 +25,13 @@ lint: $(READY)
 mutants: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,mutants]"
 	$(BIN)/python tests/mutants.py $(MODULE)
+
+# By hand: random problems and black boxes, about an hour; a hundred kills at random times, some minutes. A minute of each is in `test-slow`.
+fuzz: $(READY)
+	$(BIN)/python tests/fuzz/run_fuzz.py --flights 2000 --boxes 1000
+
+kills: $(READY)
+	$(BIN)/python tests/runs/kills.py --kills 100
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || \

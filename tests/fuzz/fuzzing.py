@@ -74,7 +74,7 @@ def check_flown(plain: Any, point: Any, front: Front) -> None:
         raise FindingError(f"verified, but other code misses {worst} by {misses[worst]:.2e}; its own defect {point.defect:.1e}")
     ranges = np.ptp(front.objectives, axis=0)
     for k, (name, value) in enumerate(objectives.items()):
-        scale = max(float(ranges[k]), abs(point.objectives[name]), 1e-9)
+        scale = max(float(ranges[k]), abs(point.objectives[name]), 1e-6)
         if not abs(value - point.objectives[name]) <= FLIES * scale:
             raise FindingError(f"verified, but other code has '{name}' = {value!r} instead of {point.objectives[name]!r}")
 

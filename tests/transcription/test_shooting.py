@@ -512,7 +512,7 @@ def test_a_lag_that_the_step_cannot_follow_is_refused(scheme, limit):
 
 
 def test_a_lag_that_no_step_in_reach_can_follow_is_refused():
-    with pytest.raises(ValueError, match="too long for 'y', .*; take far shorter ones"):
+    with pytest.raises(ValueError, match=r"too long for 'y', .*; take far shorter ones"):
         SingleShooting(51).transcribe(lag(1e6))
 
 
