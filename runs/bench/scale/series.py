@@ -184,3 +184,5 @@ SERIES = (
     Series("search", "agents", searching, (32, 64, 128, 256), (16, 32, 64)),
     Series("checkpoint", "agents", keeping, (500, 1000, 2000, 4000), (100, 200, 400)),
 )
+"""Up to 40 phases and 256 agents: from about 100 phases on, what each picks from the vector of all shows, and from about 300 agents on, that
+each looks at its distances to all others."""
