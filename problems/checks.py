@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
@@ -144,14 +145,13 @@ def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
     return length
 
 
-def expression(value: Any, known: Iterable[ca.MX], what: str, hint: str) -> ca.MX:
-    """A scalar CasADi expression of known symbols only; plain numbers are expressions too."""
+def expression(value: Any, known: Collection[AbstractSet[int]], what: str, hint: str) -> ca.MX:
+    """A scalar CasADi expression of known symbols only, which are given by sets of their hashes; plain numbers are expressions too."""
     if isinstance(value, ca.MX):
         if value.shape != (1, 1):
             raise ValueError(f"{what} must be a scalar, not of shape {value.shape}")
-        hashes = {symbol.__hash__() for symbol in known}
         for symbol in ca.symvar(value):
-            if symbol.__hash__() not in hashes:
+            if not any(symbol.__hash__() in hashes for hashes in known):
                 raise ValueError(f"{what} uses '{symbol.name()}', {hint}")
         if value.is_constant() and not math.isfinite(float(value)):
             raise ValueError(f"{what} must be finite, not {float(value)}")

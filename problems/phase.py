@@ -48,6 +48,8 @@ class Phase:
         self._duration = length
         self.time, self.t0, self.tf = (ca.MX.sym(f"{word} of {name}") for word in ("time", "t0", "tf"))
         self._symbols: dict[str, ca.MX] = {}
+        self._hashes = {symbol.__hash__() for symbol in (self.time, self.t0, self.tf)}
+        self._quantity_hashes = {symbol.__hash__() for symbol in (self.t0, self.tf)}
         self._states: dict[str, Variable] = {}
         self._controls: dict[str, Variable] = {}
         self._initial: dict[str, tuple[float, float]] = {}
@@ -182,11 +184,12 @@ class Phase:
         return checks.new_name(kind, name, taken, f"phase '{self.name}'")
 
     def _new_symbol(self, name: str) -> ca.MX:
-        self._symbols[name] = ca.MX.sym(name)
-        return self._symbols[name]
+        symbol = self._symbols[name] = ca.MX.sym(name)
+        self._hashes.add(symbol.__hash__())
+        return symbol
 
     def _expression(self, value: Any, what: str) -> ca.MX:
-        own = [self.time, self.t0, self.tf, *self._symbols.values(), *self._parameters.values()]
+        own = self._hashes, {symbol.__hash__() for symbol in self._parameters.values()}
         hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"
         return checks.expression(value, own, what, hint)
 
@@ -194,6 +197,7 @@ class Phase:
         inner = self._expression(expr, f"phase '{self.name}': the expression of {kind}(...)")
         symbol = ca.MX.sym(f"{kind}({inner}) of {self.name}")
         self._quantities[kind].append((symbol, inner))
+        self._quantity_hashes.add(symbol.__hash__())
         return symbol
 
     def _check_rates(self, given: Any) -> None:

@@ -203,7 +203,7 @@ class Problem:
         self._objectives[name] = Objective(name, checks.unit(unit, what), sense, factor), self._expression(expr, what)
 
     def _expression(self, value: Any, what: str) -> ca.MX:
-        known = [*self._symbols.values(), *(symbol for phase in self._phases.values() for symbol in phase._quantity_symbols())]
+        known = {symbol.__hash__() for symbol in self._symbols.values()}, *(phase._quantity_hashes for phase in self._phases.values())
         hint = (
             f"which is not of problem '{self.name}' or varies along a phase: "
             "use initial(...), final(...), integral(...) or peak(...) of a phase, times and parameters"

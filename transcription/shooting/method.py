@@ -154,7 +154,7 @@ class SingleShooting(Shooting):
 
     Made for searches that propagate their candidates (`inner="propagate"`): one pass gives trajectory, objectives and all residuals.
     Bounds of states are imposed at the nodes. Gradient tools work, too, but the cost of derivatives grows with the square of the number of
-    nodes: `MultipleShooting` is made for these.
+    nodes: `MultipleShooting` is made for these. Derivatives that would take more than 2 GB are refused.
 
     Parameters
     ----------

@@ -92,7 +92,8 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) 
     """Eigenvalues (nx,) of the linearised dynamics at each of the points, and in the middle of the bounds of the states if it is wanted;
     and the state that each of them is most about.
 
-    None where there are no derivatives to know them by, or no numbers.
+    None where there are no derivatives to know them by, or no numbers, or where at one of the points nothing decays fast enough to be
+    refused: eigenvalues of many states take long.
     """
     inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
     try:
@@ -109,8 +110,14 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) 
         for level in (0.0, 0.5, 1.0):
             u = [v.lower + level * v.span for v in phase.controls]
             matrix = np.array(jacobian(x, u, t0 + 0.5 * length, s))
-            if not np.isfinite(matrix).all():
+            if not np.isfinite(matrix).all() or _fastest(matrix) * length < FACTOR:
                 return []
             rates, vectors = np.linalg.eig(matrix)
             found.append((rates, [phase.states[i].name for i in np.argmax(np.abs(vectors) / span[:, None], axis=0)]))
     return found
+
+
+def _fastest(matrix: np.ndarray) -> float:
+    """A rate at least as large as that of the fastest decay, from the circles of Gershgorin about the diagonal, by rows and by columns."""
+    rates, sizes = np.diag(matrix), np.abs(matrix)
+    return float(min((sizes.sum(axis=axis) - np.abs(rates) - rates).max() for axis in (0, 1)))

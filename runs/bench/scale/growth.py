@@ -35,7 +35,7 @@ class Effort:
     limit: float = 600.0
 
 
-FULL, QUICK = Effort(), Effort(rounds=1, repeats=2, quick=True)
+FULL, QUICK = Effort(), Effort(rounds=1, repeats=3, quick=True)
 
 
 def bench_scale(rows: list[Row], effort: Effort, series: Sequence[Series] = SERIES) -> None:
@@ -90,7 +90,7 @@ def report(rows: Sequence[Row]) -> str:
     wrong = superlinear(rows)
     times = [row.of("time") for row in rows if row.values.get("time")]
     lines = [
-        "GROWTH: CPU time and peak memory of work at sizes that double, each series in a process of its own. Exponents: the power of the",
+        "GROWTH: CPU time and peak memory of work at increasing sizes, each series in a process of its own. Exponents: the power of the",
         f"size with which they grow over the {FITTED} largest sizes, 1 for a cost that is proportional to it. Memory: above that of a",
         f"process with all modules; no exponent where it grows by less than {LEAST:g} MB.",
         "",

@@ -161,8 +161,8 @@ def in_folder(work: Callable[[Path], Any]) -> Any:
 
 
 DFET, RADAU, SINGLE, MULTIPLE = "dfet:{}x3", "radau:{}x3", "shooting:{}", "multiple-shooting:{}"
-FINE, COARSE = (500, 1000, 2000, 4000), (125, 250, 500)
-LONG, SHORT = (2500, 5000, 10000, 20000), (625, 1250, 2500)
+FINE, COARSE = (500, 1000, 2000, 4000), (75, 300, 1200)
+LONG, SHORT = (2500, 5000, 10000, 20000), (625, 2500, 10000)
 SERIES = (
     Series("set-up, DFET", "elements", setup(DFET), FINE, COARSE),
     Series("set-up, Radau", "elements", setup(RADAU), FINE, ()),
@@ -174,8 +174,8 @@ SERIES = (
     Series("derivatives, DFET", "elements", derivatives(DFET), FINE, COARSE),
     Series("derivatives, Radau", "elements", derivatives(RADAU), FINE, ()),
     Series("derivatives, multiple shooting", "intervals", derivatives(MULTIPLE), FINE, COARSE),
-    Series("phases, DFET", "phases", stated(ride, "dfet:4x3"), (10, 20, 40, 80), (5, 10, 20)),
-    Series("phases, multiple shooting", "phases", stated(ride, "multiple-shooting:10"), (10, 20, 40, 80), ()),
+    Series("phases, DFET", "phases", stated(ride, "dfet:4x3"), (5, 10, 20, 40), (5, 10, 20)),
+    Series("phases, multiple shooting", "phases", stated(ride, "multiple-shooting:10"), (5, 10, 20, 40), ()),
     Series("variables, DFET", "masses", stated(masses, "dfet:10x3"), (25, 50, 100, 200), (10, 20, 40)),
     Series("variables, multiple shooting", "masses", stated(masses, "multiple-shooting:20"), (25, 50, 100, 200), ()),
     Series("front saved", "points", saving, (250, 500, 1000, 2000), (50, 100, 200)),
@@ -184,3 +184,5 @@ SERIES = (
     Series("search", "agents", searching, (32, 64, 128, 256), (16, 32, 64)),
     Series("checkpoint", "agents", keeping, (500, 1000, 2000, 4000), (100, 200, 400)),
 )
+"""Up to 40 phases and 256 agents: from about 100 phases on, what each picks from the vector of all shows, and from about 300 agents on,
+that each looks at its distances to all others."""
