@@ -37,6 +37,7 @@ def prepared(module: str, tests: list[str], spared: list[str]) -> Path:
         "do_not_mutate_patterns": "\n".join(spared),
         "pytest_add_cli_args_test_selection": "\n".join(tests),
         "pytest_add_cli_args": "\n".join(["-p", "no:cacheprovider", "--hypothesis-seed=0"]),
+        "timeout_multiplier": "5",
         "use_git_change_detection": "false",
     }
     with (folder / "setup.cfg").open("w", encoding="utf-8") as file:

@@ -13,7 +13,7 @@ from synthetic_fronts import black_box
 from macs import NSGA2
 from macs.fronts.files import to_bytes
 from runs import Study
-from runs.batch.store import Store, locked, reason
+from runs.batch.store import Store, _difference, locked, reason
 from runs.data.schema import from_record, to_record
 from runs.execution.task import Outcome, samples_path
 
@@ -70,6 +70,7 @@ def test_what_failed_has_its_reason_and_no_front(store, status):
     store.keep(list(store.runs())[2], Outcome(status, message="no air", traceback="line 1", wall_time=1.0))
     run = list(store.runs())[2]
     assert (run.status, run.finished, run.message, run.traceback, run.path.exists()) == (status, False, "no air", "line 1", False)
+    assert from_record(run.path.with_suffix(".json").read_bytes())["front"] is None
     summary = store.summary()
     assert (summary.finished, summary.failed, summary.missing) == (0, 1, 3)
     lines = str(summary).split("\n")
@@ -104,7 +105,7 @@ def test_a_front_that_is_not_what_was_written_is_unreadable_and_kept_beside_a_ne
 
 
 def test_a_front_without_a_record_counts_if_it_can_be_read_and_a_record_without_a_front_is_no_run(store):
-    finish(store)
+    finish(store, message="few")
     run = next(store.runs())
     record = run.path.with_suffix(".json")
     content = record.read_bytes()
@@ -113,6 +114,7 @@ def test_a_front_without_a_record_counts_if_it_can_be_read_and_a_record_without_
     run.path.write_bytes(b"nothing of the kind")
     assert next(store.runs()).status == "unreadable"
     record.write_bytes(content)
+    assert b"few" in content
     run.path.unlink()
     assert next(store.runs()).status == "missing" and next(store.runs()).message == ""
     record.write_bytes(content.replace(b"2.0", b"3.0"))
@@ -142,7 +144,10 @@ def test_a_folder_that_is_written_is_refused_to_others(store):
         ({"seed": 2}, "seed is 1 there and 2 here"),
         ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
         ({"solvers": {"small": NSGA2(population=4)}}, "large' is there but not here"),
-        ({"solvers": {"small": NSGA2(population=6), "large": NSGA2(population=8)}}, "population is 4 there and 6 here"),
+        (
+            {"solvers": {"small": NSGA2(population=6), "large": NSGA2(population=8)}},
+            "small: details.solver.settings.population is 4 there and 6 here",
+        ),
     ],
 )
 def test_another_study_is_refused_with_the_first_difference(store, changes, words):
@@ -217,6 +222,10 @@ def test_the_table_counts_each_cell_and_has_the_median_of_its_times(store):
     small, large = next(line for line in lines if "small" in line).split(), next(line for line in lines if " large" in line).split()
     assert lines[0] == "by hand: 2 of 4 runs finished"
     assert small[-5:] == ["2", "0", "0", "20", "s"] and large[-4:] == ["0", "1", "1", "-"]
+    assert lines[1] == "" and lines[2].split() == ["problem", "transcription", "solver", "finished", "failed", "missing", "median", "time"]
+    ends = [line.rindex(word) + len(word) for line, word in zip(lines[4:6], ("20 s", "-"), strict=True)]
+    assert lines[2].startswith("problem") and {line[: len("welded_beam")] for line in lines[4:6]} == {"welded_beam"}
+    assert ends == [len(lines[2])] * 2
     assert len(lines[-1]) == 200 and lines[-1].endswith("xxx") and lines[-2] == ""
 
 
@@ -226,7 +235,25 @@ def test_only_the_first_twenty_reasons_are_listed(tmp_path):
             for run in list(store.runs())[:count]:
                 store.keep(run, Outcome("crashed"))
             lines = str(store.summary()).split("\n")
+            large = next(line for line in lines if " large" in line).split()
+            assert large[-4:] == ["0", str(count - 11), str(22 - count), "-"]
             assert sum(line.endswith(": crashed") for line in lines) == 20 and lines[-1].startswith(last)
+
+
+def test_where_nothing_failed_the_table_is_all(store):
+    assert str(store.summary()) == str(store.summary()).rstrip()
+
+
+def test_addresses_are_trusted_only_where_that_is_said(store):
+    assert [next(Store.open(store.path, trust).runs()).trust for trust in (True, False)] == [True, False]
+    assert next(Store.open(store.path).runs()).trust is False
+
+
+def test_the_first_difference_of_two_tables():
+    assert _difference({"a": 1, "b": {"c": [2]}}, {"b": {"c": [2]}, "a": 1}) == ""
+    assert _difference({"a": 1}, {"a": 1, "b": 2}) == "b is null there and 2 here"
+    assert _difference({"a": {"b": {"c": 1}}}, {"a": {"b": {"c": "x"}}}) == 'a.b.c is 1 there and "x" here'
+    assert _difference({"a": {"b": 1}}, {"a": 3}, "cell: ") == 'cell: a is {"b": 1} there and 3 here'
 
 
 def test_reasons():

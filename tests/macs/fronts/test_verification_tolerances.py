@@ -173,6 +173,11 @@ def test_stored_objectives_are_compared_in_their_size_and_at_least_in_one(share,
         assert check.reasons == (() if good else (f"stored objectives differ from recomputed ones by {check.objectives:.1e}",))
 
 
+def test_an_objective_that_is_no_number_is_infinitely_far_off():
+    (check,) = verify(points(cart(), [1.0] * 4).replace(F=[[np.nan, 2.0]]), tolerance=1.0)
+    assert check.objectives == check.missed == np.inf and not check.ok
+
+
 @pytest.mark.parametrize(("stored", "good"), [(0.0, True), (0.9e-6, True), (1.1e-6, False), (np.nan, False)])
 def test_a_stored_violation_is_compared_to_the_tolerance_of_the_search(stored, good):
     (check,) = verify(points(cart(), [1.0] * 4).replace(violation=[stored]), tolerance=1.0)

@@ -156,6 +156,12 @@ def test_the_energy_of_a_pair_is_the_inverse_power_of_its_distance_in_spacings(e
     assert energies[0, 0] == energies[1, 1] == 0.0
 
 
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 8.0])
+def test_the_energy_of_points_that_coincide_is_that_of_a_billion_neighbours(exponent):
+    energies = pair_energies(np.array([[0.0, 1.0], [0.0, 1.0], [1.0, 0.0]]), exponent)
+    assert energies[0, 1] == pytest.approx(1e9) and energies[0, 2] < 1.0
+
+
 @pytest.mark.parametrize(("m", "varying", "exponent"), [(2, 2, 2.0), (3, 2, 2.0), (3, 3, 8.0), (5, 4, 8.0)])
 def test_the_exponent_is_two_for_curves_and_eight_for_surfaces_unless_it_is_given(m, varying, exponent):
     F = np.random.default_rng(0).random((6, m))
@@ -215,9 +221,11 @@ class Wish:
         self.rows, self.dense = np.array(rows), dense
 
     def factors(self, front, points):
+        assert front.shape == (len(front), points.shape[1])
         return np.where(self.dense & (points[:, 0] < 0.5), 2.0, 1.0)
 
     def anchors(self, front):
+        assert front.shape == (len(front), 2)
         return self.rows
 
 
