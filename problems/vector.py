@@ -33,7 +33,7 @@ Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 def real_numbers(values: Any) -> np.ndarray:
     """A copy, as floats, of what a user's function returned. Masked values are NaN: an evaluation that failed.
 
-    Raises TypeError or ValueError for anything but real numbers; a complex number is none, even if its imaginary part is 0.
+    Raises TypeError or ValueError for anything but real numbers; a complex number is none, even if its imaginary part is 0, nor is a date.
     """
     if isinstance(values, np.ma.MaskedArray) or (
         isinstance(values, list | tuple) and any(isinstance(one, np.ma.MaskedArray) for one in values)
@@ -41,8 +41,8 @@ def real_numbers(values: Any) -> np.ndarray:
         values = np.ma.array(values)
         if not np.iscomplexobj(values):
             values = values.astype(float).filled(np.nan)
-    if np.iscomplexobj(np.asarray(values)):
-        raise TypeError("complex numbers")
+    if (kind := np.asarray(values).dtype.kind) in "cmM":
+        raise TypeError("complex numbers" if kind == "c" else "dates or durations")
     return np.array(values, dtype=float)
 
 

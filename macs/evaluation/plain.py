@@ -150,7 +150,7 @@ def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
         if lower >= upper:
             raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
         if not apart(lower, upper):
-            raise ValueError(f"bounds: variable '{name}' has ({lower!r}, {upper!r}), which leave nothing to decide")
+            raise ValueError(f"bounds: variable '{name}' has ({float(lower)!r}, {float(upper)!r}), which leave nothing to decide")
     return names, limits[:, 0].copy(), limits[:, 1].copy()
 
 

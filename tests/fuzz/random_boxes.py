@@ -13,12 +13,14 @@ Function = Callable[[np.ndarray], Any]
 
 @dataclass(frozen=True)
 class Box:
-    """A function of rows (n, d) with its bounds; `honest` returns plain numbers, the same for the same row."""
+    """A function of rows (n, d) with its bounds; an `honest` one returns plain numbers, the same for the same row. Bounds may be so narrow
+    that nothing is left to decide."""
 
     function: Function
     bounds: Any
     honest: bool
     kind: str
+    narrow: bool
 
 
 def random_box(seed: int) -> Box:
@@ -36,12 +38,14 @@ def random_box(seed: int) -> Box:
         return np.cos((X[:, :, None] * weights).sum(axis=1) + shifts) + 0.1 * (np.tanh(X)[:, :, None] * weights**2).sum(axis=1)
 
     limits: Any = {f"v{i}": pair for i, pair in enumerate(bounds)} if rng.random() < 0.3 else bounds
-    return Box(names[kind](plain, rng), limits, honest, kind)
+    narrow = any(high - low <= 1e-12 * max(abs(low), abs(high), 1e-288) for low, high in bounds)
+    return Box(names[kind](plain, rng), limits, honest, kind, narrow)
 
 
 def _bounds(rng: np.random.Generator) -> tuple[float, float]:
-    middle, size = float(rng.choice([0.0, 0.0, 1.0, -1e6, 1e12])), float(10.0 ** rng.integers(-3, 4))
-    if rng.random() < 0.05:
+    middle = float(rng.choice([0.0, 1.0, -1e6, 1e12], p=[0.5, 0.28, 0.2, 0.02]))
+    size = float(10.0 ** rng.integers(-3, 4))
+    if rng.random() < 0.01:
         return middle, float(np.nextafter(middle, np.inf))
     low, high = middle - size, middle + size
     return (low, high) if low < high else (low, float(np.nextafter(low, np.inf)))
