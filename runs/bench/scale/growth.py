@@ -35,7 +35,7 @@ class Effort:
     limit: float = 600.0
 
 
-FULL, QUICK = Effort(), Effort(rounds=1, repeats=3, quick=True)
+FULL, QUICK = Effort(), Effort(rounds=1, repeats=2, quick=True)
 
 
 def bench_scale(rows: list[Row], effort: Effort, series: Sequence[Series] = SERIES) -> None:
