@@ -60,7 +60,7 @@ def judged(module: str, tests: list[str], spared: list[str]) -> float:
     mutmut(folder, "run", "--max-children", os.environ.get("JOBS", "2"))
     found = dict(line.strip().rsplit(": ", 1) for line in mutmut(folder, "results", "--all", "true").splitlines() if ": " in line)
     left = [name for name, status in found.items() if status not in NOTICED]
-    share = 100.0 * (1.0 - len(left) / max(len(found), 1))
+    share = 100.0 * (1.0 - len(left) / len(found)) if found else 0.0
     counts = ", ".join(f"{count} {status}" for status, count in Counter(found.values()).most_common())
     print(f"{share:5.1f} % {module}: {len(found)} mutants, {counts}", flush=True)
     for name in left:
@@ -80,7 +80,11 @@ def main(wanted: list[str]) -> int:
     shares = {}
     for name, one in modules.items():
         spared = [*settings["spared"], *(item["line"] for item in one.get("equivalent", []))]
-        shares[name] = judged(name, [*one["tests"], *(f"--deselect={test}" for test in settings["slow"])], spared)
+        try:
+            shares[name] = judged(name, [*one["tests"], *(f"--deselect={test}" for test in settings["slow"])], spared)
+        except RuntimeError as error:  # the other modules can still be judged
+            print(error, flush=True)
+            shares[name] = 0.0
     few = [name for name, share in shares.items() if share < settings["least"]]
     print(f"below {settings['least']} %: {', '.join(few)}" if few else f"{settings['least']} % or more of the mutants of each are noticed")
     return int(bool(few))

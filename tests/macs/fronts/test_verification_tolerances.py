@@ -195,7 +195,7 @@ def test_what_the_transcription_violates_is_compared_to_the_tolerance_of_the_sea
 
 def test_what_did_not_converge_fails():
     front = points(cart(), [1.0] * 4, [1.5] * 4).replace(status=["converged", "infeasible"])
-    assert [check.reasons for check in verify(front, tolerance=1.0)] == [(), ("its status is 'infeasible'",)]
+    assert [(check.point, check.reasons) for check in verify(front, tolerance=1.0)] == [(0, ()), (1, ("its status is 'infeasible'",))]
 
 
 # Rows of vector problems

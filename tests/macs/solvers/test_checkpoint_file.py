@@ -56,7 +56,8 @@ def same(one: tuple[Any, dict[str, np.ndarray]], two: tuple[Any, dict[str, np.nd
 
 
 def same_array(one: np.ndarray, two: np.ndarray) -> bool:
-    return (one.dtype, one.shape, one.tobytes("A")) == (two.dtype, two.shape, two.tobytes("A"))
+    """In their values row by row, and in the order that they have in memory."""
+    return (one.dtype, one.shape, one.tobytes("C"), one.tobytes("A")) == (two.dtype, two.shape, two.tobytes("C"), two.tobytes("A"))
 
 
 def test_what_is_written_is_read(file) -> None:
