@@ -34,7 +34,7 @@ def saved(front: Front, out: Path) -> tuple[Path | None, str]:
     for folder in _others():
         new = ""
         try:
-            # A folder of its own: in a shared one, nobody else can have put a link there that the front would be written through.
+            # A folder of its own: in a shared one, no other user can have put a link there that the front would be written through.
             new = tempfile.mkdtemp(prefix="macs-", dir=folder)
             front.save(Path(new) / out.name)
             return Path(new) / out.name, trouble
