@@ -224,7 +224,7 @@ def test_what_was_found_is_still_simulated_if_that_is_quick():
     assert found.stats["stopped"] == "interrupted" and len(found) and found.was_simulated.all()
 
 
-def test_ctrl_c_ends_a_simulation_that_nobody_handles_at_once():
+def test_ctrl_c_ends_a_simulation_that_nobody_handles_at_once(endless_integrations):
     front = stiff_front()
     with within(BOUND), pytest.raises(KeyboardInterrupt), ctrl_c(LIMIT):
         front[0].simulate()

@@ -70,7 +70,7 @@ class _Entries:
     def of(cls, part: Any, rows: int | list[int], columns: list[int]) -> _Entries:
         """Those of a part: its first row, or all its rows, and its columns in the large matrix."""
         i, j = (np.array(one, dtype=int) for one in part.sparsity().get_triplet())
-        return cls(rows + i if isinstance(rows, int) else np.array(rows, dtype=int)[i], np.array(columns, dtype=int)[j], part.nz[:])
+        return cls(rows + i if isinstance(rows, int) else np.array(rows, dtype=int)[i], np.array(columns, dtype=int)[j], ca.vec(part.nz[:]))
 
 
 def _joined(parts: list[_Entries], rows: int, columns: int) -> Any:
