@@ -1,0 +1,76 @@
+"""Ranges of objectives: best and worst values by name, in the user's units and senses, and how objectives are normalised by them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from choices import plain_front
+from synthetic_fronts import marked
+
+from macs.decisions import Ranges
+from macs.preferences.ranges import confidence, usable
+from problems.compiled import Objective
+
+GOALS = (Objective("cost"), Objective("speed", "m/s", "maximize"))
+RANGES = Ranges({"cost": 2.0, "speed": 30.0}, {"cost": 6.0, "speed": 10.0})
+
+
+def test_over_objectives_best_and_worst_follow_the_senses():
+    found = Ranges.over(GOALS, np.array([[3.0, 20.0], [2.0, 10.0], [6.0, 30.0], [4.0, 15.0]]))
+    assert found == RANGES
+    assert found.to_dict() == {"best": {"cost": 2.0, "speed": 30.0}, "worst": {"cost": 6.0, "speed": 10.0}}
+    assert Ranges(**found.to_dict()) == found
+
+
+def test_zero_has_no_sign():
+    found = Ranges.over((Objective("speed", "", "maximize"),), np.array([[0.0], [0.0]]))
+    assert [str(value) for value in (found.best["speed"], found.worst["speed"])] == ["0.0", "0.0"]
+
+
+def test_the_best_is_at_0_and_the_worst_at_1():
+    best, worst = RANGES.ends(GOALS)
+    assert best.tolist() == [2.0, 30.0] and worst.tolist() == [6.0, 10.0]
+    assert RANGES.spans(GOALS).tolist() == [4.0, 20.0]
+    assert RANGES.normalised(GOALS, [2.0, 30.0]) == [0.0, 0.0]
+    assert RANGES.normalised(GOALS, [6.0, 10.0]) == [1.0, 1.0]
+    assert RANGES.normalised(GOALS, [3.0, 25.0]) == [0.25, 0.25]
+
+
+def test_a_range_without_width_is_divided_by_its_size_or_by_1():
+    flat = Ranges({"cost": 5.0, "speed": 0.0}, {"cost": 5.0, "speed": 0.0})
+    assert flat.spans(GOALS).tolist() == [5.0, 1.0]
+    assert flat.normalised(GOALS, [7.5, -3.0]) == [0.5, 3.0]
+    assert Ranges({"cost": -5.0, "speed": 1.0}, {"cost": -5.0, "speed": 1.0}).spans(GOALS).tolist() == [5.0, 1.0]
+
+
+def test_what_ranges_have_to_name():
+    with pytest.raises(ValueError, match="the ranges have no 'speed'; they have cost"):
+        Ranges({"cost": 1.0}, {"cost": 2.0}).ends(GOALS)
+    with pytest.raises(ValueError, match="haste"):
+        Ranges({"cost": 1.0, "speed": 2.0, "haste": 0.0}, {"cost": 2.0, "speed": 1.0, "haste": 1.0}).ends(GOALS)
+    with pytest.raises(ValueError, match="'cost' is minimized"):
+        Ranges({"cost": 3.0, "speed": 2.0}, {"cost": 2.0, "speed": 1.0}).ends(GOALS)
+    with pytest.raises(ValueError, match="'speed' is maximized"):
+        Ranges({"cost": 0.0, "speed": 1.0}, {"cost": 1.0, "speed": 2.0}).ends(GOALS)
+
+
+@pytest.mark.parametrize(("value", "inside"), [(2.0, True), (6.0, True), (1.9999, False), (6.0001, False), (2.0 - 1e-9, True), (4.0, True)])
+def test_a_value_lies_within_a_range_as_far_as_solves_find_ends(value, inside):
+    if inside:
+        RANGES.check(value, GOALS[0], "the aim")
+        return
+    with pytest.raises(ValueError, match=r"the aim of 'cost', .*, lies beyond its range: best 2, worst 6"):
+        RANGES.check(value, GOALS[0], "the aim")
+
+
+def test_a_range_without_width_says_nothing_of_values():
+    Ranges({"cost": 5.0}, {"cost": 5.0}).check(9.0, GOALS[0], "the aim")
+    with pytest.raises(ValueError, match="best 30 m/s, worst 10 m/s"):
+        RANGES.check(31.0, GOALS[1], "the aim")
+
+
+def test_points_are_believed_by_their_status_and_their_simulation():
+    front = marked(plain_front(np.array([[1.0, 9.0], [2.0, 5.0], [3.0, np.inf], [4.0, 1.0]]), GOALS), [True, False, True, True])
+    feasible, confirmed = usable(front)
+    assert feasible.tolist() == [True, True, False, True] and confirmed.tolist() == [True, False, False, True]
+    assert confidence(front).tolist() == [0, 1, 2, 0]
