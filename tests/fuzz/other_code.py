@@ -85,6 +85,8 @@ def _element(
         known = values(s, state)
         return [(end - begin) * numeric(term, known) for term in (*phase.rates.values(), *integrands)]
 
+    if not np.isfinite(y).all():
+        return np.full(len(y), np.nan), []
     sizes = np.array([upper - lower for lower, upper in phase.states.values()] + [1.0] * len(integrands))
     found = solve_ivp(rates, (0.0, 1.0), y, method="LSODA", t_eval=TIMES, rtol=1e-9, atol=np.maximum(1e-11 * sizes, 1e-14))
     if not found.success or found.y.shape[1] < len(TIMES):

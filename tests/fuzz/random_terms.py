@@ -82,6 +82,6 @@ NUMERIC: dict[str, Any] = SYMBOLIC | {
     "tanh": math.tanh,
     "exp": math.exp,
     "root": lambda a: math.sqrt(abs(a)),
-    "log": math.log,
+    "log": lambda a: math.log(a) if a else -math.inf,
     "abs": abs,
 }

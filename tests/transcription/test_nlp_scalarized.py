@@ -334,3 +334,18 @@ def test_where_a_peak_is_infinite_no_solve_begins():
     assert start.min() == -np.inf
     solved = scalarized.scalarize(nlp, start, reference=np.zeros(1), weights=np.ones(1))
     assert solved.status == "failed" and not solved.begun and not solved.clocked
+
+
+def test_more_equations_than_variables_is_a_status_and_prints_nothing(capfd):
+    problem = Problem("nothing to decide")
+    phase = problem.phase("p", t0=0.0, tf=1.0)
+    x = phase.state("x", bounds=(-1, 1), initial=0.0, final=0.5)
+    p = problem.parameter("p", bounds=(0, 1))
+    phase.dynamics(x=x + p)
+    phase.path("along", x - p, lower=0.0, upper=0.0)
+    problem.minimize("end", phase.final(x) + p)
+    nlp = DFET(2, 1).transcribe(problem)
+    start = nlp.first_guess(np.zeros((1, len(nlp.free))))[0]
+    solved = scalarized.scalarize(nlp, start, reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status in ("failed", "infeasible")
+    assert capfd.readouterr() == ("", "")

@@ -18,9 +18,9 @@ EVERY = 0.25
 """Least seconds between two questions whether to end: most solves take less, and need not ask."""
 
 
-UNASKED = {"calc_lam_p": False, "no_nlp_grad": True}
+UNASKED = {"calc_lam_p": False, "no_nlp_grad": True, "inputs_check": False}
 """Sensitivities to the parameters are not used. They would take longer to derive than some solves take, and where rates are no numbers they
-fail, which CasADi prints."""
+fail, which CasADi prints; so does its check of what goes in, for each program that has more equations than variables."""
 
 
 class Watched:
