@@ -37,7 +37,9 @@ def flown(plain: PlainProblem, point: Any) -> tuple[dict[str, float], dict[str, 
             for values in seen:
                 for name, (lower, upper) in {**phase.states, **phase.controls}.items():
                     label = f"bounds of {phase.name}.{name}"
-                    misses[label] = max(misses.get(label, 0.0), _excess(values[name], lower, upper, upper - lower))
+                    # Bounds that rounding cannot tell from one value are one.
+                    size = max(upper - lower, 1e-9 * max(abs(lower), abs(upper)), 1e-290)
+                    misses[label] = max(misses.get(label, 0.0), _excess(values[name], lower, upper, size))
                 for name, term, lower, upper in phase.paths:
                     label, scale = f"path {phase.name}.{name}", _scale(lower, upper)
                     misses[label] = max(misses.get(label, 0.0), _excess(numeric(term, values), lower, upper, scale))

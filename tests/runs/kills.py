@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,11 +67,17 @@ def interrupted(work: Callable[[], object], kills: int, longest: float, rng: np.
         if child.exitcode is not None:
             assert child.exitcode == 0, f"it ended with {child.exitcode}"
             return done
-        assert child.pid is not None
+        _grouped(child)
         # Its own children survive a while where it alone is killed: as often as not, they do.
         (os.killpg if rng.random() < 0.5 else os.kill)(child.pid, signal.SIGKILL)
         child.join()
         done += 1
+
+
+def _grouped(child: Any) -> None:
+    """Make a child the leader of a group of its own, which it may not have done yet itself."""
+    with suppress(OSError):
+        os.setpgid(child.pid, child.pid)
 
 
 def _leading(work: Callable[[], object]) -> None:
@@ -110,7 +116,7 @@ def interrupted_once(out: Path, rng: np.random.Generator) -> int:
     """Begin the study in a folder, and kill it after a random time, or one of its workers; whether that came in time."""
     child = FORK.Process(target=_leading, args=(lambda: _patiently(lambda: study().run(out, jobs=2)),))
     child.start()
-    assert child.pid is not None
+    _grouped(child)
     child.join(rng.uniform(0.0, 5.0))
     workers = _children(child.pid)
     if workers and rng.random() < 0.3:
