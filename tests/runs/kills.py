@@ -190,10 +190,13 @@ def kill_workers(kills: int, rng: np.random.Generator) -> int:
     """Kill workers of a cluster while it makes a study, each replaced by another; the numbers are those of this machine alone."""
     from runs.execution.workers import cluster
 
-    done = 0
+    done = studies = 0
     with tempfile.TemporaryDirectory() as folder, running_cluster() as made:
         expected = fronts(study().run(Path(folder) / "here", jobs=2))
         while done < kills:
+            # A new one each time: one that is finished leaves nothing to kill.
+            out = Path(folder) / f"study {studies}"
+            studies += 1
             ended = threading.Event()
 
             def killer(ended: threading.Event = ended) -> None:
@@ -207,7 +210,6 @@ def kill_workers(kills: int, rng: np.random.Generator) -> int:
 
             thread = threading.Thread(target=killer)
             thread.start()
-            out = Path(folder) / f"study {done}"
             try:
                 with cluster(made.address) as executor:
                     study().run(out, executor=executor)

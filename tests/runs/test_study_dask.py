@@ -1,10 +1,7 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -13,6 +10,7 @@ import pytest
 
 pytest.importorskip("distributed")
 
+from kills import running_cluster
 from test_study import Inline, numbers, slow, stamps, wait_for
 
 from runs.batch.running import WorkersLost
@@ -21,26 +19,10 @@ from runs.execution.workers import cluster
 
 
 @pytest.fixture
-def scheduler(tmp_path):
+def scheduler():
     """A scheduler and two workers, processes of their own; with their address."""
-    processes, environment = [], {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [*sys.path, os.environ.get("PYTHONPATH")]))}
-
-    def start(*call: str) -> subprocess.Popen:
-        log = (tmp_path / f"{len(processes)}.log").open("w")
-        command = [sys.executable, "-m", "distributed.cli." + call[0], *call[1:]]
-        processes.append(subprocess.Popen(command, stderr=log, stdout=log, cwd=tmp_path, env=environment))
-        return processes[-1]
-
-    start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-    said = tmp_path / "0.log"
-    wait_for(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text()))
-    address = re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())[1]
-    for _ in range(2):
-        start("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
-    yield address, processes
-    for process in processes:
-        process.kill()
-        process.wait()
+    with running_cluster() as made:
+        yield made.address, [made.scheduler, *made.workers]
 
 
 @pytest.mark.slow
