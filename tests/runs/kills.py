@@ -87,10 +87,11 @@ def _leading(work: Callable[[], object]) -> None:
 
 def kill_solves(kills: int, rng: np.random.Generator) -> int:
     """Kill solves until there were so many; each has the bits of one that was not killed."""
-    expected, done = bits(solved(None)), 0
+    expected, done, number = bits(solved(None)), 0, 0
     with tempfile.TemporaryDirectory() as folder:
         while done < kills:
-            file = Path(folder) / f"{done}.ckpt"
+            # A new file, and below a new study, each time: one that is finished leaves nothing to kill.
+            file, number = Path(folder) / f"{number}.ckpt", number + 1
             done += interrupted(lambda file=file: solved(file), int(rng.integers(1, 6)), 1.5, rng)  # type: ignore[misc]
             assert bits(solved(file)) == expected
     return done
@@ -98,11 +99,11 @@ def kill_solves(kills: int, rng: np.random.Generator) -> int:
 
 def kill_studies(kills: int, rng: np.random.Generator) -> int:
     """Kill studies likewise; no run that had been finished is written again."""
-    done = 0
+    done = number = 0
     with tempfile.TemporaryDirectory() as folder:
         expected = fronts(study().run(Path(folder) / "uninterrupted", jobs=2))
         while done < kills:
-            out, before = Path(folder) / f"study {done}", dict[Path, int]()
+            out, number, before = Path(folder) / f"study {number}", number + 1, dict[Path, int]()
             for _ in range(int(rng.integers(1, 4))):
                 done += interrupted_once(out, rng)
                 stamps = {path: path.stat().st_mtime_ns for path in out.rglob("*.nc")}
@@ -190,13 +191,11 @@ def kill_workers(kills: int, rng: np.random.Generator) -> int:
     """Kill workers of a cluster while it makes a study, each replaced by another; the numbers are those of this machine alone."""
     from runs.execution.workers import cluster
 
-    done = studies = 0
+    done = number = 0
     with tempfile.TemporaryDirectory() as folder, running_cluster() as made:
         expected = fronts(study().run(Path(folder) / "here", jobs=2))
         while done < kills:
-            # A new one each time: one that is finished leaves nothing to kill.
-            out = Path(folder) / f"study {studies}"
-            studies += 1
+            out, number = Path(folder) / f"study {number}", number + 1
             ended = threading.Event()
 
             def killer(ended: threading.Event = ended) -> None:
