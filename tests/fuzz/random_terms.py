@@ -77,11 +77,12 @@ SYMBOLIC: dict[str, Any] = {
 }
 NUMERIC: dict[str, Any] = SYMBOLIC | {
     "/": lambda a, b: a / b,
+    "*": lambda a, b: a * b if a and b else 0.0,  # CasADi takes 0 x for 0, whatever x is
     "sin": math.sin,
     "cos": math.cos,
     "tanh": math.tanh,
     "exp": math.exp,
     "root": lambda a: math.sqrt(abs(a)),
-    "log": lambda a: math.log(a) if a else -math.inf,
+    "log": lambda a: math.log(a) if a > 0 else -math.inf if a == 0 else math.nan,
     "abs": abs,
 }
