@@ -77,6 +77,11 @@ def ordered(*columns: Any) -> np.ndarray:
     return rows[np.lexsort(rows.T)]
 
 
+def of(front: macs.Front) -> np.ndarray:
+    """Variables and objectives of a front, as those of a result."""
+    return ordered([point.decision for point in front], front.objectives)
+
+
 def ready(problem: Any, termination: Any = ("n_eval", 600), **settings: Any) -> MACS:
     algorithm = MACS(**settings)
     algorithm.setup(problem, termination=termination, seed=3)
@@ -109,7 +114,7 @@ def test_the_points_are_those_of_macs_to_the_last_bit(name, settings):
     front = macs.MACS(**settings).minimize(problem, evaluations=1777, seed=5, tolerance=STRICT)
     res = minimize(problem, MACS(**settings), ("n_eval", 1777), seed=5)
     assert res.algorithm.evaluator.n_eval == 1777 == front.stats["evaluations"]
-    assert len(front) and np.array_equal(ordered(res.X, res.F), ordered(front.decisions, front.objectives))
+    assert len(front) and np.array_equal(ordered(res.X, res.F), of(front))
 
 
 def test_the_paper_is_the_same_too():
@@ -135,13 +140,12 @@ def test_without_a_budget_it_is_the_search_without_one():
 
 
 def test_known_fronts_are_found():
-    res = minimize(get_problem("zdt1"), MACS(archive=50), ("n_eval", 15_000), seed=1)
+    res = minimize(get_problem("zdt1"), MACS(archive=20), ("n_eval", 10_000), seed=1)
     x = np.linspace(0, 1, 2001)
-    assert distance_to_curve(res.F, np.column_stack([x, 1 - np.sqrt(x)])).max() < 2e-3 and len(res.F) == 50
+    assert distance_to_curve(res.F, np.column_stack([x, 1 - np.sqrt(x)])).max() < 5e-3 and len(res.F) == 20
     bnh = get_problem("bnh")
-    res = minimize(bnh, MACS(archive=30), ("n_eval", 5_000), seed=1)
-    span = np.ptp(bnh.pareto_front(), axis=0)
-    assert distance_to_curve(res.F / span, bnh.pareto_front() / span).max() < 5e-3
+    res = minimize(bnh, MACS(archive=30), ("n_eval", 2_000), seed=1)
+    assert distance_to_curve(res.F, bnh.pareto_front()).max() < 2e-3
     assert (res.G <= 0).all() and (res.CV == 0).all() and len(res.X) == 30 == len(res.opt)
 
 
@@ -272,7 +276,7 @@ def test_history_has_algorithms_that_go_on():
 
 
 def test_an_archive_of_pymoo_collects_what_was_evaluated():
-    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, archive=MultiObjectiveArchive(max_size=None))
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, archive=MultiObjectiveArchive())
     assert len(res.archive) >= 10 and {F.tobytes() for F in res.F} <= {F.tobytes() for F in res.archive.get("F")}
 
 
@@ -432,7 +436,7 @@ def test_first_points_are_a_start():
     front = macs.MACS().minimize(problem, evaluations=300, seed=1, start=X)
     for sampling in (X, X.tolist(), Population.new(X=X)):
         res = minimize(problem, MACS(sampling=sampling), ("n_eval", 300), seed=1)
-        assert np.array_equal(ordered(res.X, res.F), ordered(front.decisions, front.objectives))
+        assert np.array_equal(ordered(res.X, res.F), of(front))
     few = minimize(problem, MACS(sampling=X[0]), ("n_gen", 1), seed=1)
     assert few.algorithm.evaluator.n_eval == 10 and np.array_equal(few.algorithm.off[0].X, X[0])
 
@@ -444,7 +448,7 @@ def test_evaluated_points_are_not_evaluated_again():
     res = minimize(problem, MACS(sampling=known), ("n_eval", 300), seed=1)
     front = macs.MACS().minimize(problem, evaluations=330, seed=1, start=X)
     assert res.algorithm.evaluator.n_eval == 300
-    assert np.array_equal(ordered(res.X, res.F), ordered(front.decisions, front.objectives))
+    assert np.array_equal(ordered(res.X, res.F), of(front))
     res = minimize(problem, MACS(sampling=known), ("n_gen", 1), seed=1)
     assert res.algorithm.evaluator.n_eval == 0 and len(res.algorithm.off) == 30
     many = minimize(problem, MACS(sampling=np.random.default_rng(0).random((PLANNED + 5, 4))), ("n_gen", 1), seed=1)
@@ -458,7 +462,9 @@ def test_sampling_of_pymoo_draws_the_first_population():
     assert len(first.ask()) == 40
 
 
-@pytest.mark.parametrize(("X", "message"), [([[0.5, 2.0]], "outside its bounds"), ([[0.5]], "1 entries, 2 expected"), ([[0.5, np.nan]], "nan")])
+@pytest.mark.parametrize(
+    ("X", "message"), [([[0.5, 2.0]], "outside its bounds"), ([[0.5]], "1 entries, 2 expected"), ([[0.5, np.nan]], "nan")]
+)
 def test_wrong_first_points_are_refused(X, message):
     with pytest.raises(ValueError, match=f"^sampling: .*{message}"):
         minimize(get_problem("zdt1", n_var=2), MACS(sampling=X), ("n_eval", 50))
@@ -469,9 +475,9 @@ def test_wrong_first_points_are_refused(X, message):
 
 def test_failed_evaluations_stop_nothing():
     res = minimize(Holes(), MACS(), ("n_eval", 800), seed=1, verbose=False)
-    assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1)).all()
+    assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
     front = macs.MACS().minimize(Holes(), evaluations=800, seed=1)
-    assert np.array_equal(ordered(res.X, res.F), ordered(front.decisions, front.objectives))
+    assert np.array_equal(ordered(res.X, res.F), of(front))
 
 
 def test_where_all_fails_there_is_no_result():
