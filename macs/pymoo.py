@@ -80,7 +80,7 @@ class MACS(Algorithm):
     search : macs.MACS
         The settings.
     opt : Population
-        The archive: feasible, mutually non-dominated points. As long as nothing is feasible, the least infeasible point.
+        The archive: feasible, mutually non-dominated points. As long as nothing is feasible, the point of least CV.
     pop : Population
         The points of `opt`, and then the agents that are elsewhere.
     off : Population
@@ -113,7 +113,7 @@ class MACS(Algorithm):
     *Ask and tell.* `ask` returns the next batch of candidates, the same ones until they are told. `tell(infills=batch)` takes all of
     them, in their order, with their values; their X may have been moved. Only when all batches of an iteration were told, `n_gen` grows,
     and the callback is called. The points are those that `next` finds, which may follow at any time. Each `tell` does the iteration again
-    from its beginning, with one batch more, since nothing is kept but data: that takes about a millisecond for each point.
+    from its beginning, with one batch more, since nothing is kept but data: that takes a millisecond or two for each point.
 
     *Checkpoints.* A deep copy or a pickle of the algorithm, made at any time, goes on to the same points: in a callback, between `ask` and
     `tell`, or after Ctrl-C in an evaluation. (A problem or callback of your own has to allow it, too.)
@@ -129,13 +129,14 @@ class MACS(Algorithm):
     """
 
     archive: Any
+    opt: Any
     output: Any
 
     def __init__(self, *, sampling: Any = None, output: Any = None, **settings: Any) -> None:
         options = {name: settings.pop(name) for name in OPTIONS if name in settings and name not in SETTINGS}
         for name in settings:
             if name not in SETTINGS:
-                raise TypeError(unknown("MACS: setting", name, ("sampling", *SETTINGS, *OPTIONS)))
+                raise TypeError(unknown("setting of MACS", name, dict.fromkeys(("sampling", *SETTINGS, *OPTIONS))))
         search = Search(**settings)
         super().__init__(output=output, **options)
         self.search = search
@@ -230,6 +231,7 @@ class MACS(Algorithm):
         if self.archive is not None:
             self.archive = self.archive.add(batch)
         self._told.append(batch)
+        self._asked = None
         return batch
 
     def _individuals(self, X: np.ndarray) -> Population:
@@ -275,9 +277,9 @@ class MACS(Algorithm):
             X = decisions(given.get("X"), self._compiled.variables)
         except ValueError as error:
             raise ValueError(f"sampling: {str(error).removeprefix('start: ')}") from None
-        for i in np.flatnonzero((given.get("X") != X).any(axis=1)):  # outside by rounding
-            given[i] = Population.new(X=X[[i]])[0]
-        return given
+        inside = (given.get("X") == X).all(axis=1)  # others are outside by rounding
+        moved = Population.new(X=X)
+        return Population.create(*(one if same else other for one, other, same in zip(given, moved, inside, strict=True)))
 
     def _complete(self, state: SearchState, evaluator: Told) -> None:
         """Go on to the next iteration, with the population of this one."""
@@ -287,11 +289,15 @@ class MACS(Algorithm):
         self.off = Population.create(*(one for batch in self._told for one in batch))
         self._state, self._told, self._asked, self._budget = state, [], None, None
         self._given = Population.empty()
-        best = state.archive if len(state.archive) else state.closest
-        kept = [place(*row) for group in (best, state.agents) for row in zip(group.Z, group.F, strict=True)]
+        kept = [place(*row) for group in (state.archive, state.agents) for row in zip(group.Z, group.F, strict=True)]
         self._known = {key: evaluator.known[key] for key in kept}
-        self.pop = Population.create(*self._known.values())
-        self.opt = self.pop[: len(best)]
+        individuals = list(self._known.values())
+        if not len(state.archive):  # pymoo's users look at the CV, which is not how the search orders points
+            seen = [*(self.opt if self.opt is not None else ()), *self.off]
+            least = min(seen, key=lambda one: one.CV[0])
+            individuals = [least, *(one for one in individuals if one is not least)]
+        self.pop = Population.create(*individuals)
+        self.opt = self.pop[: max(len(state.archive), 1)]
 
     def _set_optimum(self) -> None:
         pass  # `_complete` has set it
