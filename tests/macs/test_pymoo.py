@@ -1,0 +1,593 @@
+"""MACS as an algorithm of pymoo: its points are those of `macs.MACS`, and all that pymoo's users do with an algorithm works."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from fronts import distance_to_curve
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.constraints.eps import AdaptiveEpsilonConstraintHandling
+from pymoo.core.callback import Callback
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.individual import Individual
+from pymoo.core.population import Population
+from pymoo.core.problem import ElementwiseProblem, Problem
+from pymoo.core.termination import NoTermination, TerminateIfAll
+from pymoo.core.variable import Binary, Real
+from pymoo.operators.sampling.lhs import LHS
+from pymoo.optimize import minimize
+from pymoo.problems import get_problem
+from pymoo.problems.static import StaticProblem
+from pymoo.termination import get_termination
+from pymoo.termination.collection import TerminationCollection
+from pymoo.termination.default import DefaultMultiObjectiveTermination
+from pymoo.util.archive import MultiObjectiveArchive
+
+import macs
+from macs.decisions import ReferencePoint
+from macs.pymoo import MACS, most_evaluations
+from macs.search.rounds import PLANNED
+
+STRICT = 1e-300
+"""Tolerance of `macs.MACS` with which a point is feasible where it is for pymoo."""
+
+
+class Equality(ElementwiseProblem):
+    """Two distances on a circle, which is a constraint: the front is its arc between the two points."""
+
+    def __init__(self) -> None:
+        super().__init__(n_var=2, n_obj=2, n_eq_constr=1, xl=-2.0, xu=2.0)
+
+    def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        out["F"] = [(x[0] - 1) ** 2 + x[1] ** 2, x[0] ** 2 + (x[1] - 1) ** 2]
+        out["H"] = [x[0] ** 2 + x[1] ** 2 - 1]
+
+
+class Holes(Problem):
+    """Schaffer's problem, whose evaluations fail where x lies in (0.5, 1.5), or everywhere."""
+
+    def __init__(self, everywhere: bool = False) -> None:
+        super().__init__(n_var=1, n_obj=2, xl=-4.0, xu=4.0, vtype=float)
+        self.everywhere = everywhere
+
+    def _evaluate(self, X: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        F = np.hstack([X**2, (X - 2) ** 2])
+        F[np.abs(X[:, 0] - 1) < 0.5 if not self.everywhere else slice(None), 0] = np.nan
+        out["F"] = F
+
+
+class Nowhere(ElementwiseProblem):
+    """A problem without feasible points; the least violation is 1, at x = 0."""
+
+    def __init__(self) -> None:
+        super().__init__(n_var=3, n_obj=2, n_ieq_constr=1, xl=-1.0, xu=1.0)
+
+    def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        out["F"], out["G"] = [x[0], -x[0]], [1 + np.sum(x**2)]
+
+
+def ordered(*columns: Any) -> np.ndarray:
+    rows = np.hstack([np.atleast_2d(one) for one in columns])
+    return rows[np.lexsort(rows.T)]
+
+
+def of(front: macs.Front) -> np.ndarray:
+    """Variables and objectives of a front, as those of a result."""
+    return ordered([point.decision for point in front], front.objectives)
+
+
+def ready(problem: Any, termination: Any = ("n_eval", 600), **settings: Any) -> MACS:
+    algorithm = MACS(**settings)
+    algorithm.setup(problem, termination=termination, seed=3)
+    return algorithm
+
+
+def finished(algorithm: MACS) -> np.ndarray:
+    """Variables and objectives of the result, after `next` up to the end."""
+    res = algorithm.run()
+    return ordered(res.X, res.F)
+
+
+# The same search
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("zdt1", {}),
+        ("zdt4", {"agents": 20, "archive": 50, "CR": 0.5, "social": 0.5, "exponent": 4.0}),
+        ("dtlz2", {"archive": 30}),
+        ("bnh", {}),
+        ("osy", {"archive": 20}),
+        ("g1", {}),
+        ("rosenbrock", {}),
+    ],
+)
+def test_the_points_are_those_of_macs_to_the_last_bit(name, settings):
+    problem = get_problem(name)
+    front = macs.MACS(**settings).minimize(problem, evaluations=1111, seed=5, tolerance=STRICT)
+    res = minimize(problem, MACS(**settings), ("n_eval", 1111), seed=5)
+    assert res.algorithm.evaluator.n_eval == 1111 == front.stats["evaluations"]
+    assert len(front) and np.array_equal(ordered(res.X, res.F), of(front))
+
+
+def test_the_paper_is_the_same_too():
+    front = macs.MACS.paper(archive=20).minimize(get_problem("zdt2"), evaluations=500, seed=2)
+    res = minimize(get_problem("zdt2"), MACS.paper(archive=20, save_history=True), ("n_eval", 500), seed=2)
+    assert np.array_equal(ordered(res.F), ordered(front.objectives)) and len(res.history) == res.algorithm.n_gen - 1
+
+
+def test_a_preference_guides_as_it_does_macs():
+    wish = ReferencePoint({"f1": 0.2, "f2": 0.6})
+    front = macs.MACS(prefer=wish).minimize(get_problem("zdt1"), evaluations=900, seed=1)
+    res = minimize(get_problem("zdt1"), MACS(prefer=wish), ("n_eval", 900), seed=1)
+    assert np.array_equal(ordered(res.F), ordered(front.objectives))
+    with pytest.raises(ValueError, match="MACS: prefer"):
+        minimize(get_problem("zdt1"), MACS(prefer=ReferencePoint({"mass": 0.2})), ("n_eval", 100))
+
+
+def test_without_a_budget_it_is_the_search_without_one():
+    seen: list[np.ndarray] = []
+    macs.MACS(archive=15).minimize(get_problem("zdt3"), seed=4, callback=lambda progress: seen.append(progress.F) or len(seen) == 12)
+    res = minimize(get_problem("zdt3"), MACS(archive=15), ("n_gen", 13), seed=4)
+    assert np.array_equal(res.F, seen[-1]) and res.algorithm.n_gen == 14
+
+
+def test_known_fronts_are_found():
+    res = minimize(get_problem("zdt1"), MACS(archive=20), ("n_eval", 10_000), seed=1)
+    x = np.linspace(0, 1, 2001)
+    assert distance_to_curve(res.F, np.column_stack([x, 1 - np.sqrt(x)])).max() < 5e-3 and len(res.F) == 20
+    bnh = get_problem("bnh")
+    res = minimize(bnh, MACS(archive=30), ("n_eval", 2_000), seed=1)
+    assert distance_to_curve(res.F, bnh.pareto_front()).max() < 2e-3
+    assert (res.G <= 0).all() and (res.CV == 0).all() and len(res.X) == 30 == len(res.opt)
+
+
+def test_many_objectives():
+    res = minimize(get_problem("dtlz2", n_obj=6), MACS(archive=40), ("n_eval", 1_000), seed=1)
+    assert res.F.shape == (40, 6) and np.linalg.norm(res.F, axis=1).min() >= 1 - 1e-12
+    with pytest.raises(ValueError, match="archive must have at least one point for each of the 6 objectives"):
+        minimize(get_problem("dtlz2", n_obj=6), MACS(archive=5), ("n_eval", 100))
+
+
+def test_one_objective_gives_one_point_as_pymoo_does():
+    res = minimize(get_problem("sphere"), MACS(), ("n_eval", 3_000), seed=1)
+    assert res.X.shape == (10,) and res.F.shape == (1,) and res.F[0] < 1e-4
+
+
+def test_equality_constraints_are_met_as_pymoo_asks():
+    res = minimize(Equality(), MACS(), ("n_eval", 3_000), seed=1)
+    assert len(res.F) > 5 and (np.abs(res.H) <= 1e-4).all() and (res.CV == 0).all()
+    assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4 and (res.X > -0.1).all()
+
+
+# The course of a run
+
+
+def test_the_budget_is_never_exceeded():
+    for termination, most in (
+        (("n_eval", 7), 7),
+        (("n_eval", 503), 503),
+        (get_termination("n_eval", 50.5), 51),
+        (TerminationCollection(get_termination("n_eval", 80), get_termination("n_gen", 1000)), 80),
+        (DefaultMultiObjectiveTermination(n_max_evals=130), 130),
+    ):
+        res = minimize(get_problem("zdt1"), MACS(), termination, seed=1)
+        assert res.algorithm.evaluator.n_eval == most
+
+
+def test_the_budget_that_a_termination_has():
+    both = get_termination("n_eval", 100), get_termination("n_gen", 5)
+    assert most_evaluations(TerminationCollection(*both)) == 100
+    assert most_evaluations(TerminateIfAll(*both)) == np.inf == most_evaluations(NoTermination())
+    assert most_evaluations(get_termination("n_eval")) == np.inf
+    assert most_evaluations(DefaultMultiObjectiveTermination()) == 100_000
+    assert most_evaluations(DefaultMultiObjectiveTermination(), default=False) == np.inf
+
+
+def test_other_terminations_end_a_run():
+    res = minimize(get_problem("zdt1"), MACS(), ("n_gen", 4), seed=1)
+    assert res.algorithm.n_gen == 5 and res.algorithm.evaluator.n_eval < 400
+    res = minimize(get_problem("zdt1"), MACS(), ("time", 0.2), seed=1)
+    assert 0.2 <= res.exec_time < 5
+    res = minimize(get_problem("sphere", n_var=2), MACS(), seed=1)
+    assert res.F[0] < 1e-6 and res.algorithm.evaluator.n_eval < 10_000
+    res = minimize(get_problem("zdt1", n_var=5), MACS(), seed=1)
+    assert res.algorithm.evaluator.n_eval < 20_000
+
+
+def test_a_run_that_finds_nothing_to_evaluate_ends(monkeypatch):
+    monkeypatch.setattr("macs.search.macs.MACS.advance", lambda self, state, evaluator, budget: None)
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 500), seed=1)
+    assert res.algorithm.evaluator.n_eval == 10 and res.algorithm.n_gen == 102
+    asked = ready(get_problem("zdt1"))
+    batches = [len(asked.tell(infills=asked.evaluator.eval(asked.problem, asked.ask()))) for _ in range(3)]
+    assert len(batches) == 3 and asked.n_gen == 4 and len(asked.ask()) == 0
+
+
+def test_after_the_end_nothing_is_evaluated():
+    algorithm = ready(get_problem("zdt1"), ("n_eval", 50))
+    algorithm.run()
+    F = algorithm.opt.get("F")
+    algorithm.next()
+    assert algorithm.evaluator.n_eval == 50 and np.array_equal(algorithm.opt.get("F"), F)
+
+
+def test_the_same_seed_gives_the_same_points():
+    one, same, other = (minimize(get_problem("zdt1"), MACS(), ("n_eval", 300), seed=seed).X for seed in (1, 1, 2))
+    assert np.array_equal(one, same) and not np.array_equal(one, other)
+    assert not np.array_equal(*(minimize(get_problem("zdt1"), MACS(), ("n_eval", 60)).X for _ in range(2)))
+    assert np.array_equal(minimize(get_problem("zdt1"), MACS(seed=1), ("n_eval", 300)).X, one)
+
+
+def test_callbacks_see_each_iteration_and_may_end_the_run():
+    class Watch(Callback):
+        def __init__(self) -> None:
+            super().__init__()
+            self.data["seen"] = []
+
+        def notify(self, algorithm: MACS) -> None:
+            spent, off = algorithm.evaluator.n_eval, len(algorithm.off)
+            self.data["seen"].append((algorithm.n_gen, spent, off, algorithm.pop.get("F").min(), len(algorithm.opt)))
+            assert set(algorithm.off.get("n_gen")) == {algorithm.n_gen}
+            if spent > 400:
+                algorithm.termination.terminate()
+
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 5000), callback=Watch(), seed=1)
+    generations, spent, off, best, points = zip(*res.algorithm.callback.data["seen"], strict=True)
+    assert generations == tuple(range(1, len(spent) + 1)) and np.array_equal(np.cumsum(off), spent)
+    assert spent[-2] > 400 and spent[-3] <= 400 and (np.diff(best) <= 0).all() and points[-1] == 10
+    assert res.exec_time > 0 and res.algorithm.n_gen == len(spent) + 1
+
+
+def test_results_have_populations():
+    res = minimize(get_problem("bnh"), MACS(), ("n_eval", 500), seed=1)
+    assert {id(one) for one in res.opt} <= {id(one) for one in res.pop} and 10 <= len(res.pop) <= 20
+    assert all(one.evaluated == {"F", "G", "H"} for one in res.pop)
+    X, F, G = res.opt.get("X", "F", "G")
+    expected = res.problem.evaluate(X, return_values_of=["F", "G"])
+    assert np.array_equal(F, expected[0]) and np.array_equal(G, expected[1]) and np.array_equal(F, res.F)
+
+
+def test_verbose_prints_pymoos_columns(capsys):
+    minimize(get_problem("bnh"), MACS(), ("n_gen", 3), seed=1, verbose=True)
+    head, *rows = [line for line in capsys.readouterr().out.splitlines() if "|" in line]
+    assert [word.strip() for word in head.split("|")[:3]] == ["n_gen", "n_eval", "n_nds"] and len(rows) == 3
+    minimize(get_problem("sphere"), MACS(), ("n_gen", 2), seed=1, verbose=True)
+    assert "f_min" in capsys.readouterr().out
+    minimize(get_problem("sphere"), MACS(), ("n_gen", 2), seed=1)
+    assert capsys.readouterr().out == ""
+
+
+def test_history_has_algorithms_that_go_on():
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, save_history=True)
+    assert [one.n_gen for one in res.history] == list(range(1, res.algorithm.n_gen))
+    third = res.history[2]
+    third.history, third.callback, third.display = [], Callback(), Callback()
+    third.display.finalize = lambda: None
+    third.n_gen += 1
+    assert np.array_equal(ordered(third.run().F), ordered(res.F))
+
+
+def test_an_archive_of_pymoo_collects_what_was_evaluated():
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, archive=MultiObjectiveArchive())
+    assert {F.tobytes() for F in res.F} <= {F.tobytes() for F in res.archive.get("F")}
+
+
+def test_minimize_leaves_the_algorithm_as_it_was_unless_told():
+    algorithm = MACS()
+    minimize(get_problem("zdt1"), algorithm, ("n_eval", 50), seed=1)
+    assert algorithm.problem is None and algorithm.pop is None
+    res = minimize(get_problem("zdt1"), algorithm, ("n_eval", 50), seed=1, copy_algorithm=False)
+    assert res.algorithm is algorithm and algorithm.evaluator.n_eval == 50
+
+
+def test_evaluators_of_the_users_own_are_used():
+    batches: list[int] = []
+    evaluator = Evaluator(callback=lambda pop: batches.append(len(pop)))
+    minimize(get_problem("zdt1"), MACS(agents=8), ("n_eval", 300), seed=1, evaluator=evaluator, copy_algorithm=False)
+    assert sum(batches) == 300 == evaluator.n_eval and max(batches[1:]) <= 8
+
+
+# Copies
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda algorithm: pickle.loads(pickle.dumps(algorithm))])
+@pytest.mark.parametrize("name", ["zdt1", "bnh"])
+def test_copies_in_the_middle_go_on_to_the_same_points(copied, name):
+    expected = finished(ready(get_problem(name)))
+    algorithm = ready(get_problem(name))
+    assert np.array_equal(finished(copied(algorithm)), expected)
+    for _ in range(4):
+        algorithm.next()
+    other = copied(algorithm)
+    for _ in range(3):
+        other.tell(infills=other.evaluator.eval(other.problem, other.ask()))
+    assert np.array_equal(finished(copied(other)), expected)
+    other.ask()
+    assert np.array_equal(finished(copied(other)), expected)
+    assert np.array_equal(finished(algorithm), expected)
+
+
+def test_a_copy_made_by_a_callback_goes_on(tmp_path):
+    """As pymoo's users do for checkpoints: the generation of the copy has not been counted yet."""
+
+    class Keep(Callback):
+        def notify(self, algorithm: MACS) -> None:
+            if algorithm.n_gen == 5:
+                (tmp_path / "checkpoint").write_bytes(pickle.dumps(algorithm.__dict__ | {"callback": None}))
+
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 600), seed=3, callback=Keep())
+    again = MACS()
+    again.__dict__.update(pickle.loads((tmp_path / "checkpoint").read_bytes()) | {"callback": Callback()})
+    assert np.array_equal(finished(again), ordered(res.X, res.F))
+
+
+def test_a_finished_run_goes_on_with_another_termination():
+    expected = finished(ready(get_problem("zdt1"), ("n_gen", 20)))
+    algorithm = MACS()
+    minimize(get_problem("zdt1"), algorithm, ("n_gen", 5), seed=3, copy_algorithm=False)
+    loaded = pickle.loads(pickle.dumps(algorithm))
+    loaded.termination = get_termination("n_gen", 20)
+    res = minimize(get_problem("zdt1"), loaded, copy_algorithm=False)
+    assert np.array_equal(ordered(res.X, res.F), expected) and loaded.n_gen == 21
+
+
+def test_a_budget_may_come_and_go():
+    algorithm = ready(get_problem("zdt1"), ("n_eval", 100))
+    algorithm.run()
+    algorithm.termination = get_termination("n_gen", algorithm.n_gen + 2)
+    algorithm.run()
+    between = algorithm.evaluator.n_eval
+    algorithm.termination = get_termination("n_eval", between + 33)
+    algorithm.run()
+    assert 100 < between < PLANNED and algorithm.evaluator.n_eval == between + 33
+
+
+def test_an_interrupt_loses_no_evaluation():
+    class Interrupted(Evaluator):
+        def _eval(self, *args: Any, **kwargs: Any) -> None:
+            if self.n_eval > 150 and not self.interrupted:
+                self.interrupted = True
+                raise KeyboardInterrupt
+            super()._eval(*args, **kwargs)
+
+        interrupted = False
+
+    expected = finished(ready(get_problem("zdt1")))
+    for asks in (False, True):
+        algorithm = ready(get_problem("zdt1"), evaluator=Interrupted())
+        with pytest.raises(KeyboardInterrupt):
+            while True:
+                algorithm.ask()
+                algorithm.next()
+        assert 150 < algorithm.evaluator.n_eval < 250
+        while asks and algorithm.evaluator.n_eval < 400:
+            algorithm.tell(infills=algorithm.evaluator.eval(algorithm.problem, algorithm.ask()))
+        assert np.array_equal(finished(algorithm), expected) and algorithm.evaluator.n_eval == 600
+
+
+# Ask and tell
+
+
+@pytest.mark.parametrize("name", ["zdt1", "bnh", "sphere"])
+def test_ask_and_tell_give_the_same_points(name):
+    expected, problem = ready(get_problem(name)), get_problem(name)
+    points = finished(expected)
+    algorithm, generations = ready(problem), []
+    algorithm.callback = lambda algorithm: generations.append(algorithm.n_gen)
+    while algorithm.has_next():
+        infills = algorithm.ask()
+        assert np.array_equal(algorithm.ask().get("X"), infills.get("X"))
+        algorithm.evaluator.eval(problem, infills)
+        algorithm.tell(infills=infills)
+    res = algorithm.result()
+    assert np.array_equal(ordered(res.X, res.F), points)
+    assert generations == list(range(1, expected.n_gen)) and algorithm.n_gen == expected.n_gen and algorithm.evaluator.n_eval == 600
+
+
+def test_values_may_be_computed_elsewhere():
+    problem = Problem(n_var=2, n_obj=2, n_ieq_constr=1, xl=np.zeros(2), xu=np.ones(2))
+    algorithm = MACS().setup(problem, termination=NoTermination(), seed=1)
+    for _ in range(150):
+        infills = algorithm.ask()
+        X = infills.get("X")
+        F, G = np.column_stack([X[:, 0], 1 - X[:, 0] + X[:, 1]]), X[:, :1] - 0.8
+        Evaluator().eval(StaticProblem(problem, F=F, G=G), infills)
+        algorithm.tell(infills=infills)
+    res = algorithm.result()
+    assert len(res.F) == 10 and np.abs(res.F.sum(axis=1) - 1).max() < 1e-3 and 0.79 < res.X[:, 0].max() <= 0.8
+
+
+def test_told_individuals_may_have_moved():
+    problem = get_problem("zdt1", n_var=3)
+    algorithm = ready(problem, ("n_eval", 900))
+    while algorithm.has_next():
+        infills = algorithm.ask()
+        infills.set("X", np.round(infills.get("X"), 2))
+        algorithm.evaluator.eval(problem, infills)
+        algorithm.tell(infills=infills)
+    res = algorithm.result()
+    assert np.array_equal(res.X, np.round(res.X, 2)) and np.array_equal(res.F, problem.evaluate(res.X))
+
+
+def test_what_is_told_has_to_be_what_was_asked_for():
+    problem = get_problem("zdt1")
+    algorithm = ready(problem)
+    infills = algorithm.ask()
+    with pytest.raises(ValueError, match="tell: individuals without values"):
+        algorithm.tell(infills=infills)
+    algorithm.evaluator.eval(problem, infills)
+    with pytest.raises(ValueError, match="tell: 7 individuals, but 10 were asked for"):
+        algorithm.tell(infills=infills[:7])
+    algorithm.tell(infills=infills)
+    assert algorithm.n_gen == 2
+    with pytest.raises(ValueError, match="setup"):
+        MACS().next()
+
+
+# First points
+
+
+def test_first_points_are_a_start():
+    problem = get_problem("zdt1", n_var=4)
+    X = np.random.default_rng(0).random((30, 4))
+    front = macs.MACS().minimize(problem, evaluations=300, seed=1, start=X)
+    for sampling in (X, X.tolist(), Population.new(X=X)):
+        res = minimize(problem, MACS(sampling=sampling), ("n_eval", 300), seed=1)
+        assert np.array_equal(ordered(res.X, res.F), of(front))
+    beyond = np.vstack([X[:1], np.full((1, 4), 1 + 1e-9)])
+    assert np.array_equal(ready(problem, sampling=beyond).ask().get("X")[:2], np.clip(beyond, 0, 1)) and beyond.max() > 1
+    few = minimize(problem, MACS(sampling=X[0]), ("n_gen", 1), seed=1)
+    assert few.algorithm.evaluator.n_eval == 10 and np.array_equal(few.algorithm.off[0].X, X[0])
+
+
+def test_evaluated_points_are_not_evaluated_again():
+    problem = get_problem("zdt1", n_var=4)
+    X = np.random.default_rng(0).random((30, 4))
+    known = Evaluator().eval(problem, Population.new(X=X))
+    res = minimize(problem, MACS(sampling=known), ("n_eval", 300), seed=1)
+    front = macs.MACS().minimize(problem, evaluations=330, seed=1, start=X)
+    assert res.algorithm.evaluator.n_eval == 300
+    assert np.array_equal(ordered(res.X, res.F), of(front))
+    res = minimize(problem, MACS(sampling=known), ("n_gen", 1), seed=1)
+    assert res.algorithm.evaluator.n_eval == 0 and len(res.algorithm.off) == 30
+    many = minimize(problem, MACS(sampling=np.random.default_rng(0).random((PLANNED + 5, 4))), ("n_gen", 1), seed=1)
+    assert many.algorithm.evaluator.n_eval == PLANNED + 5
+
+
+def test_sampling_of_pymoo_draws_the_first_population():
+    one, same = (minimize(get_problem("zdt1"), MACS(archive=40, sampling=LHS()), ("n_gen", 2), seed=1) for _ in range(2))
+    assert np.array_equal(one.X, same.X)
+    first = ready(get_problem("zdt1"), ("n_gen", 2), archive=40, sampling=LHS())
+    assert len(first.ask()) == 40
+
+
+@pytest.mark.parametrize(
+    ("X", "message"), [([[0.5, 2.0]], "outside its bounds"), ([[0.5]], "1 entries, 2 expected"), ([[0.5, np.nan]], "nan")]
+)
+def test_wrong_first_points_are_refused(X, message):
+    with pytest.raises(ValueError, match=f"^sampling: .*{message}"):
+        minimize(get_problem("zdt1", n_var=2), MACS(sampling=X), ("n_eval", 50))
+
+
+# Failures
+
+
+def test_failed_evaluations_stop_nothing():
+    res = minimize(Holes(), MACS(), ("n_eval", 800), seed=1, verbose=False)
+    assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
+    front = macs.MACS().minimize(Holes(), evaluations=800, seed=1)
+    assert np.array_equal(ordered(res.X, res.F), of(front))
+
+
+def test_where_all_fails_there_is_no_result():
+    res = minimize(Holes(everywhere=True), MACS(), ("n_eval", 200), seed=1)
+    assert res.X is None and res.F is None and res.opt is None and np.isinf(res.pop.get("CV")).all()
+    assert res.algorithm.evaluator.n_eval == 200
+    res = minimize(Holes(everywhere=True), MACS(), seed=1, verbose=True)
+    assert res.F is None
+
+
+def test_where_nothing_is_feasible_the_least_infeasible_point_is_returned_if_asked_for():
+    res = minimize(Nowhere(), MACS(), ("n_eval", 1_000), seed=1)
+    assert res.X is None and len(res.algorithm.opt) == 1
+    res = minimize(Nowhere(), MACS(), ("n_eval", 1_000), seed=1, return_least_infeasible=True)
+    assert res.X.shape == (1, 3) and np.abs(res.X).max() < 0.1 and 1 <= res.CV[0, 0] < 1.01
+    front = macs.MACS().minimize(Nowhere(), evaluations=1_000, seed=1)
+    assert np.array_equal(res.X[0], front.closest.decision)
+
+
+def test_the_least_violation_never_grows():
+    res = minimize(get_problem("g10"), MACS(), ("n_gen", 8), seed=1, save_history=True)
+    least = [one.opt.get("CV").min() for one in res.history]
+    assert least[0] > 0 and (np.diff(least) <= 0).all() and len(set(least)) > 2
+    assert all(one.pop.get("CV").min() == one.opt.get("CV").min() for one in res.history)
+
+
+def test_points_told_with_a_violation_alone_are_infeasible():
+    problem = Problem(n_var=1, n_obj=2, xl=np.zeros(1), xu=np.ones(1))
+    algorithm = MACS().setup(problem, termination=NoTermination(), seed=1)
+    for _ in range(60):
+        infills = algorithm.ask()
+        X = infills.get("X")
+        infills.set("F", np.hstack([X, 1 - X]))
+        infills.set("CV", np.maximum(X - 0.5, 0))
+        algorithm.tell(infills=infills)
+    assert 0.4 < algorithm.opt.get("X").max() <= 0.5
+
+
+def test_what_is_feasible_is_in_the_individuals_config(monkeypatch):
+    def config() -> dict[str, Any]:
+        ours = Individual_config()
+        ours["cv_eq"] = ours["cv_eq"] | {"eps": 0.05}
+        return ours
+
+    Individual_config = Individual.default_config
+    monkeypatch.setattr(Individual, "default_config", staticmethod(config))
+    res = minimize(Equality(), MACS(), ("n_eval", 1_500), seed=1)
+    assert 1e-3 < np.abs(res.H).max() <= 0.05 and (res.CV == 0).all()
+
+
+# What is refused
+
+
+def test_only_real_variables_with_bounds():
+    class Mixed(ElementwiseProblem):
+        def __init__(self) -> None:
+            super().__init__(vars={"a": Real(bounds=(0, 1)), "b": Binary()}, n_obj=1)
+
+    for problem, message in (
+        (Mixed(), r"MACS: problem Mixed has variables by name \(Binary, Real\)"),
+        (Problem(n_var=2, n_obj=2, xl=0, xu=1, vtype=bool), "MACS: problem Problem has variables of type bool"),
+        (Problem(n_var=2, n_obj=2, xl=0, xu=9, vtype=int), "has variables of type int"),
+        (Problem(n_var=2, n_obj=2), "no bounds"),
+        (Problem(n_var=2, n_obj=2, xl=np.zeros(2), xu=np.array([1.0, np.inf])), "variable 'x2'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            minimize(problem, MACS(), ("n_eval", 10))
+
+
+def test_settings_are_refused_as_those_of_macs():
+    for name, value in {"agents": 2, "rho": 0.0, "exponent": 0.5, "mesh": "fine", "archive": MultiObjectiveArchive(), "sample": 3}.items():
+        with pytest.raises(ValueError, match=r"^MACS: ") as ours:
+            MACS(**{name: value})
+        with pytest.raises(ValueError) as theirs:
+            macs.MACS(**{name: value})
+        assert str(ours.value) == str(theirs.value)
+    with pytest.raises(TypeError, match=r"agent.*agents"):
+        MACS(agent=5)
+    for setting in ({"mesh": "adaptive"}, {"polish_on": "dfet:4x3"}):
+        with pytest.raises(ValueError, match="does not apply, since 'ZDT1' is a vector problem"):
+            minimize(get_problem("zdt1"), MACS(**setting), ("n_eval", 10))
+    minimize(get_problem("zdt1"), MACS(refine=False, mesh="fixed", ceiling=5), ("n_eval", 10))
+
+
+def test_settings_belong_to_the_algorithm():
+    for name, value in {"agents": 20, "archive": 50}.items():
+        with pytest.raises(ValueError, match=rf"{name} is a setting of the algorithm: MACS\({name}={value}\)"):
+            minimize(get_problem("zdt1"), MACS(), ("n_eval", 10), **{name: value})
+
+
+def test_constraints_that_change_are_refused():
+    with pytest.raises(ValueError, match="may not change"):
+        minimize(get_problem("bnh"), AdaptiveEpsilonConstraintHandling(MACS()), ("n_eval", 10))
+
+
+# The house
+
+
+def test_macs_does_not_import_pymoo():
+    code = "import sys, macs, macs.search.macs; sys.exit('pymoo' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_ours_and_theirs_run_side_by_side():
+    ours, theirs = (minimize(get_problem("zdt1"), one, ("n_eval", 500), seed=1) for one in (MACS(), NSGA2(pop_size=50)))
+    assert ours.algorithm.evaluator.n_eval == theirs.algorithm.evaluator.n_eval == 500
