@@ -110,7 +110,7 @@ class Baseline(PopulationSolver):
         algorithm, table = self._set_up(evaluator, members.F.shape[1], rng, budget), self._table(state)
         individuals = self._individuals(table, evaluator)
         self._restore(algorithm, state, individuals)
-        with warnings.catch_warnings():  # pymoo changes the filters
+        with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):  # pymoo changes the filters
             algorithm.tell(infills=individuals[: len(members)])
         self._remember(algorithm, state, table, members, evaluator)
         state.note(evaluator.tolerance)
@@ -139,7 +139,7 @@ class Baseline(PopulationSolver):
             left = budget - evaluator.counts.evaluations
             self._present(offspring, bred, len(table), evaluator)
             table = table.joined(bred)
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
                 algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
         state.iteration += 1
