@@ -20,7 +20,7 @@ class SMSEMOA(Baseline):
     Of the last front that fits in only in part, the member that adds least to the hypervolume is removed, again and again. As in pymoo,
     and other than in the paper, a generation has as many offspring as individuals; and objectives are scaled to the ranges of the
     population before the offspring, failed members excepted, with the reference point at 11 in each. With five objectives, a generation
-    takes about a hundred times as long as with three.
+    takes several hundred times as long as with three.
 
     Parameters
     ----------
