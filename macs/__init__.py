@@ -1,6 +1,6 @@
 """Floor 3: the search over several objectives, and the fronts that it finds."""
 
-from .baselines import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
+from .baselines import AGEMOEA2, CTAEA, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA
 from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
 from .fronts.point import Point
@@ -10,12 +10,16 @@ from .solvers.progress import Progress
 from .solvers.solver import Solver
 
 __all__ = [
+    "AGEMOEA2",
+    "CTAEA",
     "MACS",
     "MOEAD",
     "MOPSO",
     "MOPSOCD",
     "NSGA2",
     "NSGA3",
+    "RVEA",
+    "SMSEMOA",
     "Evaluation",
     "Evaluator",
     "Front",

@@ -10,9 +10,10 @@ import numpy as np
 from problems.checks import check_choice
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.directions import check_directions, pair_up, population_size, reference_directions, tchebycheff
+from ..pareto.directions import pair_up, tchebycheff
+from .directed import Directed
 from .population import Members, State
-from .pymoo_adapter import Baseline
+from .pymoo_adapter import variation
 
 
 @dataclass
@@ -31,7 +32,7 @@ class DecomposedState(State):
 
 
 @dataclass(frozen=True)
-class MOEAD(Baseline):
+class MOEAD(Directed):
     """MOEA/D (Zhang and Li 2007), pymoo's implementation; see `Baseline`. For two or more objectives.
 
     MOEA/D compares objectives only, so constraints become part of them, see `handling`. It asks for one candidate at a time, so that the
@@ -76,6 +77,7 @@ class MOEAD(Baseline):
     penalty: float = 1000.0
     degree: str = "largest"
     _compares_violations = False
+    _one_each = True
 
     def __post_init__(self) -> None:
         counts = {"population": 2, "divisions": 1, "neighbors": 2}
@@ -83,40 +85,23 @@ class MOEAD(Baseline):
         if self.decomposition is not None:
             check_choice("MOEAD: decomposition", self.decomposition, ("tchebycheff", "pbi"))
 
-    def check_objectives(self, m: int) -> None:
-        """Raise ValueError for a single objective, and for a number of directions other than that of individuals."""
-        m = self._presented_count(m)
-        check_directions("MOEAD", m, self.population, self.divisions)
-        made = population_size(m, None, self.divisions)
-        if None not in (self.population, self.divisions) and made != self.population:
-            raise ValueError(
-                f"MOEAD: divisions={self.divisions} makes {made} reference directions with {m} objectives, and population="
-                f"{self.population} needs as many; leave one of the two out"
-            )
-
-    def _size(self, m: int | None) -> int | None:
-        return population_size(m and self._presented_count(m), self.population, self.divisions)
-
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import moead
         from pymoo.decomposition.pbi import PBI
         from pymoo.decomposition.tchebicheff import Tchebicheff
-        from pymoo.operators.crossover.sbx import SBX
-        from pymoo.operators.mutation.pm import PM
 
         algorithm = moead.ParallelMOEAD if self.batch else moead.MOEAD
         return algorithm(
-            ref_dirs=reference_directions(m, self.population, self.divisions),
+            ref_dirs=self._directions(m),
             n_neighbors=self.neighbors,
             decomposition={"tchebycheff": Tchebicheff(), "pbi": PBI(), None: None}[self.decomposition],
             prob_neighbor_mating=self.neighbor_mating,
-            crossover=SBX(eta=self.crossover_eta, prob=1.0),
-            mutation=PM(eta=self.mutation_eta, prob_var=None),
+            **variation(1.0, self.crossover_eta, self.mutation_eta),
         )
 
     def _place(self, members: Members, evaluator: Evaluator) -> Members:
         F = self._presented(members, evaluator.tolerance)[0]
-        directions = reference_directions(F.shape[1], self.population, self.divisions)[: len(F)]
+        directions = self._directions(F.shape[1])[: len(F)]
         rows, places = pair_up(tchebycheff(F[:, None], directions, F.min(axis=0), F.max(axis=0)))
         return members.take(rows[np.argsort(places)])
 

@@ -3,38 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-import numpy as np
-
-from ..evaluation.evaluator import Evaluator
-from .population import Members, State
-from .pymoo_adapter import Baseline
-
-UNRANKED = -1
-"""In place of the rank of an infeasible member."""
-
-
-@dataclass(repr=False)
-class RankedState(State):
-    """State of NSGA-II, with the quantities that tournaments compare.
-
-    Attributes
-    ----------
-    rank : array (n,) of int
-        Rank of each member's front, 0 for the best; -1 for an infeasible member.
-    crowding : array (n,)
-        Crowding distances.
-    """
-
-    SHAPES: ClassVar[dict[str, str]] = {"rank": "members int", "crowding": "members"}
-
-    rank: np.ndarray
-    crowding: np.ndarray
+from .pymoo_adapter import variation
+from .ranked import Ranked
 
 
 @dataclass(frozen=True)
-class NSGA2(Baseline):
+class NSGA2(Ranked):
     """NSGA-II (Deb, Pratap, Agarwal and Meyarivan 2002), pymoo's implementation; see `Baseline`.
 
     For any number of objectives; crowding distances work well with two or three.
@@ -79,25 +55,5 @@ class NSGA2(Baseline):
 
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import nsga2
-        from pymoo.operators.crossover.sbx import SBX
-        from pymoo.operators.mutation.pm import PM
 
-        crossover, mutation = SBX(eta=self.crossover_eta, prob=self.crossover), PM(eta=self.mutation_eta)
-        return nsga2.NSGA2(pop_size=self.population, crossover=crossover, mutation=mutation)
-
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> RankedState:
-        return RankedState(**common, rank=np.full(len(members), UNRANKED), crowding=np.full(len(members), np.nan))
-
-    def _restore(self, algorithm: Any, state: RankedState, individuals: Any) -> None:
-        individuals.set("rank", state.rank, "crowding", state.crowding)
-        algorithm.pop = individuals
-
-    def _keep(self, algorithm: Any, state: RankedState, table: Members) -> None:
-        state.rank = _numbers(algorithm.pop, "rank", UNRANKED).astype(int)
-        state.crowding = _numbers(algorithm.pop, "crowding", np.nan)
-
-
-def _numbers(individuals: Any, key: str, missing: float) -> np.ndarray:
-    """Values (n,) of an attribute of individuals; `missing` for an individual without it."""
-    values = [one.get(key) for one in individuals]
-    return np.array([missing if value is None else value for value in values], dtype=float)
+        return nsga2.NSGA2(pop_size=self.population, **variation(self.crossover, self.crossover_eta, self.mutation_eta))

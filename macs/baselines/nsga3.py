@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.directions import check_directions, population_size, reference_directions
+from .directed import Directed
 from .population import Members, State
-from .pymoo_adapter import Baseline
+from .pymoo_adapter import variation
 
 
 @dataclass(repr=False)
@@ -33,7 +33,7 @@ class NormalisedState(State):
 
 
 @dataclass(frozen=True)
-class NSGA3(Baseline):
+class NSGA3(Directed):
     """NSGA-III (Deb and Jain 2014; with constraints: Jain and Deb 2014), pymoo's implementation; see `Baseline`. For two or more
     objectives.
 
@@ -77,25 +77,15 @@ class NSGA3(Baseline):
         counts = {"population": 2, "divisions": 1}
         self._check(counts, {"crossover": "[0, 1]", "crossover_eta": "[1, 100]", "mutation_eta": "[1, 100]"}, ("whole",))
 
-    def check_objectives(self, m: int) -> None:
-        """Raise ValueError for a single objective, and for directions that do not match the population."""
-        check_directions("NSGA3", self._presented_count(m), self.population, self.divisions)
-
-    def _size(self, m: int | None) -> int | None:
-        return population_size(m and self._presented_count(m), self.population, self.divisions)
-
     def _algorithm(self, m: int) -> Any:
         from pymoo.algorithms.moo import nsga3
-        from pymoo.operators.crossover.sbx import SBX
-        from pymoo.operators.mutation.pm import PM
         from pymoo.operators.selection.tournament import TournamentSelection
 
         return nsga3.NSGA3(
-            ref_dirs=reference_directions(m, self.population, self.divisions),
-            pop_size=population_size(m, self.population, self.divisions),
+            ref_dirs=self._directions(m),
+            pop_size=self.population,
             selection=TournamentSelection(func_comp=less_violated),
-            crossover=SBX(eta=self.crossover_eta, prob=self.crossover),
-            mutation=PM(eta=self.mutation_eta),
+            **variation(self.crossover, self.crossover_eta, self.mutation_eta),
         )
 
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:

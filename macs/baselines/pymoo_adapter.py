@@ -107,10 +107,10 @@ class Baseline(PopulationSolver):
         none = Archive.of(members, np.arange(0))
         common = {"members": members, "archive": none, "closest": none, "iteration": 0, "first_feasible": 0, "all_feasible": 0, "rng": rng}
         state = self._first(members, common, evaluator)
-        algorithm, table = self._set_up(evaluator, members.F.shape[1], rng), self._table(state)
+        algorithm, table = self._set_up(evaluator, members.F.shape[1], rng, budget), self._table(state)
         individuals = self._individuals(table, evaluator)
         self._restore(algorithm, state, individuals)
-        with warnings.catch_warnings():  # pymoo changes the filters
+        with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):  # pymoo changes the filters
             algorithm.tell(infills=individuals[: len(members)])
         self._remember(algorithm, state, table, members, evaluator)
         state.note(evaluator.tolerance)
@@ -122,10 +122,11 @@ class Baseline(PopulationSolver):
         if left <= 0:
             return
         table = self._table(state)
-        algorithm = self._set_up(evaluator, table.F.shape[1], state.rng)
+        algorithm = self._set_up(evaluator, table.F.shape[1], state.rng, budget)
         self._restore(algorithm, state, self._individuals(table, evaluator))
-        algorithm.is_initialized, algorithm.n_iter, algorithm.opt = True, state.iteration + 1, ()
-        while algorithm.n_iter == state.iteration + 1 and left > 0:  # some ask for one candidate at a time
+        generation = state.iteration + 2  # pymoo's number: the first population is 1
+        algorithm.is_initialized, algorithm.n_iter, algorithm.opt = True, generation, ()
+        while algorithm.n_iter == generation and left > 0:  # some ask for one candidate at a time
             asked = algorithm.ask()
             if asked is None:  # no new offspring could be made
                 break
@@ -138,7 +139,7 @@ class Baseline(PopulationSolver):
             left = budget - evaluator.counts.evaluations
             self._present(offspring, bred, len(table), evaluator)
             table = table.joined(bred)
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):
                 algorithm.tell(infills=asked if alone else offspring)
             self._remember(algorithm, state, table, bred, evaluator)
         state.iteration += 1
@@ -146,18 +147,23 @@ class Baseline(PopulationSolver):
 
     # Between the two
 
-    def _set_up(self, evaluator: Evaluator, m: int, rng: np.random.Generator) -> Any:
-        """The algorithm, set up for the variables of the evaluator and m objectives; its random numbers are drawn from `rng`."""
+    def _set_up(self, evaluator: Evaluator, m: int, rng: np.random.Generator, budget: int) -> Any:
+        """The algorithm, set up for the variables of the evaluator, m objectives and as many generations as the budget has room for; its
+        random numbers are drawn from `rng`."""
         from pymoo.config import Config
         from pymoo.core.evaluator import VoidEvaluator
         from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
+        from pymoo.termination.max_gen import MaximumGenerationTermination
 
         Config.warnings["not_compiled"] = False  # it would print
+        size = self._size(m)
+        assert size is not None
+        end = MaximumGenerationTermination(-(-budget // size))
+        end.update = lambda algorithm: 0.0  # it ends nothing, but says to an algorithm how many generations there are
         m = self._presented_count(m)
         algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._compares_violations)
         problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
-        algorithm.setup(problem, termination=NoTermination(), evaluator=VoidEvaluator(value=None), seed=0)
+        algorithm.setup(problem, termination=end, evaluator=VoidEvaluator(value=None), seed=0)
         algorithm.random_state = rng
         return algorithm
 
@@ -187,3 +193,12 @@ class Baseline(PopulationSolver):
 def rows_of(individuals: Any) -> np.ndarray:
     """Rows (n,) of pymoo's individuals in the table of all points."""
     return np.array([one.data["row"] for one in individuals], dtype=int)
+
+
+def variation(crossover: float, crossover_eta: float, mutation_eta: float, **more: Any) -> dict[str, Any]:
+    """Operators of a genetic algorithm of pymoo, by the names of its arguments: simulated binary crossover with this probability, and
+    polynomial mutation; `more` are arguments of the crossover."""
+    from pymoo.operators.crossover.sbx import SBX
+    from pymoo.operators.mutation.pm import PM
+
+    return {"crossover": SBX(eta=crossover_eta, prob=crossover, **more), "mutation": PM(eta=mutation_eta)}

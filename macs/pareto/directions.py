@@ -143,6 +143,12 @@ def population_size(m: int | None, population: int | None, divisions: int | None
     return None if m is None else lattice_size(m, divisions_below(m, DEFAULT) if divisions is None else divisions)
 
 
+def check_several(name: str, m: int) -> None:
+    """Raise ValueError, with the `name` of the solver, for a single objective."""
+    if m < 2:
+        raise ValueError(f"{name} needs at least two objectives, not {m}; NSGA2 and MACS also search for the best of one")
+
+
 def check_directions(name: str, m: int, population: int | None, divisions: int | None) -> None:
     """Raise ValueError if there are too few directions, or too few individuals for them.
 
@@ -155,8 +161,7 @@ def check_directions(name: str, m: int, population: int | None, divisions: int |
     population, divisions : int or None
         As the user gave them.
     """
-    if m < 2:
-        raise ValueError(f"{name} needs at least two objectives, not {m}; NSGA2 and MACS also search for the best of one")
+    check_several(name, m)
     if population is None:
         return
     if divisions is None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from vector_problems import parabolas
 
-from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front, optimize, payoff, sweep
+from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA, Front, optimize, payoff, sweep
 from macs.decisions import Dialogue, ReferencePoint, decide
 from macs.evaluation.blackbox import BlackBox
 from macs.fronts.verification import verify
@@ -69,7 +69,7 @@ def test_solve_and_minimize_are_one_search():
 
 
 def test_every_search_solves_it():
-    for solver in (NSGA3(), MOEAD(population=20), MOPSOCD(particles=20)):
+    for solver in (NSGA3(), MOEAD(population=20), MOPSOCD(particles=20), SMSEMOA(population=20), RVEA(), CTAEA(population=20)):
         found = solver.solve(parabolas(), evaluations=300, seed=1)
         assert len(found) and found.verified.all()
 

@@ -7,6 +7,7 @@ import sys
 import warnings
 from dataclasses import fields, is_dataclass
 from functools import partial
+from importlib.util import find_spec
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -16,13 +17,21 @@ from boxes import boxed
 from fronts import distance_to_curve
 from plain import dtlz
 
-from macs import MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3
+from macs import AGEMOEA2, CTAEA, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.directions import reference_directions
 from macs.pareto.dominance import nondominated
 from problems import load
 from problems.cases.goddard import reference
 from transcription import DFET
+
+NUMBA = find_spec("numba") is not None
+"""Without it, all but AGE-MOEA-II is tested."""
+
+
+def age(*populations: int) -> list[AGEMOEA2]:
+    return [AGEMOEA2(population=population) for population in populations if NUMBA]
+
 
 SMALL = [
     NSGA2(population=12),
@@ -31,6 +40,10 @@ SMALL = [
     MOEAD(divisions=11, batch=True),
     MOPSOCD(particles=12),
     MOPSO(particles=12),
+    SMSEMOA(population=12),
+    *age(12),
+    RVEA(divisions=11),
+    CTAEA(divisions=11),
 ]
 HANDLED = [type(s)(**{**s.__dict__, "handling": h}) for s in SMALL for h in ("feasible-first", "penalty", "objective")]
 
@@ -58,16 +71,26 @@ def schaffer(X: np.ndarray) -> np.ndarray:
 
 def theirs(settings: Any, m: int) -> Any:
     """The algorithm of pymoo that the settings are to equal."""
-    from pymoo.algorithms.moo import moead, mopso_cd, nsga2, nsga3
+    from pymoo.algorithms.moo import ctaea, moead, mopso_cd, nsga2, nsga3, rvea, sms
     from pymoo.util.ref_dirs import get_reference_directions
 
     if isinstance(settings, NSGA2):
         return nsga2.NSGA2(pop_size=settings.population)
+    if isinstance(settings, SMSEMOA):
+        return sms.SMSEMOA(pop_size=settings.population)
+    if isinstance(settings, AGEMOEA2):
+        from pymoo.algorithms.moo import age2
+
+        return age2.AGEMOEA2(pop_size=settings.population)
     if isinstance(settings, MOPSOCD):
         return mopso_cd.MOPSO_CD(pop_size=settings.particles, archive_size=settings.archive)
     directions = get_reference_directions("das-dennis", m, n_partitions=settings.divisions or (99 if m == 2 else 12))
     if isinstance(settings, NSGA3):
         return nsga3.NSGA3(directions, pop_size=settings.population)
+    if isinstance(settings, RVEA):
+        return rvea.RVEA(directions, pop_size=settings.population, alpha=settings.alpha, adapt_freq=settings.adapt_every)
+    if isinstance(settings, CTAEA):
+        return ctaea.CTAEA(directions)
     algorithm = moead.ParallelMOEAD if settings.batch else moead.MOEAD
     return algorithm(directions, n_neighbors=settings.neighbors)
 
@@ -77,6 +100,9 @@ CASES = [
     *((MOEAD(divisions=divisions, batch=batch), n) for batch in (False, True) for divisions, n in ((19, "zdt1"), (4, "dtlz2"))),
     (NSGA2(population=30), "zdt1"),
     (NSGA3(population=20, divisions=4), "dtlz7"),
+    *((settings, name) for settings in (SMSEMOA(), *age(100), RVEA(), CTAEA()) for name in ("zdt4", "dtlz2")),
+    (RVEA(population=20, divisions=4, alpha=1.0, adapt_every=0.3), "dtlz7"),
+    (CTAEA(divisions=19), "zdt1"),
 ]
 
 
@@ -88,7 +114,7 @@ def test_they_are_pymoo_s_own_to_the_last_bit(settings: Any, name: str) -> None:
     problem, generations = get_problem(name), 5
     with warnings.catch_warnings():
         truth = minimize(problem, theirs(settings, problem.n_obj), ("n_gen", generations), seed=5)
-    state = run(settings, boxed(problem), generations * len(truth.pop), seed=5)
+    state = run(settings, boxed(problem), truth.algorithm.evaluator.n_eval - (100 if isinstance(settings, MOPSOCD) else 0), seed=5)
     assert np.array_equal(state.members.F, truth.pop.get("F"))
     assert np.array_equal(state.members.Z, truth.pop.get("X"))
     kept = np.unique(truth.F, axis=0)
@@ -108,20 +134,53 @@ def test_so_are_fronts() -> None:
     assert front.stats["reproducible"]
 
 
-def test_with_one_constraint_nsga2_is_still_pymoo_s_own() -> None:
+@pytest.mark.parametrize("m", [2, 3])
+@pytest.mark.parametrize(
+    "settings",
+    [NSGA2(population=40), SMSEMOA(population=40), *age(40), RVEA(population=40, divisions=6), CTAEA(divisions=7)],
+    ids=lambda settings: type(settings).__name__,
+)
+def test_with_one_constraint_they_are_still_pymoo_s_own_if_interrupted_too(settings: Any, m: int) -> None:
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
     class Ring(Problem):
         def __init__(self) -> None:
-            super().__init__(n_var=4, n_obj=2, n_ieq_constr=1, xl=-2.0, xu=2.0)
+            super().__init__(n_var=4, n_obj=m, n_ieq_constr=1, xl=-2.0, xu=2.0)
 
         def _evaluate(self, X: np.ndarray, out: dict, *args: Any, **kwargs: Any) -> None:
-            out["F"], out["G"] = schaffer(X), (0.81 - ((X - 0.5) ** 2).sum(axis=1))[:, None] * (X[:, :1] < 1.5)
+            out["F"] = np.stack([((X - middle) ** 2).sum(axis=1) for middle in (0, 1, [1, 0, 0, -1])[:m]], axis=1)
+            out["G"] = (0.81 - ((X - 0.5) ** 2).sum(axis=1))[:, None] * (X[:, :1] < 1.5)
 
-    truth = minimize(Ring(), theirs(NSGA2(population=40), 2), ("n_gen", 15), seed=2)
-    state = run(NSGA2(population=40), boxed(Ring(), tolerance=0.0), 600, seed=2)
-    assert np.array_equal(state.members.F, truth.pop.get("F"))
+    if isinstance(settings, RVEA) and m == 2:
+        settings = RVEA(population=40, divisions=29)
+    truth = minimize(Ring(), theirs(settings, m), ("n_gen", 15), seed=2)
+    budget = truth.algorithm.evaluator.n_eval
+    for between in (None, lambda state: rebuilt(type(state), plain(state))):
+        state = run(settings, boxed(Ring(), tolerance=0.0), budget, seed=2, between=between)
+        assert np.array_equal(state.members.F, truth.pop.get("F"))
+        kept = np.unique(truth.opt[truth.opt.get("feas")].get("F"), axis=0)
+        assert np.array_equal(np.unique(state.archive.F, axis=0), kept[nondominated(kept)])
+    if isinstance(settings, CTAEA):
+        assert np.array_equal(state.diversity.F, truth.algorithm.da.get("F"))
+
+
+@pytest.mark.parametrize("settings", [SMALL[0], *SMALL[6:]], ids=named)
+def test_they_draw_from_no_generator_but_the_run_s(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Forbidden:
+        def __getattr__(self, name: str) -> Any:
+            raise AssertionError(f"{name} drawn from a generator without a seed")
+
+    seeded = np.random.default_rng
+    monkeypatch.setattr(np.random, "default_rng", lambda seed=None: Forbidden() if seed is None else seeded(seed))
+    monkeypatch.setattr(np.random.mtrand, "_rand", Forbidden())
+    for function in (schaffer, partial(tied, 0.0), partial(tied, 1.0)):
+        run(settings, boxed(function, [(-2, 2)] * 3), 150)
+
+
+def tied(share: float, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points with equal objectives, and with a few violations, so that much is equal."""
+    return np.round(schaffer(X)), np.round(X[:, :1] + share)
 
 
 def test_the_particles_that_pymoo_throws_away_are_not_evaluated() -> None:
@@ -157,7 +216,7 @@ def test_any_number_of_directions_spreads_over_the_simplex(m: int, count: int) -
 
 
 def test_importing_the_package_imports_no_pymoo() -> None:
-    code = "import sys; from macs import MOPSO, NSGA2, NSGA3, MOEAD, MOPSOCD; NSGA3(divisions=4); sys.exit('pymoo' in sys.modules)"
+    code = "import sys; from macs import *; NSGA3(divisions=4), SMSEMOA(), RVEA(), CTAEA(); sys.exit('pymoo' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -201,19 +260,32 @@ def test_a_state_that_was_data_for_a_while_goes_on_with_the_same_bits(settings: 
         np.testing.assert_equal(plain(broken)[name], value)
 
 
-@pytest.mark.parametrize("settings", [NSGA2(population=20), NSGA3(divisions=3), MOPSOCD(particles=20, archive=500)], ids=named)
+@pytest.mark.parametrize(
+    "settings",
+    [
+        NSGA2(population=20),
+        NSGA3(divisions=3),
+        MOPSOCD(particles=20, archive=500),
+        SMSEMOA(population=20),
+        *age(20),
+        RVEA(divisions=4, adapt_every=0.2),
+        CTAEA(divisions=3),
+    ],
+    ids=named,
+)
 def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
     from pymoo.optimize import minimize
     from pymoo.problems import get_problem
 
     truth = minimize(get_problem("dtlz2"), theirs(settings, 3), ("n_gen", 9), seed=4)
-    state = run(settings, boxed(get_problem("dtlz2")), 9 * len(truth.pop), seed=4, between=lambda s: rebuilt(type(s), plain(s)))
+    budget = 9 * 15 if isinstance(settings, RVEA) else 9 * len(truth.pop)
+    state = run(settings, boxed(get_problem("dtlz2")), budget, seed=4, between=lambda s: rebuilt(type(s), plain(s)))
     assert np.array_equal(state.members.F, truth.pop.get("F"))
 
 
 @pytest.mark.parametrize(
     "settings",
-    [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12), MOPSO(particles=20)],
+    [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12), MOPSO(particles=20), *SMALL[6:]],
     ids=named,
 )
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(settings: Any) -> None:
@@ -310,7 +382,8 @@ def test_a_start_is_evaluated_first_and_is_of_use(settings: Any, count: int) -> 
     first = np.vstack(asked)[: min(count, 12)]
     wanted = start[np.linspace(0, count - 1, min(count, 12)).round().astype(int)]
     assert np.array_equal(first, wanted)
-    assert (front.decision[0] == start[0]).all()
+    kept = [(front.decision == one).all(axis=1).any() for one in start]
+    assert any(kept) if isinstance(settings, RVEA) else (front.decision[0] == start[0]).all()  # it need not keep the ends of a front
 
 
 class Moved(Evaluator):
@@ -380,6 +453,15 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
         (lambda: MOEAD(batch=2), "MOEAD: batch"),  # type: ignore[arg-type]
         (lambda: MOPSOCD(particles=2.5), "MOPSOCD: particles"),  # type: ignore[arg-type]
         (lambda: MOPSOCD(max_velocity=0.0), "MOPSOCD: max_velocity"),
+        (lambda: SMSEMOA(population=1), "SMSEMOA: population must be a whole number of at least 2, not 1"),
+        (lambda: SMSEMOA(crossover=-0.5), r"SMSEMOA: crossover must be in \[0, 1\], not -0.5"),
+        (lambda: AGEMOEA2(mutation_eta=0.5), r"AGEMOEA2: mutation_eta must be in \[1, 100\], not 0.5"),
+        (lambda: AGEMOEA2(handling="death"), "AGEMOEA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
+        (lambda: RVEA(divisions=0), "RVEA: divisions must be a whole number of at least 1, not 0"),
+        (lambda: RVEA(alpha=-1.0), r"RVEA: alpha must be in \[0, inf\), not -1.0"),
+        (lambda: RVEA(adapt_every=0.0), r"RVEA: adapt_every must be in \(0, 1\], not 0.0"),
+        (lambda: CTAEA(population=2.5), "CTAEA: population must be a whole number of at least 2, not 2.5"),  # type: ignore[arg-type]
+        (lambda: CTAEA(crossover_eta=101), r"CTAEA: crossover_eta must be in \[1, 100\], not 101"),
         (lambda: NSGA2(degree="mean"), "NSGA2: degree must be one of 'largest', 'sum', 'log', 'printed', not 'mean'"),
         (lambda: MOPSO(particles=0), "MOPSO: particles must be a whole number of at least 1, not 0"),
         (lambda: MOPSO(archive=0), "MOPSO: archive must be a whole number of at least 1"),
@@ -403,6 +485,16 @@ def test_settings_that_make_no_sense(make: Any, message: str) -> None:
         (NSGA3(population=50, divisions=12), 3, "makes 91 reference directions with 3 objectives, more than population=50"),
         (NSGA3(population=120, divisions=3), 4, "makes 20 .* too few for population=120; divisions=7 makes 120"),
         (NSGA3(divisions=12, population=91, handling="objective"), 3, "makes 455 reference directions with 4 objectives"),
+        (SMSEMOA(), 1, "SMSEMOA needs at least two objectives, not 1"),
+        *((settings, 1, "AGEMOEA2 needs at least two objectives, not 1") for settings in age(100)),
+        (RVEA(), 1, "RVEA needs at least two objectives, not 1"),
+        (CTAEA(), 1, "CTAEA needs at least two objectives, not 1"),
+        (
+            RVEA(population=50, divisions=12),
+            3,
+            "RVEA: divisions=12 makes 91 reference directions with 3 objectives, more than population=50",
+        ),
+        (CTAEA(population=92, divisions=12), 3, "CTAEA: divisions=12 makes 91 .*, and population=92 needs as many"),
         (MOEAD(population=92, divisions=12), 3, "MOEAD: divisions=12 makes 91 reference directions with 3 objectives, and population=92"),
     ],
 )
@@ -415,8 +507,8 @@ def test_directions_that_do_not_fit(settings: Any, m: int, message: str) -> None
 
 
 def test_objectives_that_only_an_evaluation_tells_are_checked_then() -> None:
-    for settings, message in ((NSGA3(), "at least two objectives"), (MOEAD(population=5), "at least two objectives")):
-        with pytest.raises(ValueError, match=message):
+    for settings in (NSGA3(), MOEAD(population=5), RVEA(), CTAEA()):
+        with pytest.raises(ValueError, match="at least two objectives"):
             settings.minimize(lambda X: X.sum(axis=1), [(0, 1)] * 4, evaluations=50)
 
 

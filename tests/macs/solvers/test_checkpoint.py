@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from macs import MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, Front
+from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA, Front
 from macs.evaluation import bilevel
 from macs.gradients import polish
 from macs.io import interrupts as monitor
@@ -117,6 +117,9 @@ BASELINES = [
     MOEAD(divisions=11, batch=True),
     MOPSOCD(particles=12),
     MOPSO(particles=12),
+    SMSEMOA(population=12),
+    RVEA(divisions=11),
+    CTAEA(divisions=11),
 ]
 
 
@@ -134,7 +137,7 @@ def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
         file.unlink()
 
 
-@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6), MOPSO(particles=6)], ids=str)
+@pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6), MOPSO(particles=6), CTAEA(divisions=5)], ids=str)
 def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
     solve(solver, 30, checkpoint=file, callback=after(1))
     assert_same(solve(solver, 30, checkpoint=file), solve(solver, 30))
