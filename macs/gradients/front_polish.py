@@ -31,9 +31,9 @@ from ..fronts.provenance import more_costs
 from ..fronts.simulated import simulated
 from ..fronts.verified import unmarked
 from ..io.console import working
-from ..pareto import archive as archives
-from ..pareto.archive import Archive, Guide
+from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
+from ..pareto.energy import Guide, spread
 from ..pareto.ranges import ranges
 from .counted import CountedSolves
 from .polish import polish
@@ -95,7 +95,7 @@ def polished(
     stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
     found = merge([vectors_points(nlp, Z, front.solver, stats, **found_of, notes=notes), known])
-    found = found if len(found) <= limit else found[np.flatnonzero(archives.spread(found.F, limit, guide=guide))]
+    found = found if len(found) <= limit else found[np.flatnonzero(spread(found.F, limit, guide=guide))]
     message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
     message = f"{stopped}: {unseen} points of the front before were not simulated" if unseen else message
     return found.replace(solver=dict(front.solver), stats=stats, message=message)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED
-from ..pareto import archive as archives
-from ..pareto.archive import Archive, Guide
+from ..pareto.archive import Archive
 from ..pareto.dominance import extremes
+from ..pareto.energy import Guide, reach, spread
 from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
 from .counted import CountedSolves
 from .surface import cover
@@ -114,7 +114,7 @@ def polish(
 
 def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
     """At most `limit` points of the pool, evenly spread, or as the guide wants them."""
-    return pool if len(pool) <= limit else pool.take(archives.spread(pool.F, limit, exponent=exponent, guide=guide))
+    return pool if len(pool) <= limit else pool.take(spread(pool.F, limit, exponent=exponent, guide=guide))
 
 
 def _descend(
@@ -127,7 +127,7 @@ def _descend(
     fresh = ~_among(archive.F, solved)
     chosen = fresh.copy()
     if most < np.count_nonzero(fresh):
-        chosen[fresh] = archives.spread(archive.F[fresh], most, exponent=exponent, guide=guide)
+        chosen[fresh] = spread(archive.F[fresh], most, exponent=exponent, guide=guide)
     archive, waiting, chosen = archive.take(chosen | ~fresh), archive.take(fresh & ~chosen), chosen[chosen | ~fresh]
     points = archive.take(chosen)
     found = solves(points.Z, points.F, np.tile(span, (len(points), 1)))
@@ -214,7 +214,7 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
     gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, min(limit - n, n))]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
     starts = [archive.Z[i] for i, _ in gaps]
-    power, share = 0.5 * archives.reach(F, exponent), np.linspace(0.0, 0.6, 25)[:, None]
+    power, share = 0.5 * reach(F, exponent), np.linspace(0.0, 0.6, 25)[:, None]
     for i in np.setdiff1d(np.arange(n), extremes(archive.F)):
         others = np.delete(F, i, axis=0)
         lines = np.concatenate([F[i] + share * (F[j] - F[i]) for j in neighbours[i]])

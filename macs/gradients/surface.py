@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, Evaluation
-from ..pareto.archive import Archive, Guide
+from ..pareto.archive import Archive
 from ..pareto.directions import across, divisions_below, simplex_lattice
+from ..pareto.energy import Guide
 from ..pareto.ranges import distinct, ranges
 from .counted import CountedSolves
 

@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 
-from .archive import spread
+from .energy import spread
 from .ranges import normalised
 
 

@@ -15,8 +15,8 @@ from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
 from ..gradients.multistart import GradientSolves
 from ..gradients.tasks import Along
-from ..pareto.archive import Guide, spread
 from ..pareto.dominance import extremes
+from ..pareto.energy import Guide, spread
 from .mesh_loop import Programs
 
 STARTS = 2

@@ -21,7 +21,7 @@ from ..fronts.verified import Simulations, accuracy, largest_miss, objective_sca
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
-from ..pareto.archive import Guide
+from ..pareto.energy import Guide
 from .filling import filled
 from .fine_front import solved_on
 from .mesh_loop import BUILDING, OnMesh, Programs

@@ -1,10 +1,10 @@
 """Breeding: offspring of the points of the archive, by several operators. An operator is used more often if the archive keeps its
-offspring.
+offspring for some time.
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. No operator is
-best on every problem. Crossover suits separable problems with many local fronts, differences suit coupled variables. So all are used, in
-proportion to their success.
+best on every problem. Crossover suits separable problems with many local fronts, differences suit coupled variables. So all are used, and
+those more often whose offspring stay in the archive, see `credit`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..evaluation.box import Box
+from .credit import Offspring, judged, operator_shares
 from .state import remember
 from .trials import Trials
 
@@ -31,10 +32,6 @@ DIFFERENCE = 0.5
 
 INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 """Distribution indices; a higher index puts offspring nearer to their parents (Deb and Agrawal 1995)."""
-
-
-LEAST_SHARE, FORGET = 0.05, 0.1
-"""Least share of an operator in the offspring, so that it can succeed later; fraction of the credit that is forgotten in each iteration."""
 
 
 def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -114,7 +111,7 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np
     pool : array (p, d)
         Points that mates are chosen from.
     credit : array (number of operators, 2)
-        See `updated_credit`.
+        See `credit.updated_credit`.
     rng : numpy.random.Generator
 
     Returns
@@ -135,42 +132,16 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np
     return box.put_back(trial), operator
 
 
-def no_credit() -> np.ndarray:
-    """Initial credit (o, 2), equal for all operators: one success in five trials."""
-    return np.tile([1.0, 5.0], (len(OPERATORS), 1))
-
-
-def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Credit of the operators (o, 2): number of offspring that the archive kept, and of all offspring; older ones count less.
-
-    Parameters
-    ----------
-    credit : array (o, 2)
-        Credit so far.
-    operator, kept : arrays (k,) of int and bool
-        Operator of each child, and whether the archive kept the child.
-    """
-    tried = np.bincount(operator, minlength=len(credit))
-    won = np.bincount(operator, weights=kept, minlength=len(credit))
-    return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
-
-
-def operator_shares(credit: np.ndarray) -> np.ndarray:
-    """Probabilities (o,) of the operators: proportional to their success rates, with a least share for each (Thierens 2005)."""
-    rate = (credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)
-    return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
-
-
 def _moving_coordinates(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Mask (k, d) of the coordinates that change: all of a row or, with probability one half, each with probability one half."""
     return rng.random(X.shape) < np.where(rng.random((len(X), 1)) < 0.5, 1.0, 0.5)
 
 
 def breed_archive(trials: Trials) -> None:
-    """Breed offspring of the archive's points, from as many parents as possible, and update the credit of the operators."""
+    """Breed offspring of the archive's points, from as many parents as possible; update the credit of operators by earlier offspring."""
     state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
     archive, rng = state.archive, state.rng
-    count = settings.offspring(len(archive))
+    count = settings.offspring(len(archive), archive.F.shape[1])
     if not count:
         return
     rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
@@ -182,5 +153,5 @@ def breed_archive(trials: Trials) -> None:
     if result is None:
         return
     remember(state, trials.seen, settings, evaluator)
-    kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
-    state.credit = updated_credit(state.credit, operator[bred], kept)
+    young = state.bred.joined(Offspring(result.F, operator[bred], np.full(len(bred), state.iteration)))
+    state.bred, state.credit = judged(young, state.credit, archive=state.archive.F, iteration=state.iteration)

@@ -77,13 +77,16 @@ class Gains:
     def __init__(self, state: SearchState, tolerance: float) -> None:
         self._directions, self._tolerance = state.directions, tolerance
         self._ideal, self._nadir = state.ideal, state.nadir
-        self._best = self._values(state.archive.F) if len(state.archive) else None
+        self._front = state.archive.F
+        self._best: np.ndarray | None = None  # the best values are found when they are needed
 
     def of(self, found: Evaluation) -> float:
         """What these points bring, which then count as known."""
         F = found.F[found.violation <= self._tolerance]
-        if self._best is None or not len(F):
+        if not len(self._front) or not len(F):
             return 0.0
+        if self._best is None:
+            self._best = self._values(self._front)
         values = np.minimum(self._values(F), self._best)
         brought = float(np.mean(np.minimum(self._best - values, 1.0)))
         self._best = values

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..pareto.archive import Guide
+from ..pareto.energy import Guide
 from ..pareto.ranges import CURVE, feasible_and_no_worse, nearest, ranges
 from . import social
 from .state import NO_DIRECTION, SearchState

@@ -11,8 +11,8 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.archive import Guide
 from ..pareto.dominance import extremes
+from ..pareto.energy import Guide
 from ..pareto.ranges import CURVE, ranges
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference

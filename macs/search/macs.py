@@ -23,15 +23,16 @@ from ..fronts.merging import best_rows
 from ..gradients.counted import CountedSolves, PolishLog
 from ..gradients.front_polish import polished
 from ..gradients.polish import polish
-from ..pareto import archive as archives
 from ..pareto import directions
-from ..pareto.archive import Archive, Guide
+from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
+from ..pareto.energy import Guide, spread
 from ..refinement.mending import mended
 from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
-from .breeding import breed_archive, no_credit
+from .breeding import OPERATORS, breed_archive
+from .credit import Offspring, no_credit
 from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
@@ -103,7 +104,8 @@ class MACS(Settings, Solver):
             nadir=np.full(m, np.nan),
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
-            credit=no_credit(),
+            credit=no_credit(len(OPERATORS)),
+            bred=Offspring.none(m),
             effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
@@ -325,7 +327,7 @@ def _choose(seen: Evaluation, count: int, tolerance: float, exponent: float | No
     feasible = np.flatnonzero(seen.violation <= tolerance)
     front = feasible[nondominated(seen.F[feasible])]
     if len(front) > count:
-        return front[archives.spread(seen.F[front], count, exponent=exponent, guide=guide)]
+        return front[spread(seen.F[front], count, exponent=exponent, guide=guide)]
     worth = np.where(seen.violation <= tolerance, 0.0, seen.violation)
     dominators = [np.count_nonzero(dominates(seen.F[feasible], F)) for F in seen.F]
     return np.sort(np.lexsort((dominators, ~np.isin(np.arange(len(seen.F)), front), worth))[:count])

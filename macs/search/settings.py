@@ -12,9 +12,12 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
+from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
+FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 0.5
+"""Default of `breeding` with at most three objectives, and with more."""
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
 LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1, "ceiling": 1}
@@ -36,7 +39,7 @@ INTERVALS = {
 """Interval of each number."""
 MESHES = ("mended", "fixed", "adaptive")
 """Kinds of mesh."""
-OPTIONAL = ("exponent",)
+OPTIONAL = ("breeding", "exponent")
 """Numbers that may be None."""
 
 
@@ -122,16 +125,17 @@ class Settings:
         inner level, `inner="auto"`, a polish may always make 60. It needs about six for each point of the archive; with more than two
         objectives, one more for each point that the archive may contain. Not among these are the solves for the ends of the front, and
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
-    breeding : float, default 0.15
+    breeding : float, optional
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
-        More offspring escape from more local fronts, and leave less of the budget for the agents. 0 in the paper.
+        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 0.5 with more than
+        three objectives. 0 in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
         the budget and at least the number of agents. In the paper: the number of agents.
     exponent : float, optional
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
-        with more: on a surface, a low power drives the points to the edges.
-
+        with three: on a surface, a low power drives the points to the edges. With more than three, and without `prefer`, the default is no
+        energy: the archive then has the best points near evenly spread directions, see `macs.pareto.niches`.
     ceiling : int, default 100 000
         Largest number of evaluations of a search without one of its own (`evaluations=None`), which otherwise ends when it is done.
     prefer : Preference or dict, optional
@@ -172,7 +176,7 @@ class Settings:
     keep_velocity: bool = True
     refine_every: int = 200
     polish_every: int = 20
-    breeding: float = 0.15
+    breeding: float | None = None
     sample: int | None = None
     exponent: float | None = None
     ceiling: int = 100_000
@@ -271,9 +275,10 @@ class Settings:
         """Number of points of the first population."""
         return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
 
-    def offspring(self, archived: int) -> int:
-        """Number of offspring in an iteration of an archive with so many points; 0 if it is empty."""
-        return max(self.agents, round(self.breeding * archived)) if self.breeding and archived else 0
+    def offspring(self, archived: int, m: int) -> int:
+        """Number of offspring in an iteration of an archive with so many points, of m objectives; 0 if it is empty."""
+        each = (FEW_OBJECTIVES if m <= MANY else MANY_OBJECTIVES) if self.breeding is None else self.breeding
+        return max(self.agents, round(each * archived)) if each and archived else 0
 
     def social_agents(self, m: int) -> int:
         """Number of agents with a direction, for m objectives: 0 if they are too few for all orthogonal directions."""

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evaluation.box import Box
-from ..pareto import archive as archives
 from ..pareto import directions
-from ..pareto.archive import Guide
+from ..pareto.energy import Guide, spread
 from ..pareto.ranges import normalised
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
@@ -200,7 +199,7 @@ def assign(state: SearchState, settings: Settings, guide: Guide | None = None) -
     owners = np.flatnonzero(agents.direction != NO_DIRECTION)
     if len(archive) >= m:
         if settings.reseed == "spread" and len(archive) > len(owners) >= m:
-            archive = archive.take(archives.spread(archive.F, len(owners), exponent=settings.exponent, guide=guide))
+            archive = archive.take(spread(archive.F, len(owners), exponent=settings.exponent, guide=guide))
         weights = state.directions[agents.direction[owners]]
         costs = directions.tchebycheff(archive.F[:, None], weights, state.ideal, state.nadir)
     elif settings.reseed == "spread":

@@ -14,7 +14,7 @@ from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
 from macs.fronts.pictures.style import COLORS, label
 from macs.fronts.point import Point
-from macs.pareto.archive import spread
+from macs.pareto.energy import spread
 
 from ..measures.indicators import normalised
 from .style import COLUMN, PAGE, new_figure, style

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from macs.evaluation.box import Box
 from macs.search import breeding
+from macs.search import credit as credit_of
 from macs.search.macs import MACS
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -22,7 +23,7 @@ def test_offspring_are_in_the_box_and_the_same_seed_gives_the_same(seed, size, d
     pool = np.random.default_rng(seed).random((size, d))
     pool[::3] = np.round(pool[::3])  # some on the bounds
     cube = box(d, [0] if wrap else [])
-    credit = breeding.no_credit()
+    credit = credit_of.no_credit(len(breeding.OPERATORS))
     first, again = (breeding.breed(cube, cube.put_back(pool), pool, credit, np.random.default_rng(seed)) for _ in range(2))
     assert ((first[0] >= 0.0) & (first[0] <= 1.0)).all()
     assert np.array_equal(first[0], again[0])
@@ -95,25 +96,42 @@ def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
 
 
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
-    credit, count = breeding.no_credit(), len(breeding.OPERATORS)
-    assert np.allclose(breeding.operator_shares(credit), 1 / count)
+    credit, count = credit_of.no_credit(len(breeding.OPERATORS)), len(breeding.OPERATORS)
+    assert np.allclose(credit_of.operator_shares(credit), 1 / count)
     operator = np.repeat(np.arange(count), 25)
     for _ in range(40):
-        credit = breeding.updated_credit(credit, operator, operator == 1)
-    share = breeding.operator_shares(credit)
+        credit = credit_of.updated_credit(credit, operator, operator == 1)
+    share = credit_of.operator_shares(credit)
     assert share.sum() == pytest.approx(1.0)
     assert share.argmax() == 1
     assert share[1] > 0.8
-    assert np.allclose(share[[0, 2, 3]], breeding.LEAST_SHARE, atol=0.01)
+    assert np.allclose(share[[0, 2, 3]], credit_of.LEAST_SHARE, atol=0.01)
     for _ in range(40):  # what was is forgotten
-        credit = breeding.updated_credit(credit, operator, operator == 2)
-    assert breeding.operator_shares(credit).argmax() == 2
+        credit = credit_of.updated_credit(credit, operator, operator == 2)
+    assert credit_of.operator_shares(credit).argmax() == 2
 
 
 def test_nothing_tried_changes_nothing_that_can_be_seen():
     credit = np.zeros((len(breeding.OPERATORS), 2))
-    assert np.array_equal(breeding.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
-    assert np.allclose(breeding.operator_shares(credit), 1 / len(credit))
+    assert np.array_equal(credit_of.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
+    assert np.allclose(credit_of.operator_shares(credit), 1 / len(credit))
+
+
+def test_offspring_is_judged_when_it_is_old_enough_by_what_has_stayed():
+    count = len(breeding.OPERATORS)
+    young = credit_of.Offspring(np.array([[0.0, 1.0], [1.0, 0.0], [0.5, 0.5]]), np.array([0, 2, 2]), np.array([3, 3, 4]))
+    archive = np.array([[1.0, 0.0], [0.2, 0.3], [0.5, 0.5]])
+    credit, now = credit_of.no_credit(count), 3 + credit_of.LATER
+    same, unchanged = credit_of.judged(young, credit, archive, now - 1)
+    assert same is young
+    assert unchanged is credit
+    left, found = credit_of.judged(young, credit, archive, now)
+    assert left.F.tolist() == [[0.5, 0.5]]
+    assert (left.operator.tolist(), left.born.tolist()) == ([2], [4])
+    kept = (1 - credit_of.FORGET) * credit
+    assert np.allclose(found - kept, [[0, 1], [0, 0], [1, 1], [0, 0]])
+    none, _ = credit_of.judged(left, found, archive, now + 1)
+    assert none.F.shape == (0, 2)
 
 
 def test_the_search_credits_what_the_archive_keeps():
@@ -123,17 +141,19 @@ def test_the_search_credits_what_the_archive_keeps():
     while state.evaluations < 2000:
         settings.advance(state, box, 2000)
         assert (state.credit[:, 0] <= state.credit[:, 1]).all()
-    assert not np.array_equal(state.credit, breeding.no_credit())
+    assert not np.array_equal(state.credit, credit_of.no_credit(len(breeding.OPERATORS)))
 
 
 def test_how_many_are_sampled_and_bred():
-    assert MACS().points_to_sample(10_000) == MACS().offspring(10) == 10
-    assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100) == 100
-    assert MACS(archive=100).offspring(100) == 15
+    assert MACS().points_to_sample(10_000) == MACS().offspring(10, 2) == 10
+    assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100, 3) == 100
+    assert MACS(archive=100).offspring(100, 3) == 15
+    assert MACS(archive=100).offspring(100, 4) == 50
+    assert MACS(archive=100, breeding=0.15).offspring(100, 4) == 15
     assert MACS(archive=100).points_to_sample(500) == 25
-    assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3) == 10
+    assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3, 2) == 10
     assert MACS(sample=40).points_to_sample(20) == 40
-    assert MACS().offspring(0) == MACS(breeding=0).offspring(50) == 0
+    assert MACS().offspring(0, 2) == MACS(breeding=0).offspring(50, 2) == 0
     assert MACS.paper(agents=7, archive=100).points_to_sample(30_000) == 7
     assert MACS.paper(sample=30).sample == 30
-    assert MACS.paper().offspring(10) == 0
+    assert MACS.paper().offspring(10, 2) == 0

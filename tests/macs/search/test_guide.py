@@ -24,7 +24,7 @@ from macs.decisions import (
     WeightedSum,
 )
 from macs.pareto import directions
-from macs.pareto.archive import spread
+from macs.pareto.energy import spread
 from macs.search.guide import OUTSIDE, PreferenceGuide
 from macs.search.region import PART, Region
 from problems import load
