@@ -13,7 +13,7 @@ from .directions import reference_directions
 
 MANY = 3
 """With more than so many objectives, points compete along directions."""
-PENALTY = 5.0
+PENALTY = 3.0
 """Weight of the distance from a direction, relative to the distance along it (Zhang and Li 2007)."""
 TIE = 1e-6
 """Values of an objective that differ from the best by less than this part of the range are as good as the best."""
@@ -57,8 +57,8 @@ def best_of_niches(F: np.ndarray, limit: int) -> np.ndarray:
 def intercepts(F: np.ndarray) -> np.ndarray:
     """Scales (m,) of the objectives F (n, m): from the ideal point to where the plane through the corners of the front meets the axes.
 
-    The corner of an objective is the point nearest to its axis. If the plane has no such intercepts inside the range of F, the scales are
-    the ranges (Deb and Jain 2014). An objective that does not vary has the scale 1.
+    The corner of an objective is the point nearest to its axis. No scale is more than the range; if the plane does not meet all axes, all
+    are the ranges (Deb and Jain 2014). An objective that does not vary has the scale 1.
     """
     N = F - F.min(axis=0)
     span = N.max(axis=0)
@@ -71,8 +71,9 @@ def intercepts(F: np.ndarray) -> np.ndarray:
             cut = 1.0 / np.linalg.solve(corners, np.ones(len(span)))
         except np.linalg.LinAlgError:
             return span
-    inside = np.isfinite(cut) & (cut > ALONG) & (cut <= 1.0)
-    return span * np.where(inside.all(), cut, 1.0)
+    if not (np.isfinite(cut) & (cut > ALONG)).all():
+        return span
+    return span * np.minimum(cut, 1.0)
 
 
 def nearly_best(F: np.ndarray, total: np.ndarray) -> np.ndarray:
