@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
@@ -83,7 +83,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         are found.
     """
     conditions = Conditions.of(nlp, z, F_scales)
-    return float("inf") if conditions is None else conditions.residual
+    return np.inf if conditions is None else conditions.residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,6 @@ class Linearised:
     @classmethod
     def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Linearised | None:
         """Those at z, see `optimality`; None where a derivative, in units, is no number."""
-        z = np.asarray(z, dtype=float)
         found = gradients(nlp)(z)
         dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
         natural = nlp_scales(nlp)
@@ -163,7 +162,7 @@ class Conditions:
         try:
             return _least(self.reduced, self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
-            return float("inf")
+            return np.inf
 
     def residual_of(self, mixtures: np.ndarray) -> float:
         """The least residual of weights that are mixtures of those in the columns (used, p), which are not negative and each of sum 1."""
@@ -171,7 +170,7 @@ class Conditions:
         try:
             return _least(np.hstack([self.reduced[:, :m] @ mixtures, self.reduced[:, m:]]), self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
-            return float("inf")
+            return np.inf
 
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -194,14 +193,14 @@ class Conditions:
         """Those that leave the least residual, see `scaled`; None where none are found."""
         if self.scaled is None:
             return None
-        nlp, near, used = self.linear.nlp, self.linear.near, np.isfinite(self.linear.scales)
-        of_objectives, of_rows, of_bounds = np.zeros(len(used)), np.zeros(len(nlp.g_scale)), np.zeros(len(nlp.variables))
+        nlp, used, n, r = self.linear.nlp, np.isfinite(self.linear.scales), len(self.linear.z), len(self.linear.nlp.g_scale)
+        of_objectives, of_equations = np.zeros(len(used)), np.zeros(r)
         of_objectives[used], rest = self.scaled
-        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ np.concatenate(self.scaled)
-        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in near])[:-1])
-        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), near, (-1, 1, -1, 1), each, strict=True):
-            target[which] += side * values
-        return Multipliers(of_objectives / self.linear.scales, of_rows / nlp.g_scale, of_bounds / units(nlp))
+        of_equations[nlp.g_lower == nlp.g_upper] = -self.adjoints @ np.concatenate(self.scaled)
+        of_sides = np.zeros(2 * (n + r))
+        of_sides[np.concatenate(self.linear.near)] = rest
+        lower, upper, below, above = np.split(of_sides, [n, 2 * n, 2 * n + r])
+        return Multipliers(of_objectives / self.linear.scales, (of_equations + above - below) / nlp.g_scale, (upper - lower) / units(nlp))
 
     def _others(self) -> list[np.ndarray]:
         """Masks of the inequalities, group by group, that are no bounds of free variables."""
@@ -226,9 +225,9 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
         (nlp.g_upper - g) / nlp.g_scale,
     )
     near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
-    bounds = [side * (np.arange(len(z)) == np.flatnonzero(one)[:, None]) for side, one in zip((1.0, -1.0), near[:2], strict=True)]
-    rows = [*bounds, dg[near[2]].toarray(), -dg[near[3]].toarray()]
-    return near, np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
+    own = identity(len(z), format="csr")
+    sides = vstack([own[near[0]], -own[near[1]], dg[near[2]], -dg[near[3]]]).toarray()
+    return near, sides, np.maximum(np.concatenate(slacks)[np.concatenate(near)], 0.0)
 
 
 def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
