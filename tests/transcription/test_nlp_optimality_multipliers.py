@@ -81,7 +81,9 @@ def test_at_a_corner_of_the_box_they_are_the_slopes(slope: tuple[float, float], 
     assert multipliers.of_bounds[[slot(nlp, "p"), slot(nlp, "q")]] == pytest.approx(-np.array(slope) / scale)
 
 
-@pytest.mark.parametrize(("slope", "limits"), [((-6, -15), {"upper": 10.0}), ((6, 15), {"lower": 10.0}), ((6, 15), {"upper": 10.0, "lower": 10.0})])
+@pytest.mark.parametrize(
+    ("slope", "limits"), [((-6, -15), {"upper": 10.0}), ((6, 15), {"lower": 10.0}), ((6, 15), {"upper": 10.0, "lower": 10.0})]
+)
 def test_a_row_has_what_its_limit_is_worth(slope: tuple[float, float], limits: dict[str, float]) -> None:
     # The objective is +-3 times what is limited: a unit more of the limit changes it by so much.
     nlp = plane(slope, **limits)
@@ -167,8 +169,10 @@ def test_a_mixture_has_what_its_best_weights_leave() -> None:
     conditions = Conditions.of(nlp, z, np.ones(2))
     assert conditions is not None
     bound = 2 * 0.503 * 1.5 * s / np.sqrt(1 + s**2)
-    for columns, weight in (([[0.7, 0.3]], 0.3), ([[1, 0]], 0.0), ([[0, 1]], 1.0), ([[1, 0], [0.5, 0.5]], 0.3), ([[1, 0], [0.9, 0.1]], 0.1)):
-        assert conditions.residual_of(np.array(columns).T) == pytest.approx(np.hypot(2 * (0.3 - weight) * 4, bound), rel=1e-6)
+    for columns, weight in (([0.3], 0.3), ([0], 0.0), ([1], 1.0), ([0, 0.5], 0.3), ([0, 0.1], 0.1), ([1, 0.4], 0.4)):
+        assert conditions.residual_of(np.array([1 - np.array(columns), columns])) == pytest.approx(
+            np.hypot(2 * (0.3 - weight) * 4, bound), rel=1e-6
+        )
 
 
 @pytest.mark.parametrize("error", [RuntimeError, np.linalg.LinAlgError])
@@ -219,7 +223,7 @@ def test_a_bound_of_a_free_variable_is_named_rather_than_one_of_a_state(sign: in
 
 @pytest.mark.parametrize("side", ["lower", "upper"])
 def test_rows_that_say_the_same_share(side: str) -> None:
-    # The least squares of a + b = 6 are 3 and 3; with rows of other size they are shared by that size: in scales, 2 and 1 here.
+    # The least squares of a + b = 6 are 3 and 3, those of a + 2 b = 6 are 6/5 and 12/5, of which the latter takes 24/5.
     for factor, shares in ((1.0, (3.0, 3.0)), (2.0, (6 / 5, 6 * 4 / 5))):
         problem = still("same rows")
         p = problem.parameter("p", bounds=P)
@@ -227,8 +231,8 @@ def test_rows_that_say_the_same_share(side: str) -> None:
         problem.constraint("other", factor * p, scale=1.0, **{side: factor})
         problem.minimize("f", 6 * p if side == "lower" else -6 * p)
         nlp = nlp_of(problem, SMALLEST)
-        of_rows = check(nlp, vector(nlp, p=1.0), np.array([1.0])).of_rows
-        assert np.abs(of_rows[[row(nlp, "constraint 'one'"), row(nlp, "constraint 'other'")]]) * [1, factor] == pytest.approx(shares, rel=1e-5)
+        both = check(nlp, vector(nlp, p=1.0), np.array([1.0])).of_rows[[row(nlp, "constraint 'one'"), row(nlp, "constraint 'other'")]]
+        assert np.abs(both) * [1, factor] == pytest.approx(shares, rel=1e-5)
 
 
 def test_the_end_of_the_box_of_a_periodic_control_is_no_bound() -> None:

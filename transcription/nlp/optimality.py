@@ -21,8 +21,9 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
-BEYOND, DETERMINED = 50, 1e-9
-"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part."""
+BEYOND, DETERMINED, ADJOINT = 50, 1e-9, 1e-6
+"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part; and
+what may be left where they are not: by the weight of states, what a unit of the free variables does to them times `DEPENDENT`."""
 SMALL = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
@@ -236,7 +237,7 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
 
     Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
     for the others. Where the equations determine the others, these follow from the free ones, and it is the total derivative by these, less
-    what the equations beyond those can take from it.
+    what the equations beyond those can take from it. Raises RuntimeError where they do not.
     """
     measured = np.isinf(nlp.span)
     measured[nlp.free] = True
@@ -244,6 +245,9 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
     if found is not None:
         return found
     s, adjoints = steepest(diags(np.where(measured, 1.0, DEPENDENT)), equations, gradients)
+    left = DEPENDENT * s[~measured]
+    if not np.abs(left).max(initial=0.0) <= ADJOINT * np.abs(gradients).max(initial=0.0):
+        raise RuntimeError("the equations do not determine the states")
     return s[measured], adjoints
 
 
