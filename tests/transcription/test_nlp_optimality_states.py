@@ -68,15 +68,16 @@ def test_what_is_found_is_the_same_each_time() -> None:
     assert np.array_equal(first.reduced, again.reduced) and np.array_equal(first.adjoints, again.adjoints)
 
 
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("rate", [1.0, 3.0])
-def test_equations_that_determine_no_states_have_no_adjoint(rate: float) -> None:
+def test_equations_that_determine_no_states_have_no_adjoint(rate: float, size: float) -> None:
     # With one coefficient of x, its mean m, on one element: x(2) - x(0) = 2 rate m and the moment of the equation make 1 - rate a factor
     # of all that x can do; where it is 0, x is anything, and no multiplier of the equations takes its slope.
     problem, run = flight(rate=rate)
     problem.minimize("end", run.final(run["x"]))
     nlp = nlp_of(problem, DFET(1, 0))
-    residual = optimality(nlp, np.zeros(len(nlp.variables)), ONE)
-    assert residual == np.inf if rate == 1.0 else 0 < residual < 10
+    residual = optimality(nlp, np.zeros(len(nlp.variables)), ONE / size)
+    assert residual == np.inf if rate == 1.0 else 0 < residual < 10 * size
 
 
 def test_states_that_do_not_matter_need_not_be_determined() -> None:
@@ -84,6 +85,20 @@ def test_states_that_do_not_matter_need_not_be_determined() -> None:
     problem.minimize("effort", run.integral(run["u"]))
     nlp = nlp_of(problem, DFET(1, 0))
     assert optimality(nlp, np.zeros(len(nlp.variables)), ONE) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("elements", [2, 30])
+def test_where_states_are_free_too_the_rest_of_a_projection_is_left(elements: int) -> None:
+    # Few equations or many, each of a free vector: of the gradient, what they span is taken away.
+    problem, run = flight(rate=-0.5, final=0.0)
+    problem.minimize("effort", run.integral(run["x"] + run.time * run["u"]))
+    nlp = nlp_of(problem, DFET(elements, 1)).whole
+    assert len(nlp.free) == len(nlp.variables)
+    conditions = Conditions.of(nlp, np.zeros(len(nlp.variables)), ONE)
+    assert conditions is not None
+    equations, gradient = conditions.linear.of_equations.toarray(), conditions.linear.of_objectives[0]
+    left = gradient - equations.T @ np.linalg.lstsq(equations.T, gradient)[0]
+    assert conditions.reduced[:, 0] == pytest.approx(left, abs=1e-9) and conditions.residual == pytest.approx(np.linalg.norm(left))
 
 
 def test_products_that_overflow_are_no_residual() -> None:
