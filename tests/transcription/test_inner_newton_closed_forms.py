@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from smooth_problems import nlp_of, still
 from problems import Problem
 from transcription import DFET, NLP, InnerResult
 from transcription.inner import Newton
+from transcription.inner.effort import newton_step
 from transcription.inner.newton import PATIENCE, Anderson
 from transcription.stopping import stopped_by
 
@@ -129,18 +131,26 @@ def test_a_batch_is_no_more_than_its_candidates() -> None:
         assert together[i] == pytest.approx(alone[0], abs=1e-9)
 
 
-def test_a_periodic_control_goes_the_short_way_round() -> None:
+@pytest.mark.parametrize("turn", [2 * np.pi, 1.0, 360.0])
+def test_a_periodic_control_goes_the_short_way_round(turn: float) -> None:
     # x' = cos(u - 1/2) for 2 time units comes to -2 cos(0.3) where u is 1/2 + pi - 0.3, which lies beyond pi, or less than that by 5.7.
     problem = Problem("round")
+    rest, unit = problem.parameter("rest", bounds=(0, 1)), turn / (2 * np.pi)
     run = problem.phase("run", t0=0, tf=2)
     run.state("x", bounds=(-5, 5), initial=0, final=-2 * np.cos(0.3))
-    u = run.control("u", bounds=(-np.pi, np.pi), period=2 * np.pi)
-    run.dynamics(x=ca.cos(u - 0.5))
-    problem.minimize("drift", run.integral(u))
-    x, found = solve(nlp_of(problem, SMALLEST), [[3.1], [2.9], [-3.1]])
+    u = run.control("u", bounds=(-turn / 2, turn / 2), period=turn)
+    run.dynamics(x=ca.cos(u / unit - 0.5))
+    problem.minimize("drift", run.integral(u) + rest)
+    nlp = nlp_of(problem, SMALLEST)
+    starts = np.array([3.1, 2.9, -3.1])
+    candidates = np.ones((3, 2))
+    own = [nlp.variables[i].name for i in nlp.free].index("rest")
+    candidates[:, 1 - own] = unit * starts
+    x, found = solve(nlp, candidates)
     assert set(found.status) == {"converged"}
-    assert x[:, 0] == pytest.approx([0.2 - np.pi] * 3, abs=1e-6)
+    assert x[:, 1 - own] / unit == pytest.approx([0.2 - np.pi] * 3, abs=1e-6)
     assert found.moved * 2 * np.pi == pytest.approx([np.pi + 0.2 - 3.1, np.pi + 0.2 - 2.9, 0.2 - np.pi + 3.1], abs=1e-6)
+    assert x[:, own] == pytest.approx(1.0), "what has no period stays at its bound"
 
 
 # When it ends
@@ -195,9 +205,10 @@ def test_what_is_not_done_when_the_work_ends_says_so() -> None:
 
 def test_its_work_is_counted_by_steps() -> None:
     nlp = circle(1.0)
-    work = [solve(nlp, C)[1] for C in ([[1.0, 0.0]], [[1.0, 0.0]] * 3, [[1.5, 0.5]])]
-    assert work[0].work > 0 and work[1].work == pytest.approx(3 * work[0].work)
-    assert work[2].work == pytest.approx(work[2].iterations.sum() * work[0].work)
+    for C, iterations in (([[1.0, 0.0]], 1), ([[1.0, 0.0]] * 3, 3), ([[1.5, 0.5]], 5)):
+        found = Newton().solve(nlp, np.array(C))
+        assert found.iterations.sum() == pytest.approx(iterations, abs=1 if iterations > 3 else 0)
+        assert found.work == pytest.approx(found.iterations.sum() * newton_step(nlp)) and found.work > 0
 
 
 def test_only_those_whose_states_inside_matter_pay_for_their_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,6 +232,18 @@ def test_only_those_whose_states_inside_matter_pay_for_their_derivatives(monkeyp
     costly = [count for count, inside in asked if inside]
     assert costly and max(costly) == 1 and max(count for count, inside in asked if not inside) >= 3
     assert min(count for count, _ in asked) > 0
+
+
+def test_overflow_and_slopes_that_are_no_numbers_show_in_the_results_and_warn_nobody() -> None:
+    steep = plane(lambda p, q: [(1e300 * p**9 * ca.exp(5 * q), {"lower": 0.0, "upper": 1e-10})])
+    root = plane(lambda p, q: [(ca.sqrt(p) + q, {"lower": 1.0, "upper": 1.0})], ((0.0, 1.0), (0.0, 2.0)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, overflown = solve(steep, [[2.0, 2.0], [-2.0, 2.0], [1.9, 1.8], [0.0, 1.0]])
+        x, other = solve(root, [[0.0, 0.0], [0.25, 1.0], [0.0, 1.0]])
+    assert overflown.status.tolist() == ["infeasible"] * 3 + ["converged"] and (overflown.violation[:3] > 1e290).all()
+    # At p = 0 there is no slope to follow; elsewhere the nearest point has one of 1/(2 sqrt(p)).
+    assert other.status.tolist() == ["infeasible", "converged", "converged"] and x[0].tolist() == [0.0, 0.0]
 
 
 # Acceleration
