@@ -65,6 +65,30 @@ def test_without_an_inner_level_the_states_of_a_warm_start_are_judged_as_they_ar
     assert Whole().solve(nlp, C, still).status.tolist() == ["infeasible"]
 
 
+@pytest.mark.parametrize("inner", ["propagate", "projection", "none"])
+def test_by_default_a_millionth_of_a_bound_may_be_missed(inner: str) -> None:
+    """What flies to 1 but for shares of that, on a scale of 20, the width of the bounds of x."""
+    level = inner_solver(inner)
+    nlp = line()
+    C = np.array([[0.5 + 10.0 * share * 1e-6] * len(nlp.free) for share in (0.4, 1.5)])
+    flown = nlp.propagate(nlp.guessed(C))
+    program = level.program(nlp)
+    found = level.solve(program, flown[:, program.free], flown)
+    projects = inner == "projection"
+    assert found.status.tolist() == ["converged", "converged" if projects else "infeasible"]
+    assert bool(found.moved[1] > 0.0) is projects
+
+
+def test_levels_are_found_by_their_names_alone() -> None:
+    for name, level in levels.NAMED.items():
+        assert inner_solver(name) is level and inner_solver(level) is level
+    for wrong in ("newton", "", None, 3, Propagate, ["auto"]):
+        with pytest.raises(
+            ValueError, match=r"unknown inner level .*; there are auto, projection, propagate, none, ipopt, ipopt-feasibility$"
+        ):
+            inner_solver(wrong)  # type: ignore[arg-type]
+
+
 # A projection of what Newton's method leaves
 
 
@@ -81,7 +105,7 @@ class Told(InnerSolver):
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         assert len(candidates) == len(self.status)
-        self.asked.update(candidates=candidates, warm=warm, tolerance=tolerance)
+        self.asked.update(nlp=nlp, candidates=candidates, warm=warm, tolerance=tolerance)
         each = self.sign * np.arange(1.0, len(self.status) + 1)
         wide = each[:, None] * np.ones(3)
         iterations = np.full(len(each), self.iterations)
@@ -122,7 +146,7 @@ def test_the_work_of_both_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_both_begin_where_they_are_told_to_and_keep_the_tolerance(monkeypatch: pytest.MonkeyPatch, warm: bool) -> None:
     newton, ipopt = Told(("infeasible", "converged", "infeasible"), 3, 1.0, 1.5), Told(("converged", "converged"), 20, -1.0)
     _, C, start = projected(monkeypatch, newton, ipopt, warm)
-    assert newton.asked["tolerance"] == ipopt.asked["tolerance"] == 1e-4
+    assert newton.asked["tolerance"] == ipopt.asked["tolerance"] == 1e-4 and newton.asked["nlp"] is ipopt.asked["nlp"]
     assert newton.asked["warm"] is start and np.array_equal(newton.asked["candidates"], C)
     nlp = line()
     begun = ipopt.asked["warm"]
