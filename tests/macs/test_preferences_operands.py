@@ -21,6 +21,7 @@ ALL: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
 }
 
 
+@pytest.mark.filterwarnings("error")  # CasADi warns of numpy's functions on its symbols
 @pytest.mark.parametrize("name", ALL)
 def test_all_operands_give_the_same(name: str) -> None:
     function, expected = ALL[name]
