@@ -80,7 +80,7 @@ class Ranking:
         rows : int or None
             Most points to show; None: all.
         """
-        front, shown = self.front, self.order[: len(self) if rows is None else rows]
+        front, shown = self.front, self.order[:rows]
         titles, units, cells = ["rank", "#"], ["", ""], [[str(k + 1) for k in range(len(shown))], [str(i) for i in shown]]
         for goal, column in zip(front.goals, front.objectives[shown].T, strict=True):
             titles.append(goal.name)

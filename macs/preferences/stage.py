@@ -167,7 +167,7 @@ def _sorted(rows: np.ndarray, keys: Sequence[tuple[np.ndarray, float]]) -> np.nd
     if not keys or len(rows) < 2:
         return rows
     key, slack = keys[0]
-    rows = rows[np.argsort(key[rows], kind="stable")]
+    rows = rows[np.argsort(key[rows])]
     values = key[rows]
     found, begin = [], 0
     while begin < len(rows):

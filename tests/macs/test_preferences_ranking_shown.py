@@ -136,6 +136,19 @@ def test_what_no_simulation_confirms_is_said() -> None:
     )
 
 
+def test_one_point_that_claims_to_meet_all_limits_is_contradicted() -> None:
+    J = [(3.0, 14.0), (6.0, 9.0)]
+    assert GOAL.rank(flown(front(*J), [(9.0, 14.0), (6.0, 9.0)], [False, True]), RANGES).message.startswith(
+        "No point meets all hard limits when simulated."
+    )
+
+
+def test_all_that_the_nearest_confirmed_point_exceeds_is_said() -> None:
+    J = [(3.0, 14.0), (6.0, 9.0)]
+    words = GOAL.rank(flown(front(*J), J, [False, True]), RANGES).message
+    assert words.endswith("of the nearest, 'a at most 5 kg' is missed by 1 kg, 'b at least 10' is missed by 1.")
+
+
 def test_what_confirmed_points_exceed_is_said_where_the_best_is_not_confirmed() -> None:
     J = [(3.0, 14.0), (6.0, 16.0), (9.0, 17.0)]
     ranking = GOAL.rank(flown(front(*J), J, [False, True, True]), RANGES)

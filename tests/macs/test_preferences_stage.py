@@ -48,6 +48,15 @@ def test_what_exceeds_a_limit_has_no_value() -> None:
     assert Stage("one", lambda J, peaks: J[0], limits=lambda J: [0.5]).excess(rows((1.0,), (2.0,))).tolist() == [0.5, 0.5]
 
 
+def test_what_is_exactly_at_the_slack_is_met_for_all() -> None:
+    stage = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[0]])
+    for amount, met in ((SLACK, True), (np.nextafter(SLACK, 1.0), False)):
+        J = rows((amount, 0.0, 0.0))
+        assert bool(np.isfinite(stage.numbers(J)[0])) is met
+        assert (exceeded(stage, GOALS, J[0]) == "") is met
+        assert bool(ordering([stage], J, np.zeros(1)).excess[0] == 0.0) is met
+
+
 def test_without_limits_nothing_is_exceeded_but_by_what_is_no_number() -> None:
     J = rows((1.0, 2.0), (np.nan, 2.0), (1.0, np.inf), (-np.inf, 0.0))
     assert FREE.excess(J).tolist() == [0.0, 0.0, 0.0, 0.0] and FREE.excesses(J).shape == (4, 0)
@@ -75,6 +84,9 @@ def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
     )
     assert exceeded(LIMITED, GOALS, np.array([1.0, 4.5, 1e3])) == "'mass at least 5 kg' is missed by 0.5 kg"
     assert exceeded(LIMITED, GOALS, np.array([1e3, 5.0, 1e3])) == "'time at most 2 s' is missed by 998 s"
+    assert exceeded(LIMITED, GOALS, np.array([1e7, 5.0, 1e7])) == "'time at most 2 s' is missed by 1e+07 s"
+    unnamed = Stage("cheap", lambda J, peaks: J[0], limits=lambda J: [J[0] - 1.0, 3.0 * (2.0 - J[1])])
+    assert exceeded(unnamed, GOALS, np.array([0.0, 1.0, 0.0])) == "'limit 2 of cheap' is missed by 1 kg"
     assert exceeded(LIMITED, GOALS, np.array([0.0, 5.0, 0.0])) == "", "what is met is not missed"
     assert exceeded(LIMITED, GOALS, np.array([2.0 + SLACK, 5.0, 3.0])) == ""
     assert exceeded(LIMITED, GOALS, np.array([np.nan, 5.0, np.inf])) == "'time', 'risk' is no number"
