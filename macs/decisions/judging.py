@@ -21,19 +21,19 @@ ALIKE = 0.5
 
 
 def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
-    """The stages of m objectives, of which the first has all limits, each once: the later ones keep it, and so have them, too."""
-    limits: dict[str, tuple[int, int]] = {}
+    """The stages of m objectives, of which the first has all limits: the later ones keep it, and so have them, too. Those of one name are
+    one limit; without names, each is one of its own."""
+    places: dict[str | tuple[int, int], tuple[int, int, str]] = {}
     for i, stage in enumerate(stages):
-        count = len(stage.limits([1.0] * m))
-        for k, name in enumerate(stage.limit_names or [f"limit {k + 1} of {stage.name}" for k in range(count)]):
-            limits.setdefault(name, (i, k))
+        for k, name in enumerate(stage.titles(len(stage.limits([1.0] * m)))):
+            places.setdefault(name if stage.limit_names else (i, k), (i, k, name))
 
     def every(J: Sequence[Any]) -> list[Any]:
         found = [stage.limits(J) for stage in stages]
-        return [found[i][k] for i, k in limits.values()]
+        return [found[i][k] for i, k, _ in places.values()]
 
     bare = [replace(stage, limits=_nothing, limit_names=()) for stage in stages]
-    return [replace(bare[0], limits=every, limit_names=tuple(limits)), *bare[1:]]
+    return [replace(bare[0], limits=every, limit_names=tuple(name for _, _, name in places.values())), *bare[1:]]
 
 
 def excess_stage(limits: Stage) -> Stage:
@@ -55,7 +55,7 @@ def unmet(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     """Text with the limits that cannot be met, by objectives (m,) that exceed them as little as possible: those in conflict are exceeded
     alike there."""
     excess = limits.excesses(J[None])[0]
-    names = [name for name, one in zip(limits.limit_names, excess, strict=True) if one >= ALIKE * excess.max()]
+    names = [limits.titles(len(excess))[k] for k in np.flatnonzero(excess >= ALIKE * excess.max())]
     nearest = ", ".join(f"{goal.name} {shown(float(value), goal)}" for goal, value in zip(goals, J, strict=True))
     what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
     return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"

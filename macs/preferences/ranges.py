@@ -64,16 +64,16 @@ class Ranges:
         F = front.F[kept][nondominated(front.F[kept])]
         if len(F) < TWO:
             F = front.F[feasible][nondominated(front.F[feasible])]
-        best, worst = (F.min(axis=0) * front.signs + 0.0, F.max(axis=0) * front.signs + 0.0)
-        return cls(dict(zip(front.names, best.tolist(), strict=True)), dict(zip(front.names, worst.tolist(), strict=True)))
+        return cls.over(front.goals, F * front.signs)
 
     @classmethod
     def over(cls, goals: Sequence[Objective], objectives: np.ndarray) -> Ranges:
         """The best and the worst values of goals over objectives (n, m), n > 0, in the user's units and senses."""
-        names, signs = [goal.name for goal in goals], np.array([goal.sign for goal in goals])
-        F = objectives * signs
-        best, worst = F.min(axis=0) * signs + 0.0, F.max(axis=0) * signs + 0.0
-        return cls(dict(zip(names, best.tolist(), strict=True)), dict(zip(names, worst.tolist(), strict=True)))
+        best, worst = {}, {}
+        for goal, column in zip(goals, objectives.T, strict=True):
+            ends = float(column.min()) + 0.0, float(column.max()) + 0.0
+            best[goal.name], worst[goal.name] = ends if goal.sign > 0 else ends[::-1]
+        return cls(best, worst)
 
     def to_dict(self) -> dict[str, dict[str, float]]:
         """As plain data: `Ranges(**data)` makes them again."""

@@ -80,7 +80,7 @@ class Ranking:
         rows : int or None
             Most points to show; None: all.
         """
-        front, shown = self.front, self.order[: len(self) if rows is None else rows]
+        front, shown = self.front, self.order[:rows]
         titles, units, cells = ["rank", "#"], ["", ""], [[str(k + 1) for k in range(len(shown))], [str(i) for i in shown]]
         for goal, column in zip(front.goals, front.objectives[shown].T, strict=True):
             titles.append(goal.name)
@@ -173,8 +173,8 @@ def _message(stages: Sequence[Stage], front: Points, rank: np.ndarray, order: np
     best, parts = rank[order[0]], []
     if best >= BEYOND:
         J = front.objectives[rank < INFEASIBLE]
-        most = [(np.min(stage.excesses(J), axis=0), stage.limit_names) for stage in stages]
-        never = [name for least, names in most for value, name in zip(least, names, strict=True) if value > SLACK]
+        most = [(stage, np.min(stage.excesses(J), axis=0)) for stage in stages]
+        never = [name for stage, least in most for value, name in zip(least, stage.titles(len(least)), strict=True) if value > SLACK]
         claimed = (np.max([stage.excess(J) for stage in stages], axis=0) <= SLACK).any()
         how = "; none has " + ", nor ".join(dict.fromkeys(never)) if never else " when simulated" if claimed else " together"
         parts.append(f"No point meets all hard limits{how}.")

@@ -46,7 +46,7 @@ class Stage:
     limits : callable (J) -> list of Operand
         Hard limits, each at most 0, without dimension.
     limit_names : tuple of str
-        What each limit says.
+        What each limit says; none: they are called by their numbers, see `titles`.
     after_zero : bool
         Whether the stage follows only if the value of the stage before is zero. Then every target is met and many points are equally good;
         the stage chooses among them.
@@ -79,6 +79,10 @@ class Stage:
         found = np.stack(rows, axis=1) if rows else np.zeros((len(objectives), 0))
         return np.where(good[:, None], found, np.inf)
 
+    def titles(self, count: int) -> tuple[str, ...]:
+        """What each of its limits says, of which there are so many."""
+        return self.limit_names or tuple(f"limit {k + 1} of {self.name}" for k in range(count))
+
 
 def exceeded(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     """Text with each limit that objectives (m,) exceed, and by how much."""
@@ -88,7 +92,7 @@ def exceeded(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     excess = limits.excesses(J[None])[0]
     return ", ".join(
         f"'{name}' is missed by {_amount(limits, k, goals, J)}"
-        for k, (name, one) in enumerate(zip(limits.limit_names, excess, strict=True))
+        for k, (name, one) in enumerate(zip(limits.titles(len(excess)), excess, strict=True))
         if one > SLACK
     )
 
@@ -163,7 +167,7 @@ def _sorted(rows: np.ndarray, keys: Sequence[tuple[np.ndarray, float]]) -> np.nd
     if not keys or len(rows) < 2:
         return rows
     key, slack = keys[0]
-    rows = rows[np.argsort(key[rows], kind="stable")]
+    rows = rows[np.argsort(key[rows])]
     values = key[rows]
     found, begin = [], 0
     while begin < len(rows):

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, is_dataclass
 from os import PathLike
 from types import TracebackType
-from typing import Any, cast, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -208,12 +208,12 @@ def keeps(solver: SearchMethod) -> bool:
 def _state_class(solver: SearchMethod) -> type:
     name = type(solver).__name__
     try:
-        found = get_type_hints(solver.makes_state).get("return", Any)
+        found = get_type_hints(solver.makes_state).get("return")
     except NameError as error:
         raise ValueError(f"checkpoint: what {name}.{solver.makes_state.__name__} returns is not known at run time: {error}") from error
-    if not is_dataclass(found):
+    if not (isinstance(found, type) and is_dataclass(found)):
         raise ValueError(f"checkpoint: {name}.{solver.makes_state.__name__} is not annotated with the class of the state that it returns")
-    return cast(type, found)
+    return found
 
 
 def _check_counts(kept: Kept) -> None:

@@ -125,6 +125,57 @@ def test_round_trip(kind: type[Preference]) -> None:
     check()
 
 
+EXAMPLES: list[tuple[Preference, dict[str, Any]]] = [
+    (WeightedSum({"time": 2.0}), {"weights": {"time": 2.0}}),
+    (
+        FuzzyGoal({"time": Around(2.0, (1.0, 3.0)), "class": 4.0}, {"class": 1.0}, "sum"),
+        {
+            "targets": {"time": {"class": "Around", "value": 2.0, "tolerance": [1.0, 3.0]}, "class": 4.0},
+            "tolerances": {"class": 1.0},
+            "aggregate": "sum",
+        },
+    ),
+    (
+        FuzzySatisfactory({"time": Around(2.0)}, [("time", "effort"), "risk"], 0.2, ordered=True),
+        {
+            "targets": {"time": {"class": "Around", "value": 2.0, "tolerance": None}},
+            "priorities": [["time", "effort"], ["risk"]],
+            "regulating": 0.2,
+            "ordered": True,
+        },
+    ),
+    (
+        PhysicalProgramming({"time": Smaller(1, 2, 3, 4, 5), "class": Value(1, 2, 3, 4, 5, 6, 7, 8, 9)}, beta=3.0),
+        {
+            "classes": {
+                "time": {"class": "Smaller", "boundaries": [1.0, 2.0, 3.0, 4.0, 5.0]},
+                "class": {"class": "Value", "boundaries": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]},
+            },
+            "beta": 3.0,
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize(("preference", "settings_of_it"), EXAMPLES, ids=lambda one: type(one).__name__)
+def test_what_is_written_is_what_a_file_says_and_is_read_again(preference: Preference, settings_of_it: dict[str, Any]) -> None:
+    data = to_dict(preference)
+    assert data["method"] == type(preference).__name__ and data["settings"] == settings_of_it
+    assert json.loads(json.dumps(data)) == data and from_dict(data) == preference
+
+
+def test_settings_are_nested_as_deep_as_targets_on_both_sides_and_no_deeper() -> None:
+    """A pair of tolerances of a target is what lies deepest."""
+    pair = {"class": "Around", "value": 2.0, "tolerance": [1.0, 3.0]}
+    assert from_dict({"method": "FuzzyGoal", "settings": {"targets": {"time": pair}}}) == FuzzyGoal({"time": Around(2.0, (1.0, 3.0))})
+    for deeper in ([[1.0], 3.0], {"more": {"more": 1.0}}):
+        with pytest.raises(ValueError, match=r"^FuzzyGoal: its settings are nested too deeply$"):
+            from_dict({"method": "FuzzyGoal", "settings": {"targets": {"time": {**pair, "tolerance": deeper}}}})
+    with pytest.raises(ValueError, match=r"^PhysicalProgramming: its settings are nested too deeply$"):
+        boundaries = [[1.0], 2.0, 3.0, 4.0, 5.0]
+        from_dict({"method": "PhysicalProgramming", "settings": {"classes": {"a": {"class": "Smaller", "boundaries": [boundaries]}}}})
+
+
 def test_what_is_left_out_has_its_default() -> None:
     assert from_dict({"method": "ReferencePoint", "settings": {"aspiration": {"time": 2}}}) == ReferencePoint({"time": 2.0})
     # Numbers of numpy are numbers.
@@ -163,6 +214,23 @@ for _ in range(2000):
             {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Smaller", "boundaries": [3, 2, 1, 0, -1]}}}},
             "the boundaries of Smaller must increase",
         ),
+        (
+            {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Smaler", "boundaries": []}}}},
+            "PhysicalProgramming: unknown class 'Smaler', did you mean Smaller?",
+        ),
+        (
+            {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Smaller", "boundaries": [], "more": 1}}}},
+            "PhysicalProgramming: Smaller: unknown key 'more'",
+        ),
+        (
+            {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Larger"}}}},
+            "PhysicalProgramming: the boundaries of Larger must be a list of numbers, not None",
+        ),
+        (
+            {"method": "PhysicalProgramming", "settings": {"classes": {"a": {"class": "x"}}}},
+            "there are Smaller, Larger, Value, Range, Around",
+        ),
+        ("x" * 500, "a preference must be a table of method, settings, not 'xxx"),
         ({"method": "FuzzyGoal", "settings": {"targets": {"time": {"class": "Around", "vale": 2}}}}, "Around: unknown key 'vale'"),
         ({"method": "FuzzySatisfactory", "settings": {"targets": 0, "priorities": ["a", "b"]}}, "the targets must be a dict by name"),
         ({"method": "Nimbus", "settings": {"current": {"a": 1, "b": 2}, "to": 0, "improve": ["a"], "free": ["b"]}}, "'to' must be a dict"),

@@ -24,6 +24,7 @@ from macs.decisions import (
     Value,
     WeightedSum,
 )
+from macs.preferences.checks import levels, shown
 from problems.compiled import Objective
 
 BOTH = {"time": 2.0, "effort": 1.0}
@@ -167,3 +168,19 @@ def test_preferences_are_shown_as_they_are_written():
     ]
     for preference in shown:
         assert eval(repr(preference)) == preference
+
+
+def test_a_value_is_shown_with_its_unit_and_six_digits():
+    assert shown(1234.5678, Objective("time", "s")) == "1234.57 s" and shown(0.5, Objective("time")) == "0.5"
+
+
+@pytest.mark.parametrize("wrong", [3, {"time"}, None, [], "time"])
+def test_levels_are_a_list(wrong):
+    with pytest.raises(ValueError, match=r"^priorities must be a list of names of objectives, most important first, not "):
+        levels(wrong)
+
+
+def test_a_name_is_in_one_level_only():
+    assert levels(["a", ("b", "c"), ["d"]]) == (("a",), ("b", "c"), ("d",))
+    with pytest.raises(ValueError, match=r"^priorities: 'a' is named twice$"):
+        levels(["a", ("b", "a")])

@@ -22,9 +22,17 @@ def test_over_objectives_best_and_worst_follow_the_senses():
     assert Ranges(**found.to_dict()) == found
 
 
-def test_zero_has_no_sign():
-    found = Ranges.over((Objective("speed", "", "maximize"),), np.array([[0.0], [0.0]]))
-    assert [str(value) for value in (found.best["speed"], found.worst["speed"])] == ["0.0", "0.0"]
+@pytest.mark.parametrize("sense", ["minimize", "maximize"])
+def test_zero_has_no_sign(sense):
+    """A maximised objective of zero would be shown as -0."""
+    goals = (Objective("speed", "", sense),)
+    for found in (Ranges.over(goals, np.array([[-0.0], [-0.0]])), Ranges.of(plain_front(np.array([[-0.0]]), list(goals)))):
+        assert [str(value) for value in (found.best["speed"], found.worst["speed"])] == ["0.0", "0.0"]
+
+
+def test_all_goals_have_a_column():
+    with pytest.raises(ValueError, match="zip"):
+        Ranges.over(GOALS, np.zeros((2, 3)))
 
 
 def test_the_best_is_at_0_and_the_worst_at_1():
@@ -40,7 +48,11 @@ def test_a_range_without_width_is_divided_by_its_size_or_by_1():
     flat = Ranges({"cost": 5.0, "speed": 0.0}, {"cost": 5.0, "speed": 0.0})
     assert flat.spans(GOALS).tolist() == [5.0, 1.0]
     assert flat.normalised(GOALS, [7.5, -3.0]) == [0.5, 3.0]
-    assert Ranges({"cost": -5.0, "speed": 1.0}, {"cost": -5.0, "speed": 1.0}).spans(GOALS).tolist() == [5.0, 1.0]
+    assert Ranges({"cost": -5.0, "speed": 0.5}, {"cost": -5.0, "speed": 0.5}).spans(GOALS).tolist() == [5.0, 0.5]
+
+
+def test_narrow_ranges_are_as_wide_as_they_are():
+    assert Ranges({"cost": 5.0, "speed": 1e-3}, {"cost": 5.5, "speed": 0.0}).spans(GOALS).tolist() == [0.5, 1e-3]
 
 
 def test_what_ranges_have_to_name():
@@ -74,3 +86,32 @@ def test_points_are_believed_by_their_status_and_their_simulation():
     feasible, confirmed = usable(front)
     assert feasible.tolist() == [True, True, False, True] and confirmed.tolist() == [True, False, False, True]
     assert confidence(front).tolist() == [0, 1, 2, 0]
+
+
+def rows(*objectives, **columns):
+    return plain_front(np.array(objectives, dtype=float), list(GOALS), **columns)
+
+
+def test_ranges_of_a_front_are_those_of_its_feasible_points_that_no_other_dominates():
+    front = rows((1.0, 10.0), (2.0, 30.0), (3.0, 20.0), (0.0, 99.0), status=["converged"] * 3 + ["infeasible"])
+    assert Ranges.of(front) == Ranges({"cost": 1.0, "speed": 30.0}, {"cost": 2.0, "speed": 10.0})
+
+
+def test_points_that_a_simulation_contradicts_do_not_count_unless_fewer_than_two_are_left():
+    front = rows((1.0, 10.0), (2.0, 30.0), (3.0, 40.0))
+    assert Ranges.of(marked(front, [True, True, False])).worst["cost"] == 2.0
+    assert Ranges.of(marked(front, [True, False, False])).worst["cost"] == 3.0
+    assert Ranges.of(marked(front, [False, False, False])).worst["cost"] == 3.0
+    payoff = front.replace(solver={"name": "payoff", "settings": {}})
+    assert Ranges.of(marked(payoff, [True, True, False])).worst["cost"] == 3.0, "a payoff table keeps all its ends"
+
+
+def test_what_has_no_ranges_says_so():
+    with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges$"):
+        Ranges.of(rows((1.0, 1.0), status=["failed"]))
+    with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges: nothing there$"):
+        Ranges.of(rows((1.0, 1.0), status=["failed"]).replace(message="nothing there"))
+    with pytest.raises(ValueError, match=r"^ranges are those of a front or a payoff table, not of \[1, 2\]$"):
+        Ranges.of([1, 2])
+    with pytest.raises(ValueError, match=r"^ranges need the best and the worst value of 'speed'$"):
+        Ranges({"cost": 1.0}, {"cost": 2.0, "speed": 1.0})

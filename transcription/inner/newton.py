@@ -173,8 +173,6 @@ class _Going:
         reduced, watched = self.reduced, self.watched[some]
         rows = np.flatnonzero(watched.any(axis=0))
         box = -self.x[some] - self.walls, 1.0 - self.x[some] + self.walls
-        if not len(rows):
-            return np.clip(pull, *box)
         scale, equation = reduced.scale[rows], reduced.equation[rows]
         A = reduced.derivatives(propagated, rows) * (self.span / scale[:, None])
         values = propagated.values[:, rows]

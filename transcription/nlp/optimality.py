@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
@@ -21,8 +21,9 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 REGULAR = 1e-12
 """Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
-BEYOND, DETERMINED = 50, 1e-9
-"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part."""
+BEYOND, DETERMINED, ADJOINT = 50, 1e-9, 1e-6
+"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part; and
+what may be left where they are not: by the weight of states, what a unit of the free variables does to them times `DEPENDENT`."""
 SMALL = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
@@ -83,7 +84,7 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
         are found.
     """
     conditions = Conditions.of(nlp, z, F_scales)
-    return float("inf") if conditions is None else conditions.residual
+    return np.inf if conditions is None else conditions.residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,6 @@ class Linearised:
     @classmethod
     def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Linearised | None:
         """Those at z, see `optimality`; None where a derivative, in units, is no number."""
-        z = np.asarray(z, dtype=float)
         found = gradients(nlp)(z)
         dF, dg, g = np.array(found[0]), csr_matrix(found[1].sparse()), np.array(found[3]).ravel()
         natural = nlp_scales(nlp)
@@ -163,7 +163,7 @@ class Conditions:
         try:
             return _least(self.reduced, self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
-            return float("inf")
+            return np.inf
 
     def residual_of(self, mixtures: np.ndarray) -> float:
         """The least residual of weights that are mixtures of those in the columns (used, p), which are not negative and each of sum 1."""
@@ -171,7 +171,7 @@ class Conditions:
         try:
             return _least(np.hstack([self.reduced[:, :m] @ mixtures, self.reduced[:, m:]]), self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
-            return float("inf")
+            return np.inf
 
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -194,14 +194,14 @@ class Conditions:
         """Those that leave the least residual, see `scaled`; None where none are found."""
         if self.scaled is None:
             return None
-        nlp, near, used = self.linear.nlp, self.linear.near, np.isfinite(self.linear.scales)
-        of_objectives, of_rows, of_bounds = np.zeros(len(used)), np.zeros(len(nlp.g_scale)), np.zeros(len(nlp.variables))
+        nlp, used, n, r = self.linear.nlp, np.isfinite(self.linear.scales), len(self.linear.z), len(self.linear.nlp.g_scale)
+        of_objectives, of_equations = np.zeros(len(used)), np.zeros(r)
         of_objectives[used], rest = self.scaled
-        of_rows[nlp.g_lower == nlp.g_upper] = -self.adjoints @ np.concatenate(self.scaled)
-        each = np.split(rest, np.cumsum([np.count_nonzero(one) for one in near])[:-1])
-        for target, which, side, values in zip((of_bounds, of_bounds, of_rows, of_rows), near, (-1, 1, -1, 1), each, strict=True):
-            target[which] += side * values
-        return Multipliers(of_objectives / self.linear.scales, of_rows / nlp.g_scale, of_bounds / units(nlp))
+        of_equations[nlp.g_lower == nlp.g_upper] = -self.adjoints @ np.concatenate(self.scaled)
+        of_sides = np.zeros(2 * (n + r))
+        of_sides[np.concatenate(self.linear.near)] = rest
+        lower, upper, below, above = np.split(of_sides, [n, 2 * n, 2 * n + r])
+        return Multipliers(of_objectives / self.linear.scales, (of_equations + above - below) / nlp.g_scale, (upper - lower) / units(nlp))
 
     def _others(self) -> list[np.ndarray]:
         """Masks of the inequalities, group by group, that are no bounds of free variables."""
@@ -226,9 +226,9 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
         (nlp.g_upper - g) / nlp.g_scale,
     )
     near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
-    bounds = [side * (np.arange(len(z)) == np.flatnonzero(one)[:, None]) for side, one in zip((1.0, -1.0), near[:2], strict=True)]
-    rows = [*bounds, dg[near[2]].toarray(), -dg[near[3]].toarray()]
-    return near, np.vstack(rows), np.maximum(np.concatenate([slack[index] for slack, index in zip(slacks, near, strict=True)]), 0.0)
+    own = identity(len(z), format="csr")
+    sides = vstack([own[near[0]], -own[near[1]], dg[near[2]], -dg[near[3]]]).toarray()
+    return near, sides, np.maximum(np.concatenate(slacks)[np.concatenate(near)], 0.0)
 
 
 def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -237,7 +237,7 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
 
     Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
     for the others. Where the equations determine the others, these follow from the free ones, and it is the total derivative by these, less
-    what the equations beyond those can take from it.
+    what the equations beyond those can take from it. Raises RuntimeError where they do not.
     """
     measured = np.isinf(nlp.span)
     measured[nlp.free] = True
@@ -245,6 +245,9 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
     if found is not None:
         return found
     s, adjoints = steepest(diags(np.where(measured, 1.0, DEPENDENT)), equations, gradients)
+    left = DEPENDENT * s[~measured]
+    if not np.abs(left).max(initial=0.0) <= ADJOINT * np.abs(gradients).max(initial=0.0):
+        raise RuntimeError("the equations do not determine the states")
     return s[measured], adjoints
 
 

@@ -1,0 +1,468 @@
+"""What a checkpoint keeps, refuses and says, on a state of a few numbers: no search is run."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from macs.evaluation.evaluator import Counts
+from macs.solvers import checkpoint, checkpoint_file
+from macs.solvers.checkpoint import SECONDS, SHARE, Checkpoint, Kept, Unreadable, keeps
+
+
+@dataclass
+class Rows:
+    """Points without anything said about their shapes."""
+
+    Z: np.ndarray
+    F: np.ndarray
+    violation: np.ndarray
+
+
+@dataclass
+class State:
+    archive: Rows
+    closest: Rows
+    step: int
+
+
+class Walk:
+    """A solver of which a checkpoint needs no more."""
+
+    def begin(self) -> State:
+        raise NotImplementedError
+
+    @property
+    def makes_state(self) -> Callable[..., Any]:
+        return self.begin
+
+
+def rows(count: int, m: int = 2, d: int = 3) -> Rows:
+    return Rows(np.full((count, d), 0.5), np.arange(float(count * m)).reshape(count, m), np.zeros(count))
+
+
+def state() -> State:
+    return State(rows(4), rows(1), 7)
+
+
+def kept(**changes: Any) -> Kept:
+    return replace(Kept(3, Counts(), 2, 1.5, "budget"), **changes)
+
+
+BELONGS: dict[str, Any] = {"problem": {"name": "cart", "fingerprint": "12"}, "evaluations": 100, "settings": {"evaluations": 5}}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "run.ckpt"
+
+
+def made(path: Path, belongs: dict[str, Any] | None = None, sizes: dict[str, int] | None = None) -> Checkpoint:
+    return Checkpoint(path, Walk(), BELONGS if belongs is None else belongs, sizes)  # type: ignore[arg-type]
+
+
+def written(path: Path, what: State | None = None, how: Kept | None = None, belongs: dict[str, Any] | None = None) -> Checkpoint:
+    """A checkpoint of which the file is up to date."""
+    one = made(path, belongs)
+    one.keep(what or state(), how or kept())
+    one.write()
+    return one
+
+
+def forged(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], Any]) -> None:
+    """A valid file with another content."""
+    written(path)
+    header, arrays = checkpoint_file.read(path)
+    change(header, arrays)
+    path.write_bytes(checkpoint_file.to_bytes(header, arrays))
+
+
+class Clock:
+    """Time goes on only where it is told to."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        patch.setattr(checkpoint, "time", self)
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+# There and back
+
+
+@pytest.mark.parametrize("seed", [None, 3])
+def test_what_was_kept_comes_back(path: Path, seed: int | None) -> None:
+    how = kept(counts=replace(Counts(), evaluations=17, failures=Counter(timeout=2)))
+    written(path, how=how)
+    found = made(path).read(seed)
+    assert found is not None
+    what, again = found
+    assert again == how and again.counts.failures["timeout"] == 2 and type(what) is State and what.step == 7
+    for name in ("archive", "closest"):
+        for part in ("Z", "F", "violation"):
+            assert np.array_equal(getattr(getattr(what, name), part), getattr(getattr(state(), name), part))
+
+
+def test_without_a_file_there_is_nothing_to_go_on_from(path: Path) -> None:
+    assert made(path).read(None) is None and not path.exists()
+
+
+def test_a_folder_is_no_checkpoint(path: Path) -> None:
+    path.mkdir()
+    with pytest.raises(Unreadable, match=r"run.ckpt' is no ordinary file; it was left as it is; "):
+        made(path).read(None)
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [(OSError(errno.EIO, "Input/output error"), "Input/output error"), (OSError("the tape is stuck"), "the tape is stuck")],
+)
+def test_a_file_that_cannot_be_read_says_why(path: Path, monkeypatch: pytest.MonkeyPatch, error: OSError, reason: str) -> None:
+    def fails(path: Path) -> None:
+        raise error
+
+    monkeypatch.setattr(checkpoint_file, "read", fails)
+    with pytest.raises(Unreadable, match=f"^checkpoint '.*run.ckpt' cannot be read: {reason}$"):
+        made(path).read(None)
+
+
+def test_settings_that_are_no_numbers_are_the_same_setting(path: Path) -> None:
+    """A NaN is not equal to itself; the run that it belongs to is the same one."""
+    written(path, belongs={"bounds": [math.nan, math.inf]})
+    assert made(path, {"bounds": [math.nan, math.inf]}).read(3) is not None
+    with pytest.raises(Unreadable, match=r"bounds is \['NaN', 'Infinity'\] there, \['NaN', 1.0\] here"):
+        made(path, {"bounds": [math.nan, 1.0]}).read(3)
+
+
+def test_a_state_is_kept_as_it_was_when_it_was_noted(path: Path) -> None:
+    one, what = made(path), state()
+    one.keep(what, kept())
+    what.archive.F[:] = -1.0
+    one.write()
+    found = made(path).read(3)
+    assert found is not None and np.array_equal(found[0].archive.F, state().archive.F)
+
+
+# When it is written
+
+
+def test_the_end_of_the_context_writes_what_is_left(path: Path) -> None:
+    with made(path) as one:
+        assert not path.exists()
+        one.keep(state(), kept())
+    assert made(path).read(3) is not None
+    path.unlink()
+    with one:  # of which nothing is left
+        pass
+    assert not path.exists()
+
+
+def test_an_error_within_the_context_is_not_swallowed_and_loses_nothing(path: Path) -> None:
+    with pytest.raises(RuntimeError, match="licence"), made(path) as one:
+        one.keep(state(), kept())
+        raise RuntimeError("licence")
+    assert made(path).read(3) is not None
+
+
+def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At least `SECONDS`, from the beginning on, and at least `SHARE` times as long as the last write took."""
+    clock = Clock(monkeypatch)
+    write, took = checkpoint.write_whole, 0.01
+
+    def slow(path: Any, content: bytes) -> None:
+        clock.now += took
+        write(path, content)
+
+    monkeypatch.setattr(checkpoint, "write_whole", slow)
+
+    def after(seconds: float) -> bool:
+        """Whether something is written after so many seconds."""
+        path.unlink(missing_ok=True)
+        one.keep(state(), kept())
+        clock.now += seconds
+        one.write_in_time()
+        return path.exists()
+
+    one = made(path)
+    assert not after(0.9 * SECONDS) and after(0.2 * SECONDS)
+    took = 3.0
+    assert not after(0.9 * SECONDS) and after(0.2 * SECONDS)
+    assert not after(0.9 * SHARE * took) and after(0.2 * SHARE * took)
+
+
+# Disks that are full
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [(OSError(errno.ENOSPC, "No space left on device"), "No space left on device"), (OSError("the tape is stuck"), "the tape is stuck")],
+)
+def test_a_write_that_fails_is_logged_once_and_tried_again(
+    path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: OSError, reason: str
+) -> None:
+    def fails(path: Path, content: bytes) -> None:
+        raise error
+
+    one = made(path)
+    assert one.failure == ""
+    one.keep(state(), kept())
+    with monkeypatch.context() as patch, caplog.at_level(logging.WARNING):
+        patch.setattr(checkpoint, "write_whole", fails)
+        for _ in range(3):
+            one.write()
+            assert [record.getMessage() for record in caplog.records] == [f"checkpoint: {reason}; the search goes on without"]
+    assert one.failure == f"{reason}; the file is behind" and not path.exists()
+    one.write()
+    assert one.failure == "" and made(path).read(3) is not None
+
+
+# Other versions
+
+
+def test_other_versions_are_told_with_the_name_of_the_file_and_remembered(
+    path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert not written(path).mixed
+    with caplog.at_level(logging.WARNING):
+        same = made(path)
+        same.read(3)
+        assert not same.mixed and not caplog.records
+        with monkeypatch.context() as patch:
+            patch.setattr(checkpoint, "versions", lambda: {"numpy": "99"})
+            other = made(path)
+            other.read(3)
+            assert other.mixed
+            other.keep(state(), kept())
+            other.write()
+        expected = f"checkpoint '{path}' was written by other versions: the rest of the run may differ in its last bits"
+        assert [record.getMessage() for record in caplog.records] == [expected]
+        back = made(path)
+        back.read(3)
+    assert back.mixed, "what the other ones did remains part of the run"
+
+
+# Runs of others
+
+
+OTHERS: list[tuple[dict[str, Any], str]] = [
+    (
+        BELONGS | {"evaluations": 200},
+        "evaluations is 100 there, 200 here (a larger budget is another search; to add to what was found, give",
+    ),
+    (BELONGS | {"settings": {"evaluations": 6}}, "settings.evaluations is 5 there, 6 here; it was left as it is"),
+    (
+        BELONGS | {"problem": {"name": "car", "fingerprint": "34"}},
+        "problem.name is 'cart' there, 'car' here; problem.fingerprint is '12' there, '34' here (bounds, equations, objectives or data",
+    ),
+    (BELONGS | {"more": 1}, "more is nothing there, 1 here; it was left as it is"),
+    ({"problem": BELONGS["problem"], "evaluations": 100}, "settings is {'evaluations': 5} there, nothing here; it was left as it is"),
+]
+
+
+@pytest.mark.parametrize(("belongs", "words"), OTHERS, ids=["budget", "setting", "problem", "more", "less"])
+def test_another_run_is_refused_with_what_differs_and_what_to_do(path: Path, belongs: dict[str, Any], words: str) -> None:
+    written(path)
+    with pytest.raises(Unreadable) as caught:
+        made(path, belongs).read(3)
+    assert str(caught.value).startswith(f"'{path}' belongs to another run: {words}")
+    assert str(caught.value).endswith("make the call that it belongs to, name another file, or delete this one")
+
+
+def test_another_seed_is_another_run(path: Path) -> None:
+    written(path)
+    with pytest.raises(Unreadable, match="belongs to another run: seed is 3 there, 4 here; it was left"):
+        made(path).read(4)
+
+
+@pytest.mark.parametrize("size", [57, 58, 59, 60, 61, 200])
+def test_long_values_are_cut_to_sixty_characters(path: Path, size: int) -> None:
+    """With their quotes, and with dots where something is left out."""
+    word = "".join(str(i % 10) for i in range(size - 2))
+    written(path, belongs={"word": word})
+    with pytest.raises(Unreadable) as caught:
+        made(path, {"word": 1}).read(3)
+    shown = str(caught.value).partition("word is ")[2].partition(" there")[0]
+    assert len(shown) == min(size, 60)
+    assert shown == f"'{word}'" if size <= 60 else shown[:-3] == f"'{word}"[:57] and shown.endswith("...")
+
+
+# Files that were forged
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        ["cake"],
+        {},
+        {"belongs": {}},
+        {"belongs": 3, "versions": [], "run": {}, "state": {}},
+        {"belongs": {}, "versions": [], "run": {}, "state": {}, "more": 1},
+    ],
+    ids=str,
+)
+def test_a_document_of_other_parts_is_no_checkpoint(path: Path, header: Any) -> None:
+    path.write_bytes(checkpoint_file.to_bytes(header, {}))
+    with pytest.raises(
+        Unreadable, match="' is no valid checkpoint: its document does not consist of belongs, versions, run, state; it was left"
+    ):
+        made(path).read(3)
+
+
+FORGED: dict[str, tuple[Callable[[dict[str, Any], dict[str, np.ndarray]], Any], str]] = {
+    "seed": (lambda header, arrays: header["run"].update(seed=-1), "run.seed is -1, a number of at least 0 expected"),
+    "idle": (lambda header, arrays: header["run"].update(idle=-2), "run.idle is -2, a number of at least 0 expected"),
+    "elapsed": (lambda header, arrays: header["run"].update(elapsed=-0.5), "run.elapsed is -0.5, a number"),
+    "endless": (lambda header, arrays: header["run"].update(elapsed=math.inf), "run.elapsed is inf, a number"),
+    "no number": (lambda header, arrays: header["run"].update(elapsed=math.nan), "run.elapsed is nan, a number"),
+    "evaluations": (lambda header, arrays: header["run"]["counts"].update(evaluations=-5), "run.counts.evaluations is -5, a number"),
+    "failures": (lambda header, arrays: header["run"]["counts"]["failures"].update(failed=-1), "run.counts.failures['failed'] is -1, a"),
+    "part of a number": (lambda header, arrays: header["run"].update(idle=1.5), "run.idle is float, int expected"),
+    "field": (lambda header, arrays: header["state"].pop("step"), "state.step is missing"),
+    "another field": (lambda header, arrays: header["state"].update(more=1), "state.more is unknown"),
+    "another array": (lambda header, arrays: arrays.update({"z": np.zeros(3), "b": np.zeros(3)}), "b is unknown"),
+    "versions": (lambda header, arrays: header.update(versions=3), "versions is int, list"),
+    "version": (lambda header, arrays: header.update(versions=[{"numpy": 3}]), "versions[0]['numpy'] is int, str expected"),
+    "type": (
+        lambda header, arrays: arrays.update({"state.archive.Z": np.zeros((4, 3), np.float32)}),
+        "state.archive.Z is an array of float32 with 2 dimensions; float64 with 2 expected",
+    ),
+    "rank": (
+        lambda header, arrays: arrays.update({"state.closest.violation": np.zeros((1, 1))}),
+        "state.closest.violation is an array of float64 with 2 dimensions; float64 with 1 expected",
+    ),
+    "rows": (lambda header, arrays: arrays.update({"state.closest.Z": np.zeros((2, 3))}), "state.closest.Z has 2 rows, 1 expected"),
+    "objectives": (
+        lambda header, arrays: arrays.update({"state.closest.F": np.zeros((1, 3))}),
+        "state.closest.F has 3 columns, 2 expected",
+    ),
+    "variables": (lambda header, arrays: arrays.update({"state.closest.Z": np.zeros((1, 4))}), "state.closest.Z has 4 columns, 3 expected"),
+    "NaN": (lambda header, arrays: arrays["state.archive.F"].fill(np.nan), "state.archive.F has a value that is not finite"),
+    "infinite": (lambda header, arrays: arrays["state.archive.Z"].fill(np.inf), "state.archive.Z has a value that is not finite"),
+}
+
+
+@pytest.mark.parametrize("kind", FORGED)
+def test_what_no_run_can_have_is_refused_by_the_name_of_the_field(path: Path, kind: str) -> None:
+    change, words = FORGED[kind]
+    forged(path, change)
+    content = path.read_bytes()
+    with pytest.raises(Unreadable) as caught:
+        made(path).read(3)
+    assert str(caught.value).startswith(f"'{path}' cannot be continued by this Walk: {words}")
+    assert "; it was left as it is; " in str(caught.value) and path.read_bytes() == content
+
+
+def test_what_was_never_evaluated_may_be_infinite(path: Path) -> None:
+    """The point that is nearest to feasible has no number yet."""
+    what = state()
+    what.closest.F[:], what.closest.violation[:] = np.nan, np.inf
+    written(path, what)
+    assert made(path).read(3) is not None
+
+
+# States that break the contract
+
+
+BROKEN: dict[str, tuple[Callable[[], tuple[Any, Kept]], str]] = {
+    "column": (lambda: (replace(state(), closest=rows(1, m=3)), kept()), "^state.closest.F has 3 columns, 2 expected$"),
+    "rows": (lambda: (replace(state(), archive=replace(rows(4), violation=np.zeros(3))), kept()), "^state.archive.violation has 3 rows"),
+    "field": (lambda: (replace(state(), step=1.5), kept()), "^state.step is float, int expected$"),  # type: ignore[arg-type]
+    "run": (lambda: (state(), kept(idle=1.5)), "^run.idle is float, int expected$"),
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_state_that_breaks_the_contract_is_refused_when_it_is_noted(path: Path, kind: str) -> None:
+    make, words = BROKEN[kind]
+    one = made(path)
+    with pytest.raises(TypeError, match=words):
+        one.keep(*make())
+    one.write()
+    assert not path.exists()
+
+
+@dataclass
+class Shaped(Rows):
+    SHAPES: ClassVar[dict[str, str]] = {"F": "rows m", "Z": "rows d", "violation": "rows"}
+
+
+@dataclass
+class ShapedState:
+    archive: Shaped
+    closest: Shaped
+
+
+class ShapedWalk(Walk):
+    def begin(self) -> ShapedState:  # type: ignore[override]
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize(
+    ("sizes", "words"), [({}, ""), ({"m": 2, "d": 3}, ""), ({"m": 3}, "F has 2 columns, 3"), ({"d": 4}, "Z has 3 col")]
+)
+def test_the_sizes_of_the_run_are_those_of_its_state(path: Path, sizes: dict[str, int], words: str) -> None:
+    def of(count: int) -> Shaped:
+        return Shaped(**vars(rows(count)))
+
+    one = Checkpoint(path, ShapedWalk(), {}, sizes)  # type: ignore[arg-type]
+    if words:
+        with pytest.raises(TypeError, match=f"^state.archive.{words}"):
+            one.keep(ShapedState(of(4), of(1)), kept())
+        # Nor is a file of other sizes gone on from.
+        unchecked = Checkpoint(path, ShapedWalk(), {})  # type: ignore[arg-type]
+        unchecked.keep(ShapedState(of(4), of(1)), kept())
+        unchecked.write()
+        with pytest.raises(Unreadable, match=f"cannot be continued by this ShapedWalk: state.archive.{words}"):
+            one.read(3)
+    else:
+        one.keep(ShapedState(of(4), of(1)), kept())
+        one.write()
+        assert one.read(3) is not None
+
+
+# Solvers that say what their state is, and others
+
+
+class Silent(Walk):
+    def begin(self):  # type: ignore[no-untyped-def]
+        raise NotImplementedError
+
+
+class Vague(Walk):
+    def begin(self) -> dict[str, float]:  # type: ignore[override]
+        raise NotImplementedError
+
+
+class Bare(Walk):
+    def begin(self) -> dict:  # type: ignore[override,type-arg]
+        raise NotImplementedError
+
+
+class Lost(Walk):
+    def begin(self) -> Nowhere:  # type: ignore[name-defined]  # noqa: F821
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize(
+    ("solver", "words"),
+    [
+        (Silent, "^checkpoint: Silent.begin is not annotated with the class of the state that it returns$"),
+        (Vague, "^checkpoint: Vague.begin is not annotated with the class of the state that it returns$"),
+        (Bare, "^checkpoint: Bare.begin is not annotated with the class of the state that it returns$"),
+        (Lost, "^checkpoint: what Lost.begin returns is not known at run time: name 'Nowhere' is not defined$"),
+    ],
+)
+def test_a_solver_that_does_not_say_what_its_state_is_is_not_kept(path: Path, solver: type[Walk], words: str) -> None:
+    assert keeps(Walk()) and not keeps(solver())  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=words):
+        Checkpoint(path, solver(), {})  # type: ignore[arg-type]

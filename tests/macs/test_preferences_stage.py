@@ -1,0 +1,154 @@
+"""Stages on their own: values, excesses over limits and their words, and the order of points by them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from macs.decisions import Stage
+from macs.preferences.stage import SLACK, exceeded, ordering
+from problems.compiled import Objective
+
+GOALS = (Objective("time", "s"), Objective("mass", "kg", "maximize"), Objective("risk"))
+FREE = Stage("first", lambda J, peaks: J[0])
+LIMITED = Stage(
+    "limited",
+    lambda J, peaks: J[0] + 10.0 * peaks[0] + 100.0 * peaks[1],
+    lambda J: [[J[0], J[1]], [0.0, J[2]]],
+    lambda J: [J[0] / 2.0 - 1.0, (5.0 - J[1]) / 10.0, J[0] - J[2]],
+    ("time at most 2 s", "mass at least 5 kg", "time at most the risk"),
+)
+
+
+def rows(*J: tuple[float, ...]) -> np.ndarray:
+    return np.array(J, dtype=float)
+
+
+# Values and limits
+
+
+def test_peaks_are_the_largest_of_their_groups() -> None:
+    assert LIMITED.numbers(rows((1.0, 7.0, 3.0), (2.0, 5.0, 2.0))) == pytest.approx([1.0 + 70.0 + 300.0, 2.0 + 50.0 + 200.0])
+    assert Stage("same", lambda J, peaks: 3.0).numbers(rows((1.0,), (2.0,))).tolist() == [3.0, 3.0], "a number for all points"
+    assert Stage("peak", lambda J, peaks: peaks[0], lambda J: [[0.0, J[0], 1.0]]).numbers(rows((0.5,), (2.0,), (-1.0,))).tolist() == [
+        1,
+        2,
+        1,
+    ]
+
+
+def test_what_exceeds_a_limit_has_no_value() -> None:
+    J = rows((2.0, 5.0, 2.0), (2.0 + 1.9 * SLACK, 5.0, 3.0), (2.0 + 2.1 * SLACK, 5.0, 3.0), (2.0, 4.0, 2.0), (2.0, 5.0, 1.5))
+    assert np.isfinite(LIMITED.numbers(J)).tolist() == [True, True, False, False, False]
+    assert LIMITED.excess(J) == pytest.approx([0.0, 0.95 * SLACK, 1.05 * SLACK, 0.1, 0.5])
+    assert LIMITED.excesses(rows((1.0, 7.0, 3.0))) == pytest.approx(rows((-0.5, -0.2, -2.0)))
+    assert LIMITED.excess(rows((1.0, 7.0, 3.0))).tolist() == [0.0], "met by more is met"
+    assert Stage("one", lambda J, peaks: J[0], limits=lambda J: [0.5]).excess(rows((1.0,), (2.0,))).tolist() == [0.5, 0.5]
+
+
+def test_what_is_exactly_at_the_slack_is_met_for_all() -> None:
+    stage = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[0]])
+    for amount, met in ((SLACK, True), (np.nextafter(SLACK, 1.0), False)):
+        J = rows((amount, 0.0, 0.0))
+        assert bool(np.isfinite(stage.numbers(J)[0])) is met
+        assert (exceeded(stage, GOALS, J[0]) == "") is met
+        assert bool(ordering([stage], J, np.zeros(1)).excess[0] == 0.0) is met
+
+
+def test_without_limits_nothing_is_exceeded_but_by_what_is_no_number() -> None:
+    J = rows((1.0, 2.0), (np.nan, 2.0), (1.0, np.inf), (-np.inf, 0.0))
+    assert FREE.excess(J).tolist() == [0.0, 0.0, 0.0, 0.0] and FREE.excesses(J).shape == (4, 0)
+    assert FREE.numbers(J).tolist() == [1.0, np.inf, np.inf, np.inf]
+    limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[0] - 5.0])
+    assert limited.excesses(J).tolist() == [[-4.0], [np.inf], [np.inf], [np.inf]]
+
+
+@pytest.mark.filterwarnings("error")
+def test_values_that_are_no_numbers_do_not_warn() -> None:
+    found = Stage("root", lambda J, peaks: np.sqrt(J[0]), lambda J: [[np.log(J[0])]], lambda J: [1.0 / J[0] - 3.0]).numbers(
+        rows((0.0,), (4.0,))
+    )
+    assert found.tolist() == [np.inf, 2.0]
+
+
+def test_what_limits_say() -> None:
+    assert LIMITED.titles(3) == LIMITED.limit_names
+    assert FREE.titles(2) == ("limit 1 of first", "limit 2 of first") and FREE.titles(0) == ()
+
+
+def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
+    assert exceeded(LIMITED, GOALS, np.array([3.0, 1.0, 1.0])) == (
+        "'time at most 2 s' is missed by 1 s, 'mass at least 5 kg' is missed by 4 kg, 'time at most the risk' is missed by 2"
+    )
+    assert exceeded(LIMITED, GOALS, np.array([1.0, 4.5, 1e3])) == "'mass at least 5 kg' is missed by 0.5 kg"
+    assert exceeded(LIMITED, GOALS, np.array([1e3, 5.0, 1e3])) == "'time at most 2 s' is missed by 998 s"
+    assert exceeded(LIMITED, GOALS, np.array([1e7, 5.0, 1e7])) == "'time at most 2 s' is missed by 1e+07 s"
+    unnamed = Stage("cheap", lambda J, peaks: J[0], limits=lambda J: [J[0] - 1.0, 3.0 * (2.0 - J[1])])
+    assert exceeded(unnamed, GOALS, np.array([0.0, 1.0, 0.0])) == "'limit 2 of cheap' is missed by 1 kg"
+    assert exceeded(LIMITED, GOALS, np.array([0.0, 5.0, 0.0])) == "", "what is met is not missed"
+    assert exceeded(LIMITED, GOALS, np.array([2.0 + SLACK, 5.0, 3.0])) == ""
+    assert exceeded(LIMITED, GOALS, np.array([np.nan, 5.0, np.inf])) == "'time', 'risk' is no number"
+    with pytest.raises(ValueError, match="zip"):
+        exceeded(LIMITED, GOALS[:2], np.array([1.0, 5.0, 1.0]))
+
+
+# The order
+
+
+def ordered(stages: Any, J: np.ndarray, **more: Any) -> list[int]:
+    return ordering(stages, J, more.pop("kind", np.zeros(len(J))), **more).order.tolist()
+
+
+def test_the_kind_comes_first_then_the_limits_and_then_the_values() -> None:
+    limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1] - 1.0])
+    J = rows((4.0, 0.0), (3.0, 1.0), (0.0, 2.0), (0.0, 1.5), (0.0, 0.0))
+    found = ordering([limited], J, np.array([0, 0, 0, 0, 1]))
+    assert found.order.tolist() == [1, 0, 3, 2, 4]
+    assert found.excess.tolist() == [0.0, 0.0, 1.0, 0.5, 0.0]
+    assert found.values[:, 0].tolist() == [4.0, 3.0, np.inf, np.inf, 0.0]
+    # Rounding is no excess, so that it does not order.
+    assert ordering([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * SLACK)), np.zeros(2)).excess.tolist() == [0.0, 0.0]
+    assert ordered([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * SLACK))) == [1, 0]
+
+
+def test_limits_of_all_stages_count() -> None:
+    second = Stage("second", lambda J, peaks: J[0], limits=lambda J: [J[1] - 1.0])
+    found = ordering([FREE, second], rows((1.0, 3.0), (2.0, 0.0)), np.zeros(2))
+    assert found.order.tolist() == [1, 0] and found.excess.tolist() == [2.0, 0.0] and found.values.tolist() == [[1.0, np.inf], [2.0, 2.0]]
+
+
+def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
+    second, third = (Stage(name, lambda J, peaks, k=k: J[k]) for k, name in ((1, "second"), (2, "third")))
+    J = rows((1.0, 2.0, 0.0), (1.0 + 1e-10, 1.0, 5.0), (2.0, 0.0, 0.0), (1.0, 1.0 + 1e-10, 4.0))
+    assert ordered([FREE, second, third], J) == [3, 1, 0, 2]
+    assert ordered([FREE, second, third], J, same=1e-12) == [3, 0, 1, 2]
+    # By parts of their size where this is above 1, and as they are below it.
+    assert ordered([FREE, second], rows((100.0, 1.0, 0.0), (100.5, 0.0, 0.0)), same=1e-2) == [1, 0]
+    assert ordered([FREE, second], rows((100.0, 1.0, 0.0), (101.5, 0.0, 0.0)), same=1e-2) == [0, 1]
+    assert ordered([FREE, second], rows((0.0, 1.0, 0.0), (0.009, 0.0, 0.0)), same=1e-2) == [1, 0]
+    assert ordered([FREE, second], rows((0.0, 1.0, 0.0), (0.011, 0.0, 0.0)), same=1e-2) == [0, 1]
+    assert ordered([FREE, second], rows((-100.0, 1.0, 0.0), (-99.5, 0.0, 0.0)), same=1e-2) == [1, 0]
+
+
+def test_a_stage_that_follows_on_zero_follows_nowhere_else() -> None:
+    missing = Stage("missing", lambda J, peaks: J[0])
+    rest = Stage("rest", lambda J, peaks: J[1], after_zero=True)
+    found = ordering([missing, rest], rows((0.0, 3.0), (1e-10, 2.0), (1.0, 0.0), (1.0, -1.0)), np.zeros(4))
+    assert found.values[:, 1].tolist() == pytest.approx([3.0, 2.0, np.nan, np.nan], nan_ok=True)
+    assert found.order.tolist() == [1, 0, 2, 3]
+
+
+def test_ties_are_told_apart_by_what_is_given_or_keep_their_places() -> None:
+    J = rows((1.0,), (1.0,), (0.0,), (1.0,))
+    assert ordered([FREE], J) == [2, 0, 1, 3]
+    assert ordered([FREE], J, tie=np.array([2.0, 1.0, 9.0, 0.0])) == [2, 3, 1, 0]
+    # The last stage tells all differences: there is no slack in it.
+    assert ordered([FREE], rows((1.0,), (1.0 - 1e-12,)), tie=np.array([0.0, 1.0]), same=1.0) == [1, 0]
+    assert ordered([FREE], rows((1.0,))) == [0] and ordered([FREE], np.zeros((0, 1))) == []
+
+
+def test_what_has_no_value_comes_last_and_keeps_its_places() -> None:
+    limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1]])
+    assert ordered([limited, FREE], rows((1.0, np.nan), (0.0, np.inf), (2.0, 0.0), (0.0, 0.5), (1.0, 0.5))) == [2, 3, 4, 0, 1]

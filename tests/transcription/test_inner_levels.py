@@ -1,0 +1,169 @@
+"""The inner levels that need no file of their own: what they hand on, what they add up, and what their work is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from cases import candidates, integrator
+
+from problems import Problem
+from transcription import DFET, NLP, InnerResult, InnerSolver
+from transcription.inner import Propagate, Whole, inner_solver, levels
+from transcription.inner.effort import evaluation, propagation
+
+
+def line() -> NLP:
+    problem, phase = integrator(final=1)
+    problem.minimize("effort", phase.integral(phase["u"] ** 2))
+    return DFET(2, 1).transcribe(problem)
+
+
+def no_numbers() -> NLP:
+    """The square root of a negative number from the first."""
+    problem = Problem("broken")
+    phase = problem.phase("run", t0=0, tf=(1, 2))
+    x = phase.state("x", bounds=(-1, 1), initial=-0.5)
+    phase.dynamics(x=ca.sqrt(x) + phase.control("u", bounds=(-1, 1)))
+    problem.minimize("time", phase.tf)
+    return DFET(2, 2).transcribe(problem)
+
+
+# Propagation alone, and none
+
+
+@pytest.mark.parametrize(("inner", "one"), [("propagate", propagation), ("none", evaluation)])
+def test_each_candidate_takes_the_same_work_and_one_iteration(inner: str, one: Any) -> None:
+    level = inner_solver(inner)
+    program = level.program(line())
+    for k in (1, 4):
+        found = level.solve(program, candidates(program, k))
+        assert found.work == pytest.approx(k * one(program)) and 0.0 < found.work < k, "less than an iteration of IPOPT each"
+        assert found.iterations.tolist() == [1] * k and found.iterations.dtype.kind == "i" and found.fallbacks == 0
+
+
+def test_a_propagation_that_fails_gives_the_warm_start_back() -> None:
+    nlp = no_numbers()
+    C, warm = candidates(nlp, 3), np.full((3, len(nlp.variables)), 0.25)
+    found = Propagate().solve(nlp, C, warm)
+    assert set(found.status) == {"failed"} and np.array_equal(found.z[:, nlp.free], C)
+    assert (np.delete(found.z, nlp.free, axis=1) == 0.25).all()
+
+
+def test_without_an_inner_level_the_states_of_a_warm_start_are_judged_as_they_are() -> None:
+    """x' = u = 0.5 reaches 1 in 2: with the states of that flight it is feasible, with the guessed ones of 0 everywhere it is not."""
+    nlp = line()
+    C = np.full((1, len(nlp.free)), 0.5)
+    flown = nlp.propagate(nlp.guessed(C))
+    found = Whole().solve(nlp, C, flown)
+    assert found.status.tolist() == ["converged"] and np.array_equal(found.z, flown)
+    still = flown.copy()
+    still[:, np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)] = 0.0
+    assert Whole().solve(nlp, C, still).status.tolist() == ["infeasible"]
+
+
+@pytest.mark.parametrize("inner", ["propagate", "projection", "none"])
+def test_by_default_a_millionth_of_a_bound_may_be_missed(inner: str) -> None:
+    """What flies to 1 but for shares of that, on a scale of 20, the width of the bounds of x."""
+    level = inner_solver(inner)
+    nlp = line()
+    C = np.array([[0.5 + 10.0 * share * 1e-6] * len(nlp.free) for share in (0.4, 1.5)])
+    flown = nlp.propagate(nlp.guessed(C))
+    program = level.program(nlp)
+    found = level.solve(program, flown[:, program.free], flown)
+    projects = inner == "projection"
+    assert found.status.tolist() == ["converged", "converged" if projects else "infeasible"]
+    assert bool(found.moved[1] > 0.0) is projects
+
+
+def test_levels_are_found_by_their_names_alone() -> None:
+    for name, level in levels.NAMED.items():
+        assert inner_solver(name) is level and inner_solver(level) is level
+    for wrong in ("newton", "", None, 3, Propagate, ["auto"]):
+        with pytest.raises(
+            ValueError, match=r"unknown inner level .*; there are auto, projection, propagate, none, ipopt, ipopt-feasibility$"
+        ):
+            inner_solver(wrong)  # type: ignore[arg-type]
+
+
+# A projection of what Newton's method leaves
+
+
+@dataclass(frozen=True)
+class Told(InnerSolver):
+    """Says what it is told to, and keeps what it was asked."""
+
+    status: tuple[str, ...]
+    iterations: int
+    sign: float
+    work: float | None = None
+    clocked: bool = False
+    asked: dict[str, Any] = field(default_factory=dict)
+
+    def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
+        assert len(candidates) == len(self.status)
+        self.asked.update(nlp=nlp, candidates=candidates, warm=warm, tolerance=tolerance)
+        each = self.sign * np.arange(1.0, len(self.status) + 1)
+        wide = each[:, None] * np.ones(3)
+        iterations = np.full(len(each), self.iterations)
+        status = np.array(self.status, dtype="<U10")
+        return InnerResult(wide, wide[:, :1], each + 0, status, each + 0, iterations, self.clocked, 0, wide + 0, self.work)
+
+
+def projected(monkeypatch: pytest.MonkeyPatch, newton: Told, ipopt: Told, warm: bool = False) -> tuple[InnerResult, np.ndarray, Any]:
+    """What a projection makes of what these two say; with its candidates and warm start."""
+    nlp = line()
+    C = candidates(nlp, len(newton.status))
+    start = np.full((len(C), len(nlp.variables)), 0.25) if warm else None
+    monkeypatch.setattr(levels, "Newton", lambda: newton)
+    monkeypatch.setattr(levels, "Ipopt", lambda max_iterations: ipopt)
+    return inner_solver("projection").solve(nlp, C, start, tolerance=1e-4), C, start
+
+
+def test_only_what_is_left_is_projected_and_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    newton, ipopt = Told(("converged", "infeasible", "converged", "failed"), 3, 1.0, 1.5), Told(("converged", "failed"), 20, -1.0)
+    found, C, _ = projected(monkeypatch, newton, ipopt)
+    assert found.status.tolist() == ["converged", "converged", "converged", "failed"]
+    for name in ("violation", "moved"):
+        assert getattr(found, name).tolist() == [1.0, -1.0, 3.0, -2.0], name
+    for name in ("z", "F", "residuals"):
+        assert getattr(found, name)[:, 0].tolist() == [1.0, -1.0, 3.0, -2.0], name
+    assert np.array_equal(ipopt.asked["candidates"], C[[1, 3]])
+    assert found.fallbacks == 2 and found.clocked is False
+
+
+def test_the_work_of_both_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of Newton's method in iterations of IPOPT, to which those of IPOPT are added."""
+    newton, ipopt = Told(("converged", "infeasible", "failed"), 3, 1.0, 1.5), Told(("converged", "failed"), 20, -1.0)
+    found, *_ = projected(monkeypatch, newton, ipopt)
+    assert found.iterations.tolist() == [3, 23, 23] and found.work == 1.5 + 40
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_both_begin_where_they_are_told_to_and_keep_the_tolerance(monkeypatch: pytest.MonkeyPatch, warm: bool) -> None:
+    newton, ipopt = Told(("infeasible", "converged", "infeasible"), 3, 1.0, 1.5), Told(("converged", "converged"), 20, -1.0)
+    _, C, start = projected(monkeypatch, newton, ipopt, warm)
+    assert newton.asked["tolerance"] == ipopt.asked["tolerance"] == 1e-4 and newton.asked["nlp"] is ipopt.asked["nlp"]
+    assert newton.asked["warm"] is start and np.array_equal(newton.asked["candidates"], C)
+    nlp = line()
+    begun = ipopt.asked["warm"]
+    assert np.array_equal(begun[:, nlp.free], C[[0, 2]])
+    states = np.delete(begun, nlp.free, axis=1)
+    assert np.array_equal(states, np.full(states.shape, 0.25) if warm else np.delete(nlp.guessed(C[[0, 2]]), nlp.free, axis=1))
+
+
+@pytest.mark.parametrize("clocked", [True, False])
+def test_a_clock_that_ended_the_projection_is_told(monkeypatch: pytest.MonkeyPatch, clocked: bool) -> None:
+    found, *_ = projected(monkeypatch, Told(("failed",), 3, 1.0, 1.5), Told(("timeout",), 20, -1.0, clocked=clocked))
+    assert found.clocked is clocked
+
+
+@pytest.mark.parametrize("newton", [Told(("converged",), 3, 1.0, 1.5), Told(("timeout",), 3, 1.0, 1.5, clocked=True)], ids=["done", "late"])
+def test_nothing_is_projected_where_all_is_feasible_or_time_is_up(monkeypatch: pytest.MonkeyPatch, newton: Told) -> None:
+    ipopt = Told(("converged",), 20, -1.0)
+    found, *_ = projected(monkeypatch, newton, ipopt)
+    assert not ipopt.asked and found.z[0, 0] == 1.0 and found.work == 1.5 and found.clocked is newton.clocked and found.fallbacks == 0
+    assert found.iterations.tolist() == [3]
