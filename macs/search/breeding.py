@@ -1,10 +1,10 @@
 """Breeding: offspring of the points of the archive, by several operators. An operator is used more often if the archive keeps its
-offspring for some time.
+offspring.
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. No operator is
 best on every problem. Crossover suits separable problems with many local fronts, differences suit coupled variables. So all are used, and
-those more often whose offspring stay in the archive, see `credit`.
+those more often whose offspring the archive keeps, see `credit`.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return X + np.where(rng.random(X.shape) < 1.0 / X.shape[1], np.copysign(size, u - 0.5), 0.0)
 
 
-def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def breed(box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """One offspring of each parent, and the operator that made it.
 
     Parameters
@@ -110,8 +110,8 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np
         The parents, in unit coordinates.
     pool : array (p, d)
         Points that mates are chosen from.
-    credit : array (number of operators, 2)
-        See `credit.updated_credit`.
+    shares : array (number of operators,)
+        Probabilities of the operators.
     rng : numpy.random.Generator
 
     Returns
@@ -121,7 +121,7 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, credit: np.ndarray, rng: np
     array (k,) of int
         Row in `OPERATORS` of the operator that made each.
     """
-    operator = rng.choice(len(OPERATORS), size=len(X), p=operator_shares(credit))
+    operator = rng.choice(len(OPERATORS), size=len(X), p=shares)
     others = mates(box, X, pool, rng)
     trial = X.copy()
     for index, (propose, mutates) in enumerate(OPERATORS):
@@ -148,7 +148,7 @@ def breed_archive(trials: Trials) -> None:
     rows = np.concatenate(rounds)[:count]
     points = box.to_unit(archive.Z[:, evaluator.free])
     pool = points if len(points) > FEW else np.vstack([points, trials.positions()])
-    trial, operator = breed(box, points[rows], pool, state.credit, rng)
+    trial, operator = breed(box, points[rows], pool, operator_shares(state.credit, archive.F.shape[1]), rng)
     bred, result = trials.evaluate(archive.Z[rows], points[rows], trial)
     if result is None:
         return

@@ -1,7 +1,7 @@
-"""Credit of the operators that breed: by what became of their offspring some iterations later.
+"""Credit of the operators that breed: by how much of their offspring the archive keeps.
 
-What the archive keeps at first tells little: with many objectives nearly every new point is non-dominated. What stays in it is what a front
-is made of.
+With many objectives nearly every new point is non-dominated, so that what the archive keeps at first tells little. Offspring is then judged
+some iterations later, by what has stayed.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..pareto.niches import MANY
+
 LEAST_SHARE, FORGET = 0.05, 0.1
 """Least share of an operator in the offspring, so that it can succeed later; fraction of the credit that is forgotten in each iteration."""
 
 
 LATER, CLEARLY = 10, 3.0
-"""Offspring is judged so many iterations after its birth; power of the success rates to which shares are proportional."""
+"""With many objectives: offspring is judged so many iterations after its birth; power of the success rates to which shares are
+proportional. With few, it is judged at once, and shares are proportional to the rates."""
 
 
 @dataclass(frozen=True)
@@ -77,16 +80,16 @@ def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -
     return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
 
 
-def operator_shares(credit: np.ndarray) -> np.ndarray:
-    """Probabilities (o,) of the operators: proportional to a power of their success rates, with a least share for each (Thierens 2005)."""
-    rate = ((credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)) ** CLEARLY
+def operator_shares(credit: np.ndarray, m: int) -> np.ndarray:
+    """Probabilities (o,) of the operators for m objectives: by their success rates, with a least share for each (Thierens 2005)."""
+    rate = ((credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)) ** (CLEARLY if m > MANY else 1.0)
     return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
 
 
 def judged(young: Offspring, credit: np.ndarray, archive: np.ndarray, iteration: int) -> tuple[Offspring, np.ndarray]:
     """The offspring that is still too young to be judged, and the credit (o, 2) after the rest was: what is among the objectives (a, m) of
     the archive has stayed."""
-    old = young.born <= iteration - LATER
+    old = young.born <= iteration - (LATER if archive.shape[1] > MANY else 0)
     if not old.any():
         return young, credit
     those = young.take(old)

@@ -69,8 +69,8 @@ def test_scales_are_the_ranges_where_the_plane_of_the_corners_cuts_no_axis():
 
 @pytest.mark.parametrize(("share", "wins"), [(1.1, False), (0.9, True)])
 def test_the_penalty_weighs_the_distance_from_a_direction(share, wins):
-    lattice = simplex_lattice(4, 2)
-    middle = int(np.flatnonzero((lattice == [0.5, 0.5, 0.0, 0.0]).all(axis=1))[0])
+    lattice = simplex_lattice(4, 4)
+    middle = int(np.flatnonzero((lattice == 0.25).all(axis=1))[0])
     # Nearer along its direction, and aside by so much of what that is worth.
     gain = 0.02 * np.linalg.norm(lattice[middle])
     other = 0.98 * lattice[middle] + share * gain / PENALTY * np.array([1.0, -1.0, 0.0, 0.0]) / np.sqrt(2.0)

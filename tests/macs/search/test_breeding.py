@@ -23,8 +23,8 @@ def test_offspring_are_in_the_box_and_the_same_seed_gives_the_same(seed, size, d
     pool = np.random.default_rng(seed).random((size, d))
     pool[::3] = np.round(pool[::3])  # some on the bounds
     cube = box(d, [0] if wrap else [])
-    credit = credit_of.no_credit(len(breeding.OPERATORS))
-    first, again = (breeding.breed(cube, cube.put_back(pool), pool, credit, np.random.default_rng(seed)) for _ in range(2))
+    shares = np.full(len(breeding.OPERATORS), 1 / len(breeding.OPERATORS))
+    first, again = (breeding.breed(cube, cube.put_back(pool), pool, shares, np.random.default_rng(seed)) for _ in range(2))
     assert ((first[0] >= 0.0) & (first[0] <= 1.0)).all()
     assert np.array_equal(first[0], again[0])
     assert np.array_equal(first[1], again[1])
@@ -97,41 +97,52 @@ def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
 
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
     credit, count = credit_of.no_credit(len(breeding.OPERATORS)), len(breeding.OPERATORS)
-    assert np.allclose(credit_of.operator_shares(credit), 1 / count)
+    assert np.allclose(credit_of.operator_shares(credit, 2), 1 / count)
     operator = np.repeat(np.arange(count), 25)
     for _ in range(40):
         credit = credit_of.updated_credit(credit, operator, operator == 1)
-    share = credit_of.operator_shares(credit)
+    share = credit_of.operator_shares(credit, 2)
     assert share.sum() == pytest.approx(1.0)
     assert share.argmax() == 1
     assert share[1] > 0.8
     assert np.allclose(share[[0, 2, 3]], credit_of.LEAST_SHARE, atol=0.01)
     for _ in range(40):  # what was is forgotten
         credit = credit_of.updated_credit(credit, operator, operator == 2)
-    assert credit_of.operator_shares(credit).argmax() == 2
+    assert credit_of.operator_shares(credit, 2).argmax() == 2
 
 
 def test_nothing_tried_changes_nothing_that_can_be_seen():
     credit = np.zeros((len(breeding.OPERATORS), 2))
     assert np.array_equal(credit_of.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
-    assert np.allclose(credit_of.operator_shares(credit), 1 / len(credit))
+    assert np.allclose(credit_of.operator_shares(credit, 2), 1 / len(credit))
 
 
-def test_offspring_is_judged_when_it_is_old_enough_by_what_has_stayed():
-    count = len(breeding.OPERATORS)
-    young = credit_of.Offspring(np.array([[0.0, 1.0], [1.0, 0.0], [0.5, 0.5]]), np.array([0, 2, 2]), np.array([3, 3, 4]))
-    archive = np.array([[1.0, 0.0], [0.2, 0.3], [0.5, 0.5]])
-    credit, now = credit_of.no_credit(count), 3 + credit_of.LATER
+def test_offspring_is_judged_by_what_has_stayed_at_once_with_few_objectives_and_later_with_many():
+    young = credit_of.Offspring(np.repeat([[0.0], [1.0], [0.5]], 4, axis=1), np.array([0, 2, 2]), np.array([3, 3, 4]))
+    archive = np.repeat([[1.0], [0.2], [0.5]], 4, axis=1)
+    credit, now = credit_of.no_credit(len(breeding.OPERATORS)), 3 + credit_of.LATER
     same, unchanged = credit_of.judged(young, credit, archive, now - 1)
     assert same is young
     assert unchanged is credit
     left, found = credit_of.judged(young, credit, archive, now)
-    assert left.F.tolist() == [[0.5, 0.5]]
+    assert left.F.tolist() == [[0.5] * 4]
     assert (left.operator.tolist(), left.born.tolist()) == ([2], [4])
     kept = (1 - credit_of.FORGET) * credit
     assert np.allclose(found - kept, [[0, 1], [0, 0], [1, 1], [0, 0]])
     none, _ = credit_of.judged(left, found, archive, now + 1)
-    assert none.F.shape == (0, 2)
+    assert none.F.shape == (0, 4)
+    few = credit_of.Offspring(young.F[:, :3], young.operator, np.full(3, 7))
+    none, found = credit_of.judged(few, credit, archive[:, :3], 7)
+    assert len(none.F) == 0
+    assert np.allclose(found - kept, [[0, 1], [0, 0], [2, 2], [0, 0]])
+
+
+def test_what_succeeds_more_often_has_clearly_more_of_the_offspring_with_many_objectives():
+    credit = np.array([[60.0, 100.0], [30.0, 100.0], [30.0, 100.0], [30.0, 100.0]])
+    few, many = credit_of.operator_shares(credit, 3), credit_of.operator_shares(credit, 4)
+    assert few[0] / few[1] < 2.0 < many[0] / many[1]
+    assert many.sum() == pytest.approx(1.0)
+    assert (many >= credit_of.LEAST_SHARE).all()
 
 
 def test_the_search_credits_what_the_archive_keeps():

@@ -2,6 +2,7 @@
 
 import copy
 
+import moocore
 import numpy as np
 import pytest
 from ascent import Ascent
@@ -9,6 +10,7 @@ from boxes import boxed
 from fronts import distance_to_curve, inverted_distance, mean_distance
 from plain import dtlz, uf, zdt
 
+from macs.baselines import NSGA3
 from macs.pareto.dominance import dominates
 from macs.search.macs import MACS
 from problems.cases.goddard import reference
@@ -243,6 +245,20 @@ def test_fronts_of_zitzler_deb_and_thiele(kind, evaluations, limit):
 def test_fronts_of_two_and_three_objectives(kind, m, limit):
     values = distances(dtlz(kind, m), range(1, 4), 30_000)
     assert np.median(values) <= limit, values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("m", [5, 8])
+def test_with_many_objectives_it_is_nearer_to_the_front_than_nsga3_and_covers_more(m):
+    function, bounds, _ = dtlz(2, m)
+    distance, volume = {}, {}
+    for solver in (MACS(archive=110), NSGA3(population=110)):
+        fronts = [solver.minimize(function, bounds, evaluations=15_000, seed=seed, progress=False).F for seed in range(1, 6)]
+        distance[solver] = np.median([np.abs(np.linalg.norm(F, axis=1) - 1).mean() for F in fronts])
+        volume[solver] = np.median([moocore.hypervolume(F[(F < 1.1).all(axis=1)], ref=np.full(m, 1.1)) for F in fronts])
+    (ours, theirs), (more, less) = distance.values(), volume.values()
+    assert ours < theirs
+    assert more > less
 
 
 @pytest.mark.slow
