@@ -347,7 +347,8 @@ def check_problem(problem: Any, transcription: Any = None) -> None:
     if isinstance(problem, VectorProblem | CompiledVectorProblem):
         raise ValueError(f"{without_dynamics(problem.name)}: use a search, such as MACS().solve(problem)")
     if not isinstance(problem, Problem | CompiledProblem):
-        raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; problems.load makes one from a name")
+        others = "problems.load makes one from a name, and minimize(...) searches a plain function or a problem of pymoo"
+        raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; {others}")
     if transcription is not None and not isinstance(transcription, Transcription):
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
 

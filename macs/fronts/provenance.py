@@ -106,7 +106,7 @@ STATS: dict[str, Any] = {
 """Entries that the `stats` of every front have, beside `versions`."""
 
 
-PACKAGES = ("macs-trajectories", "casadi", "numpy", "scipy")
+PACKAGES = ("macs-trajectories", "casadi", "numpy", "pymoo", "scipy")
 
 
 @lru_cache(maxsize=1)
