@@ -57,8 +57,8 @@ def best_of_niches(F: np.ndarray, limit: int) -> np.ndarray:
 def intercepts(F: np.ndarray) -> np.ndarray:
     """Scales (m,) of the objectives F (n, m): from the ideal point to where the plane through the corners of the front meets the axes.
 
-    The corner of an objective is the point nearest to its axis. No scale is more than the range; if the plane does not meet all axes, all
-    are the ranges (Deb and Jain 2014). An objective that does not vary has the scale 1.
+    The corner of an objective is the point nearest to its axis. No scale is more than the range; if the plane meets an axis behind the
+    ideal point, or is none, all are the ranges (Deb and Jain 2014). An objective that does not vary has the scale 1.
     """
     N = F - F.min(axis=0)
     span = N.max(axis=0)
@@ -71,7 +71,7 @@ def intercepts(F: np.ndarray) -> np.ndarray:
             cut = 1.0 / np.linalg.solve(corners, np.ones(len(span)))
         except np.linalg.LinAlgError:
             return span
-    if not (np.isfinite(cut) & (cut > ALONG)).all():
+    if not (cut > ALONG).all():
         return span
     return span * np.minimum(cut, 1.0)
 

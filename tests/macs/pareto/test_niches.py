@@ -67,6 +67,26 @@ def test_scales_are_the_ranges_where_the_plane_of_the_corners_cuts_no_axis():
     assert np.allclose(intercepts(flat), [2.0, 2.0, 1.0, 1.0])
 
 
+@pytest.mark.parametrize("last", [[0.5, 0.25, 0.25, 1.0], [0.7, 0.7, 0.6, 1.0]])
+def test_scales_are_the_ranges_where_the_plane_runs_along_an_axis_or_meets_it_behind_the_ideal_point(last):
+    F = np.vstack([np.eye(3, 4), last])
+    with np.errstate(all="raise"):
+        assert intercepts(F).tolist() == [1.0] * 4
+
+
+def test_an_objective_that_does_not_vary_has_no_part_in_what_is_chosen():
+    F = np.hstack([simplex_lattice(4, 3), np.full((20, 1), 7.0)])
+    assert intercepts(F).tolist() == [1.0] * 5
+    total = F[:, :4] @ [1.0, 2.0, 3.0, 4.0]
+    with np.errstate(all="raise"):
+        assert nearly_best(F, total)[4] == total.argmin()
+
+
+def test_no_scale_is_more_than_the_range():
+    corners = np.array([[0.9, 0.3, 0.0, 0.0], [0.0, 0.9, 0.3, 0.0], [0.0, 0.0, 0.9, 0.3], [0.3, 0.0, 0.0, 0.9]])
+    assert intercepts(corners).tolist() == [0.9] * 4
+
+
 @pytest.mark.parametrize(("share", "wins"), [(1.1, False), (0.9, True)])
 def test_the_penalty_weighs_the_distance_from_a_direction(share, wins):
     lattice = simplex_lattice(4, 4)
