@@ -64,7 +64,7 @@ def dtlz(kind: int, m: int) -> Plain:
         front = front[nondominated(front)]
         front = front[np.random.default_rng(0).permutation(len(front))[:5000]]
     else:
-        lattice = simplex_lattice(m, 999 if m == 2 else 99)
+        lattice = simplex_lattice(m, {2: 999, 3: 99}.get(m, 7))
         front = lattice / 2 if kind == 1 else lattice / np.linalg.norm(lattice, axis=1, keepdims=True)
     return function, [(0, 1)] * (m - 1 + distant), front
 
