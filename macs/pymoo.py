@@ -2,7 +2,7 @@
 
 pymoo tells an algorithm the values of one batch of candidates in each iteration, but an iteration of MACS evaluates several, each of which
 depends on the one before. So an iteration is a function of the state before it and of the values that are known: it is done on a copy of
-this state, and ends where it needs values that nobody has told, or is complete. What is kept between two calls is data: the state, and the
+this state, and ends where values are missing, or when it is complete. What is kept between two calls is data: the state, and the
 batches told since. `tell` does the iteration again with one batch more; `next` evaluates by pymoo's evaluator whatever is needed.
 """
 
@@ -161,7 +161,7 @@ class MACS(Algorithm):
         if self.output is None:
             self.output = SingleObjectiveOutput() if problem.n_obj == 1 else MultiObjectiveOutput()
         super().setup(problem, verbose=verbose, progress=progress, **options)
-        self._compiled = replace(plain_problem(problem), name=problem.name(), rows=_nobody)
+        self._compiled = replace(plain_problem(problem), name=problem.name(), rows=_only_pymoo)
         self.search.check_objectives(problem.n_obj)
         self.search.check_goals(self._compiled.goals)
         self.search.check_vector(self._compiled)
@@ -369,7 +369,7 @@ def place(z: np.ndarray, f: np.ndarray) -> bytes:
 def most_evaluations(termination: Any, default: bool = True) -> float:
     """Number of evaluations at which a termination of pymoo ends a run at the latest; infinite if there is none.
 
-    Without `default`, that of pymoo's default terminations is none: nobody has chosen it.
+    Without `default`, that of pymoo's default terminations does not count, since the user has not chosen it.
     """
     if isinstance(termination, MaximumFunctionCallTermination):
         most = termination.n_max_evals
@@ -411,6 +411,6 @@ def _columns(values: Any, count: int) -> np.ndarray:
     return array.reshape(count, array.size // count)
 
 
-def _nobody(X: np.ndarray) -> NoReturn:
+def _only_pymoo(X: np.ndarray) -> NoReturn:
     """In place of the function of a problem, which only pymoo evaluates."""
     raise NotImplementedError

@@ -41,7 +41,7 @@ def best_of_niches(F: np.ndarray, limit: int) -> np.ndarray:
     """
     N = (F - F.min(axis=0)) / intercepts(F)
     axes = _unit_directions(F.shape[1], limit)
-    along = N @ axes.T
+    along = np.einsum("nm,km->nk", N, axes)  # no matrix product: with more threads BLAS may sum in another order
     aside = np.sqrt(np.maximum((N**2).sum(axis=1)[:, None] - along**2, 0.0))
     niche = aside.argmin(axis=1)
     rows = np.arange(len(F))

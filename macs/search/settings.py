@@ -60,7 +60,7 @@ class Settings:
         Number of agents, at least 3, as differential evolution needs.
     archive : int, default 10
         Largest number of points in the archive, and so on the front. At least the number of objectives; the best point of each objective is
-        always kept.
+        always kept (with more than three objectives, to a millionth of its range).
     refine : bool, default True
         Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, see
         `refine_every`, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
