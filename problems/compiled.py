@@ -20,7 +20,7 @@ from .derived import Deriving
 FINGERPRINT_POINTS = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A state, control, parameter or time: its bounds, and how it is shown and scaled.
 

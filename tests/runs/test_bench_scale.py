@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 
@@ -43,6 +44,15 @@ def test_exponents_are_those_of_powers():
     assert len(row.values["time"]) == 2 and len(row.values["memory"]) == 1  # a few MB say nothing
 
 
+def test_of_repetitions_the_quickest_counts_and_the_first_peak():
+    row = Row("work", "things")
+    first, again = [(10, 2.0, 20.0), (20, 4.0, 40.0), (40, 4.0, 80.0)], [(10, 1.0, 80.0), (20, 2.0, 80.0), (40, 9.0, 80.0)]
+    growth.add_round(row, (10, 20, 40), [*first, *again])
+    assert row.of("time") == pytest.approx(1.0) and row.of("memory") == pytest.approx(1.0) and row.of("seconds at 40") == 4.0
+    growth.add_round(row, (10, 20, 40), first[:2])
+    assert row.values["unfinished"] == [1.0] and len(row.values["time"]) == 1
+
+
 def test_what_grows_faster_than_asked_is_named():
     rows = [
         Row("first", "nodes", {"time": [1.0, 1.05, 3.0], "memory": [1.0]}),
@@ -62,7 +72,7 @@ def test_what_grows_faster_than_asked_is_named():
     assert "at most, met" in scale.report(rows[:1])
 
 
-def test_a_repetition_is_prepared_anew():
+def test_a_repetition_is_prepared_anew_and_all_sizes_come_before_the_next(capsys):
     made = []
 
     def prepare(size):
@@ -70,7 +80,9 @@ def test_a_repetition_is_prepared_anew():
         return lambda: None
 
     one = replace(SERIES[0], prepare=prepare)
-    assert child.least(one, 7, 3) >= 0.0 and made == [7, 7, 7]
+    child.measure(one, (7, 8), 3)
+    assert made == [7, 7, 8, 7, 8, 7, 8]
+    assert [json.loads(line)[:2] for line in capsys.readouterr().out.splitlines()] == [[one.name, size] for size in made[1:]]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")

@@ -67,7 +67,7 @@ class Reduced(Deriving):
         self._peaks, self._largest = peaks
         self._rest, g_lower, g_upper, g_scale = rest
         self._scores = scores
-        self._dependent = np.setdiff1d(np.arange(len(layout.variables)), layout.free)
+        self._dependent = np.flatnonzero(~_marked(layout.free, len(layout.variables)))
         finals = [
             replace(v, lower=low, upper=high)
             for writer in writers
@@ -173,11 +173,19 @@ class Reduced(Deriving):
 
     def _rows_inside(self) -> np.ndarray:
         """Rows that need the states inside the elements."""
-        inside = self._layout.index(np.concatenate([*(writer.interior for writer in self._writers), self._peaks]))
+        slots = np.concatenate([*(writer.interior for writer in self._writers), self._peaks])
+        inside = _marked(self._layout.index(slots), self._layout.total)
         rest = np.zeros(self._rest.numel_out(0), dtype=bool)
         rows, columns = self._rest.jac_sparsity(0, 0).get_triplet()
-        rest[np.array(rows, dtype=int)[np.isin(columns, inside)]] = True
-        return np.concatenate([np.zeros(len(self._imposed), dtype=bool), np.isin(self._dependent, inside), rest])
+        rest[np.array(rows, dtype=int)[inside[columns]]] = True
+        return np.concatenate([np.zeros(len(self._imposed), dtype=bool), inside[self._dependent], rest])
+
+
+def _marked(places: Sequence[int] | np.ndarray, count: int) -> np.ndarray:
+    """Which of 0 ... count - 1 are among these places, (count,) of bool: a set of them would cost more than it in a long vector."""
+    found = np.zeros(count, dtype=bool)
+    found[places] = True
+    return found
 
 
 def _jacobian(function: ca.Function, at: ca.MX) -> ca.MX:

@@ -11,7 +11,7 @@ from multiprocessing import get_context
 
 from .series import SERIES, Series
 
-ENOUGH = 2.0
+ENOUGH = 4.0
 """Seconds of work at one size after which it is not repeated."""
 
 
@@ -28,23 +28,23 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def measure(series: Series, sizes: Sequence[int], repeats: int) -> None:
-    """Print a line of JSON for each size: name, size, least CPU seconds of the repetitions, and MB of the peak so far above the
-    beginning."""
+    """Print a line of JSON for each repetition: name, size, CPU seconds, and MB of the peak so far above the beginning."""
     begin = peak()
     series.prepare(sizes[0])()  # whatever is made once is made
-    for size in sizes:
-        print(json.dumps([series.name, size, least(series, size, repeats), peak() - begin]), flush=True)
+    spent = dict.fromkeys(sizes, 0.0)
+    for _ in range(repeats):  # all sizes, then again: a minute in which the machine is slow is one of all of them
+        for size in sizes:
+            if spent[size] < ENOUGH:
+                spent[size] += (once := seconds(series, size))
+                print(json.dumps([series.name, size, once, peak() - begin]), flush=True)
 
 
-def least(series: Series, size: int, repeats: int) -> float:
-    """The least CPU seconds of so many repetitions, fewer where they take long."""
-    times: list[float] = []
-    while len(times) < repeats and sum(times) < ENOUGH:
-        work = series.prepare(size)
-        began = time.process_time()
-        work()
-        times.append(time.process_time() - began)
-    return min(times)
+def seconds(series: Series, size: int) -> float:
+    """CPU seconds of one repetition."""
+    work = series.prepare(size)
+    began = time.process_time()
+    work()
+    return time.process_time() - began
 
 
 def peak() -> float:

@@ -30,7 +30,7 @@ class Effort:
     round have one step of progress; seconds that a step may take."""
 
     rounds: int = 3
-    repeats: int = 3
+    repeats: int = 5
     quick: bool = False
     limit: float = 600.0
 
@@ -56,14 +56,18 @@ def bench_scale(rows: list[Row], effort: Effort, series: Sequence[Series] = SERI
 
 
 def add_round(row: Row, sizes: Sequence[int], measured: Sequence[tuple[int, float, float]]) -> None:
-    """Add what one process measured, (size, seconds, MB) each, and the exponents; a series that did not reach its last size has none, and
-    is noted as unfinished."""
-    for size, seconds, memory in measured:
-        row.add(**{f"seconds at {size}": seconds, f"MB at {size}": memory})
-    if len(measured) < len(sizes):
+    """Add the repetitions that one process measured, (size, seconds, MB) each, and the exponents of the quickest of each size; a series
+    that did not reach its last size has none, and is noted as unfinished. The peak is that of the first repetition: later ones have it
+    from larger sizes."""
+    quickest = {size: min(one for own, one, _ in measured if own == size) for size, *_ in measured}
+    peaks = {size: memory for size, _, memory in reversed(measured)}
+    for size, least in quickest.items():
+        row.add(**{f"seconds at {size}": least, f"MB at {size}": peaks[size]})
+    if len(quickest) < len(sizes):
         row.add(unfinished=1.0)
         return
-    count, seconds, memory = np.array(measured, dtype=float)[-FITTED:].T
+    largest = sizes[-FITTED:]
+    count, seconds, memory = (np.array(one, dtype=float) for one in (largest, [quickest[i] for i in largest], [peaks[i] for i in largest]))
     row.add(size=count[-1], seconds=seconds[-1], MB=memory[-1], time=exponent(count, seconds))
     if memory[-1] - memory[0] >= LEAST:
         row.add(memory=exponent(count, memory))
