@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import tracemalloc
 
 import numpy as np
@@ -91,3 +92,14 @@ def test_steps_end_at_nodes_of_controls():
     mesh = StepMesh.of(4, 2, nodes)
     assert np.allclose(mesh.places, [0, 0.1, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.77, 0.875, 1])
     assert mesh.ends.tolist() == [0, 3, 5, 7, 10]
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_the_collector_is_left_as_it_was(on):
+    before = gc.isenabled()
+    try:
+        (gc.enable if on else gc.disable)()
+        parse("dfet:4x3").transcribe(load("goddard").compile())
+        assert gc.isenabled() == on
+    finally:
+        (gc.enable if before else gc.disable)()

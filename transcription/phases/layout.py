@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import gc
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import casadi as ca
 import numpy as np
@@ -40,9 +42,11 @@ class Layout:
 
     def add_table(self, prefix: str, variables: Sequence[Variable], rows: int, columns: int, *, free: bool = False) -> np.ndarray:
         """The same quantities at rows x columns places (elements x coefficients); returns slots (rows, columns, len(variables))."""
-        slots = [
-            [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)] for j in range(rows)
-        ]
+        with _uncollected():
+            slots = [
+                [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)]
+                for j in range(rows)
+            ]
         return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
 
     def add_hidden(self, *shape: int) -> np.ndarray:
@@ -96,3 +100,16 @@ class Layout:
         """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape, ...); constants stay what they are."""
         flat, mask = slots.ravel(), slots.ravel() >= 0
         extended[:, flat[mask]] = values.reshape(len(extended), slots.size, *extended.shape[2:])[:, mask]
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Python's search for cycles of objects waits: there are none in a table of variables, and it would go through all of a long one again
+    and again."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
