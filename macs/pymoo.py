@@ -110,9 +110,9 @@ class MACS(Algorithm):
     Infeasible points are ordered by their largest violation; CV is the sum of all. A failed evaluation (NaN or infinite values) is
     infeasible, with an infinite CV.
 
-    *Ask and tell.* `ask` returns the next batch of candidates, the same ones until they are told. `tell(infills=batch)` takes all of
-    them, in their order, with their values; their X may have been moved. Only when all batches of an iteration were told, `n_gen` grows,
-    and the callback is called. The points are those that `next` finds, which may follow at any time. Each `tell` does the iteration again
+    *Ask and tell.* `ask` returns the next batch of candidates, the same ones until `tell(infills=batch)` is called with all of
+    them, in their order, with their values; their X may have been moved. Only after the last batch of an iteration does `n_gen` grow, and
+    is the callback called. The points are those that `next` finds, which may follow at any time. Each `tell` does the iteration again
     from its beginning, with one batch more, since nothing is kept but data: that takes a millisecond or two for each point.
 
     *Checkpoints.* A deep copy or a pickle of the algorithm, made at any time, goes on to the same points: in a callback, between `ask` and

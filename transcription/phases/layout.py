@@ -104,8 +104,8 @@ class Layout:
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Python's search for cycles of objects waits: there are none in a table of variables, and it would go through all of a long one again
-    and again."""
+    """Python's garbage collector is paused: a table of variables has no reference cycles, and the collector would scan all of a long one
+    many times while it is made."""
     enabled = gc.isenabled()
     gc.disable()
     try:

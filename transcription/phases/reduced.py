@@ -182,7 +182,7 @@ class Reduced(Deriving):
 
 
 def _marked(places: Sequence[int] | np.ndarray, count: int) -> np.ndarray:
-    """Which of 0 ... count - 1 are among these places, (count,) of bool: a set of them would cost more than it in a long vector."""
+    """Which of 0 ... count - 1 are among these places, (count,) of bool. The time is proportional to count, that of NumPy's sets is not."""
     found = np.zeros(count, dtype=bool)
     found[places] = True
     return found

@@ -32,7 +32,7 @@ def measure(series: Series, sizes: Sequence[int], repeats: int) -> None:
     begin = peak()
     series.prepare(sizes[0])()  # whatever is made once is made
     spent = dict.fromkeys(sizes, 0.0)
-    for _ in range(repeats):  # all sizes, then again: a minute in which the machine is slow is one of all of them
+    for _ in range(repeats):  # all sizes, then again: if the machine is slow for a while, all sizes suffer alike
         for size in sizes:
             if spent[size] < ENOUGH:
                 spent[size] += (once := seconds(series, size))
