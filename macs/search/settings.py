@@ -16,7 +16,7 @@ from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
-FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 0.5
+FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 1.0
 """Default of `breeding` with at most three objectives, and with more."""
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
@@ -127,7 +127,7 @@ class Settings:
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
     breeding : float, optional
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
-        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 0.5 with more than
+        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 1 with more than
         three objectives. 0 in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
