@@ -96,6 +96,8 @@ class Counts:
     work : int
         Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
         programs of all sizes. Plain functions take none.
+    gradient_work : int
+        Part of the work that gradient solves took.
     """
 
     evaluations: int = 0
@@ -105,6 +107,7 @@ class Counts:
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
     work: int = 0
+    gradient_work: int = 0
 
     __repr__ = short_repr
 
@@ -116,6 +119,7 @@ class Counts:
         self.inner_iterations += iterations
         self.clocked += clocked
         self.work += iterations * variables
+        self.gradient_work += iterations * variables
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""

@@ -34,7 +34,8 @@ class Progress:
         Number of evaluations and gradient solves that did not converge, by status.
     F : array (archive, m)
         Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
-    inner_iterations, gradient_solves : int
+    inner_iterations, gradient_solves, work, gradient_work : int
+        See `Counts`.
     """
 
     evaluations: int
@@ -47,6 +48,8 @@ class Progress:
     F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
     inner_iterations: int = 0
     gradient_solves: int = 0
+    work: int = 0
+    gradient_work: int = 0
 
     @property
     def front(self) -> Front:

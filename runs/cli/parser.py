@@ -268,6 +268,8 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     report.add_argument("folder", metavar="DIR")
     report.add_argument("--trust", action="store_true", help=TRUST)
     report.add_argument("--no-figures", action="store_true", help="tables only, which is quicker")
+    report.add_argument("--page", metavar="FILE.md", help="also write a page in Markdown, with its pictures beside it")
+    report.add_argument("--study", metavar="STUDY", help="with --page: the study's name or file (default: the name in DIR)")
     report.add_argument(
         "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
     )
