@@ -52,9 +52,8 @@ search      MACS against gradient sweeps from many starts, on the same mesh, at 
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 study       a study with two processes against one, and how much longer it takes than its runs do
 
-Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
-machine proves little; but it is 1 where methods find different optima, both verified, and where a cost grows faster than linearly. Ctrl-C
-prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
+What is asked is printed beside the measured values, and judged by medians of rounds or seeds. The exit code is 1 where anything is missed.
+Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
 benchmark and that of populations show both."""
 
 
