@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 from macs.io.interrupts import Stopped
 
-from . import density, fronts, inner, methods, passages, peers, population, prefer, scale, search, standard, study
+from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
 
-BENCHMARKS = {
+BENCHMARKS: dict[str, Any] = {
+    **{name: functions.Contest(name) for name in functions.NAMES},
     "density": density,
     "front": fronts,
     "inner": inner,
@@ -24,7 +27,7 @@ BENCHMARKS = {
     "standard": standard,
     "study": study,
 }
-KINDS = tuple(BENCHMARKS)
+KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
@@ -56,7 +59,9 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
 def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
     cases = [case for case in inner.INNER if case.quick or not quick]
+    sets = {name: BENCHMARKS[name] for name in functions.NAMES}
     work: dict[str, Callable[[], None]] = {
+        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),

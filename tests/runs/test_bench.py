@@ -59,6 +59,7 @@ def optima(*values, verified=1.0):
 def small(monkeypatch):
     """Benchmarks that take little; those in processes of their own, which other tests measure, find what is given here."""
     monkeypatch.setattr(search, "load", coarse)
+    monkeypatch.setattr(command.functions.Contest, "quick", lambda self, rows: None)  # tests of its own
     monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
     monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
     monkeypatch.setattr(standard, "apart", lambda *given: {"status": "converged", **dict.fromkeys(SOLVED, 1.0)})
@@ -335,7 +336,7 @@ def test_an_interrupt_ends_the_steps():
     [
         (
             ["bench", "studies"],
-            ["studies", "study", "density, front, inner, methods, passages, peers, population, prefer, scale, search"],
+            ["studies", "study", "constrained, density, front, inner, many, methods, passages, peers, population, prefer, scale"],
         ),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
