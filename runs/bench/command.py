@@ -11,6 +11,7 @@ from macs.io.interrupts import Stopped
 
 from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
+from .page import header_of, write_page
 
 BENCHMARKS: dict[str, Any] = {
     **{name: functions.Contest(name) for name in functions.NAMES},
@@ -31,11 +32,13 @@ KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
-def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
+def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None = None) -> bool:
     """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
 
-    Returns whether all targets are met, see `Target`.
+    The report of a single one is also written to `page`, if there is one and it was not interrupted. Returns whether all targets are met,
+    see `Target`.
     """
+    header = header_of(kinds[0], quick, page) if page else None
     measured: list[tuple[str, Row]] = []
     missed: list[str] = []
     for kind in kinds:
@@ -43,7 +46,11 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
         ended = _run(kind, rows, quick)
         measured += [(kind, row) for row in rows]
         if rows:
-            print(BENCHMARKS[kind].report(rows), end="\n\n", flush=True)
+            text = BENCHMARKS[kind].report(rows)
+            print(text, end="\n\n", flush=True)
+            if page and header and not ended:
+                write_page(page, kind, header, text)
+                print(f"page in {page}")
             missed += [f"{kind}: {one.what}" for one in BENCHMARKS[kind].targets(rows) if not one.met]
         if ended:
             print("interrupted: these are the values measured until then", file=sys.stderr)

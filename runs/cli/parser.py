@@ -290,6 +290,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
     bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
+    bench.add_argument("--page", metavar="FILE.md", help="write the report of a single one as a page too, with the command that made it")
 
 
 def _unknown_option(word: str, parser: Parser) -> str:
