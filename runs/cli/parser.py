@@ -50,7 +50,7 @@ peers       the examples of YAPSS, from statement to solution, here, in YAPSS an
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations
 scale       how time and memory grow with elements, nodes, phases, variables, points and agents: exponents beside the limit of 1.1
-search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and counted work
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 uf          UF1 to UF10 of CEC 2009, likewise: IGD as in the competition
 zdt         ZDT1-4 and 6, likewise
