@@ -158,7 +158,13 @@ def bench(arguments: Namespace) -> int:
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)
-    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv) else FAILED
+    if arguments.page:
+        if not arguments.what:
+            raise WrongCall("--page: of which one? a page is of a single benchmark")
+        check_target(arguments.page)
+        with wrong_call_on_value_error():
+            benchmarks.header_of(kinds[0], arguments.quick, arguments.page)
+    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv, arguments.page) else FAILED
 
 
 # Arguments
