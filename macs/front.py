@@ -173,7 +173,7 @@ class Front(Points):
         Returns
         -------
         Front
-            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and `note`s on what is missed.
+            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and a `note` where something is missed.
 
         Raises
         ------
