@@ -37,6 +37,7 @@ class Problem:
 
     Examples
     --------
+    >>> from problems import Problem
     >>> problem = Problem("coast")
     >>> phase = problem.phase("glide", t0=0.0, tf=(1.0, 2.0))
     >>> x = phase.state("x", bounds=(0, 10), initial=0)

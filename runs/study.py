@@ -112,6 +112,13 @@ class Study:
     ------
     ValueError
         A value is wrong; the message names it, before any work.
+
+    Examples
+    --------
+    >>> from runs import Study
+    >>> study = Study("mine", problems="four_bar_truss", solvers=["macs", "nsga2"], evaluations=500, runs=2, seed=1)
+    >>> len(study.cells)
+    2
     """
 
     name: str = field(metadata=_key(Text, decides=True))

@@ -35,6 +35,15 @@ class Progress:
     F : array (archive, m)
         Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
     inner_iterations, gradient_solves : int
+
+    Examples
+    --------
+    >>> from macs import MACS
+    >>> from problems import load
+    >>> seen = []
+    >>> front = MACS().solve(load("four_bar_truss"), evaluations=100, seed=1, callback=lambda progress: seen.append(progress.evaluations))
+    >>> seen[-1] <= 100
+    True
     """
 
     evaluations: int
