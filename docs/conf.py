@@ -37,6 +37,7 @@ html_theme = "furo"
 html_title = f"MACS {release}"
 html_show_sourcelink = False
 html_copy_source = False
+html_show_copyright = False
 html_math_renderer = "mathml"
 
 
@@ -48,7 +49,7 @@ def inline_math(writer: Any, node: nodes.math) -> None:
 
 def displayed_math(writer: Any, node: nodes.math_block) -> None:
     """Write a formula on lines of its own."""
-    writer.body.append(f'<div class="math-block">{tex2mathml(node.astext(), as_block=True)}</div>')
+    writer.body.append(f"<p>{tex2mathml(node.astext(), as_block=True)}</p>")
     raise nodes.SkipNode
 
 

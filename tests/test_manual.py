@@ -33,7 +33,7 @@ PAGES = [
     ROOT / "README.md",
     *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.relative_to(ROOT / "docs").parts[0] not in OTHERS),
 ]
-SLOW = ("docs/search.md", "docs/studies.md", "docs/sweep-or-search.md", "docs/stating/objectives.md")
+SLOW = ("docs/settings.md", "docs/studies.md", "docs/sweep-or-search.md", "docs/stating/objectives.md")
 """Pages that take more than some seconds."""
 COMMANDS = ("docs/first-steps.md",)
 """Pages whose commands are run, one after the other."""
@@ -186,6 +186,7 @@ def test_every_page_is_in_the_manual() -> None:
     pages = {path for path in (ROOT / "docs").rglob("*") if path.suffix in (".md", ".rst") and "generated" not in path.parts}
     pages = {page for page in pages if "_templates" not in page.parts}
     assert pages - listed == {ROOT / "docs" / "index.md"}
+    assert not {page.stem for page in pages if page.parent == ROOT / "docs"} & {"search", "genindex"}, "the generator's own pages"
 
 
 @pytest.mark.slow
