@@ -51,7 +51,8 @@ class Settings:
     actions). The best trade-offs are kept in an archive and spread evenly along the front; offspring of the archive's points add to the
     search. If the problem has derivatives, gradient solves refine agents during the search and polish the archive at its end.
 
-    `MACS()` suits most problems. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
+    `MACS()` suits most problems. Five settings matter first: `agents`, `archive`, `refine`, `mesh` and `prefer`; all others are further
+    settings, under Other Parameters. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
     Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
 
     Parameters
@@ -65,16 +66,24 @@ class Settings:
         Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, see
         `refine_every`, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
         `stats["gradient_solves"]` counts all solves.
-    polish_on : str, optional
-        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
-        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
-        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
-        polished again each time.
     mesh : {"mended", "fixed", "adaptive"}, default "mended"
         What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
         points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
         of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
         Without derivatives ("refine=False") points are not mended.
+    prefer : Preference or dict, optional
+        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
+        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
+        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
+        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
+
+    Other Parameters
+    ----------------
+    polish_on : str, optional
+        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
+        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
+        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
+        polished again each time.
     mesh_tolerance : float, default 1e-7
         With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
         [1e-10, 1].
@@ -138,16 +147,20 @@ class Settings:
         energy: the archive then has the best points near evenly spread directions, see `macs.pareto.niches`.
     ceiling : int, default 100 000
         Largest number of evaluations of a search without one of its own (`evaluations=None`), which otherwise ends when it is done.
-    prefer : Preference or dict, optional
-        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
-        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
-        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
-        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
 
     Raises
     ------
     ValueError
         If a setting is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> from macs import MACS
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = MACS(archive=5).solve(load("goddard"), DFET(4, 6), evaluations=100, seed=1)
+    >>> print(len(front), front.verified.all())
+    5 True
     """
 
     agents: int = 10
