@@ -14,7 +14,6 @@ from problems.vector import CompiledVectorProblem
 from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
-from .evaluation.evaluator import CONVERGED
 from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
@@ -275,7 +274,7 @@ class Front(Points):
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
-        return draw_designs(self.decision, self.variables, self.objectives, self.goals, self.status == CONVERGED, title, figure)
+        return draw_designs(self, title, figure)
 
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.

@@ -12,7 +12,6 @@ from transcription.trajectories.costates import Costates
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
 from ..evaluation.reevaluated import Reevaluation, reevaluation
 from .columns import number
 from .provenance import Source
@@ -201,17 +200,21 @@ class Point:
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
-        there are any. Without dynamics, axes with each variable along its front, and this point in it."""
+        there are any. Without dynamics, axes with each variable along its front, and this point in it.
+
+        The title says whether a point is not verified or not feasible; then the nodes of its trajectory are hollow.
+        """
         from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
+        from .pictures.kinds import remark
 
+        said = remark(self)
+        title = f"{self.title}; {said}" if said else self.title
         if not self._points.dynamic:
-            front = self._points
-            feasible = front.status == CONVERGED
-            return draw_designs(front.decision, front.variables, front.objectives, front.goals, feasible, self.title, figure, [self.index])
+            return draw_designs(self._points, title, figure, [self.index])
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
-        return draw_flight(self.trajectory, self.title, figure, self.costates)
+        return draw_flight(self.trajectory, title, figure, self.costates, hollow=bool(said))
 
     @property
     def title(self) -> str:
