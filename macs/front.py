@@ -18,7 +18,7 @@ from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
-from .fronts.tables import front_table, headline
+from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
@@ -54,6 +54,13 @@ class Front(Points):
 
     def __repr__(self) -> str:
         return f"<Front: {headline(self)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the table and a small picture."""
+        from .fronts.front_plot import front_figure
+        from .fronts.pictures.style import rendered
+
+        return front_html(self, rendered(front_figure(self), "png", 80))
 
     def refine_mesh(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +21,7 @@ from .pictures.style import (
     better,
     blank_figure,
     new_figure,
+    rendered,
     title_and_legend,
     wrapped,
 )
@@ -37,17 +37,21 @@ def save_picture(what: Any, path: str | PathLike[str]) -> None:
     """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
-    figure = blank_figure()
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if isinstance(what, Points):
-            figure.set_size_inches(*_size(what))
-            draw_front(what, figure.add_subplot())
+            figure = front_figure(what)
         else:
+            figure = blank_figure()
             what.plot(figure=figure)
-    suffix = Path(path).suffix.lstrip(".").lower()
-    picture = io.BytesIO()
-    figure.savefig(picture, format=suffix, dpi=200)
-    write_whole(path, picture.getvalue())
+    write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
+
+
+def front_figure(front: Points) -> Any:
+    """A figure without a window of a front."""
+    figure = blank_figure()
+    figure.set_size_inches(*_size(front))
+    draw_front(front, figure.add_subplot())
+    return figure
 
 
 def _size(front: Points) -> tuple[float, float]:

@@ -125,6 +125,11 @@ class Point:
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
     @property
+    def dynamic(self) -> bool:
+        """Whether it is of a problem with trajectories."""
+        return bool(self._points.dynamic)
+
+    @property
     def trajectory(self) -> Trajectory | None:
         """The trajectory; None for a black box."""
         return self._points.trajectories[self.index]
@@ -221,6 +226,12 @@ class Point:
         """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
         named = zip(self.goals, self.objectives.values(), strict=True)
         return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a table of the objectives and a small picture."""
+        from .pictures.notebook import point_html
+
+        return point_html(self)
 
     def __repr__(self) -> str:
         return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"

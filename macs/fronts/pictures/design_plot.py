@@ -11,7 +11,7 @@ from problems.compiled import Variable
 
 from .kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
 from .limits import draw_limits
-from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, wrapped
+from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, plain, wrapped
 
 MOST = 30
 """Variables that are drawn; of more, those that vary most within their bounds."""
@@ -74,7 +74,7 @@ def draw_designs(front: Any, title: str, figure: Any = None, marked: Sequence[in
             figure.legend(handles, words, loc="outside upper right", ncols=len(handles), frameon=False)
         left_out = len(variables) - len(names)
         text = f"{title}; {left_out} variables that vary less are left out" if left_out else title
-        figure.suptitle(wrapped(text, figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+        figure.suptitle(wrapped(plain(text), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
         figure.supxlabel(axis_label(goals[0].name, goals[0].unit), fontsize=9)
     return used
 

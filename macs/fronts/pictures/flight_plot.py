@@ -11,7 +11,7 @@ import numpy as np
 from problems.compiled import Limit, Variable
 
 from .limits import draw_limits
-from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, wrapped
+from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, plain, wrapped
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -232,6 +232,6 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
     if len(trajectory) > 1:
         from matplotlib.lines import Line2D
 
-        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(trajectory)]
+        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(trajectory)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
-    figure.suptitle(wrapped(title, figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+    figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import textwrap
 from typing import Any
@@ -64,6 +65,13 @@ def blank_figure() -> Any:
     return Figure(figsize=(5.5, 4.0), layout="constrained")
 
 
+def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
+    """A figure as the content of a file of a format."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format=suffix, dpi=dpi)
+    return picture.getvalue()
+
+
 def label(name: str, unit: str) -> str:
     """Name of a column or a line: `name [unit]`."""
     return f"{name} [{unit}]" if unit else name
@@ -71,7 +79,12 @@ def label(name: str, unit: str) -> str:
 
 def axis_label(name: str, unit: str) -> str:
     """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
-    return label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}"))
+    return plain(label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def plain(text: str) -> str:
+    """Words of the user for a picture: of two dollars matplotlib would make mathematics."""
+    return text.replace("$", r"\$") if text.count("$") > 1 else text
 
 
 def axis_number(value: float) -> str:
@@ -97,7 +110,7 @@ def title_and_legend(ax: Any, title: str, columns: int = 3) -> None:
     pad = None
     if handles:
         room = ax.bbox.width / ax.figure.dpi
-        names = [wrapped(name, room - 0.4, 8.0) for name in names]
+        names = [wrapped(plain(name), room - 0.4, 8.0) for name in names]
         for count in range(min(columns, len(names)), 0, -1):
             place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
             legend = ax.legend(handles, names, frameon=False, ncols=count, handletextpad=0.4, **place)
@@ -106,4 +119,4 @@ def title_and_legend(ax: Any, title: str, columns: int = 3) -> None:
                 break
         pad = 72.0 * box.height / ax.figure.dpi + 4.0
     if title:
-        ax.set_title(title, loc="left", color=GREY, pad=pad)
+        ax.set_title(plain(title), loc="left", color=GREY, pad=pad)
