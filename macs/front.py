@@ -14,12 +14,11 @@ from problems.vector import CompiledVectorProblem
 from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
-from .evaluation.evaluator import CONVERGED
 from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
-from .fronts.tables import front_table, headline
+from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
@@ -80,6 +79,13 @@ class Front(Points):
 
     def __repr__(self) -> str:
         return f"<Front: {headline(self)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the table and a small picture."""
+        from .fronts.front_plot import front_figure
+        from .fronts.pictures.style import rendered
+
+        return front_html(self, rendered(front_figure(self), "png", 80))
 
     def refine_mesh(
         self,
@@ -300,7 +306,7 @@ class Front(Points):
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
-        return draw_designs(self.decision, self.variables, self.objectives, self.goals, self.status == CONVERGED, title, figure)
+        return draw_designs(self, title, figure)
 
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.fronts.verified import VERIFY
+from macs.io.html import html_block, html_table
 from problems.checks import short_repr
 from transcription import Smooth
 
@@ -151,6 +152,13 @@ class Study:
 
     def __repr__(self) -> str:
         return short_repr(self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a row for each cell."""
+        rows = [[*cell.labels, "auto" if cell.evaluations is None else f"{cell.evaluations}", str(self.runs)] for cell in self.cells]
+        heads = ["problem", "transcription", "solver", "evaluations of a run", "runs"]
+        table = html_table([heads], rows, [True, True, True, False, False])
+        return html_block(f"study {self.name}", table, [self.description] if self.description else [])
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():

@@ -12,6 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
+from ..io.html import html_block, html_table
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
 from ..preferences.ranges import confidence
@@ -132,6 +133,12 @@ class Choice:
 
     def __repr__(self) -> str:
         return f"<Choice by {self.preference!r}: {self.point.title}; value {self.value:.6g}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: each objective with its degree, and the point."""
+        degrees = [[name, degree_text(degree)] for name, degree in self.degrees.items()]
+        table = html_table([["objective", "degree"]], degrees, [True, False])
+        return html_block(repr(self.preference), table, [self.message] if self.message else []) + self.point._repr_html_()
 
     def table(self) -> str:
         """The choice as plain text: each objective with its range and its degree, the steps, and the message."""

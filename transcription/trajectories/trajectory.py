@@ -205,6 +205,12 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
         parameters = "".join(f", {name}={value:g}" for name, value in self.parameters.items())
         return f"Trajectory({phases}{parameters})"
 
+    def _repr_html_(self) -> str:
+        """For notebooks: a table for each phase, with a small line of each quantity over time."""
+        from .html import trajectory_html
+
+        return trajectory_html(self)
+
     def __getitem__(self, name: str) -> PhaseTrajectory:
         for phase in self.phases:
             if phase.name == name:
