@@ -68,7 +68,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     if len(apart) > 0:
         again = AGAIN if _is_vector(front) else MISSES
         lines.insert(len(lines) - len(apart), f"\nNot verified: {again}these differ by more than {front.stats['verify']:g}.")
-    return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
+    return "\n".join([headline(front), "", *lines, "", *footer(front)]).rstrip()
 
 
 def _is_vector(front: Points) -> bool:
@@ -135,7 +135,8 @@ FEW = 5
 """Number of points whose misses are given in words."""
 
 
-def _footer(front: Points) -> list[str]:
+def footer(front: Points) -> list[str]:
+    """Lines below the table of a front with points: how many are verified, notes and warnings."""
     lines = _simulated(front) if front.was_simulated.all() else _between_nodes(front) if front.dynamic else []
     bad = int((front.status != CONVERGED).sum())
     if bad:

@@ -69,7 +69,7 @@ def draw_flight(trajectory: Trajectory, title: str, figure: Any = None, costates
 
 def draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
     """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one."""
-    worth = max(_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    worth = max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
     for ax, name in zip(axes, [*states, None], strict=True):
         everything: list[np.ndarray] = []
         ranges: list[np.ndarray] = []
@@ -98,7 +98,7 @@ def draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costate
     axes[-1].set_title(f"weights {weights}", loc="right", fontsize=7, color=GREY, pad=2)
 
 
-def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
+def costates_worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
     """How much the largest costate of each state is worth over the range of the state, all states together."""
     return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 
