@@ -68,7 +68,7 @@ def _head(title: str, policy: str) -> bytes:
     text = (STATIC / "page.html").read_text(encoding="utf-8")
     style = (STATIC / "page.css").read_text(encoding="utf-8")
     for mark, content in (("{{policy}}", policy), ("{{style}}", style), ("{{title}}", html.escape(title))):  # the user's words last
-        text = text.replace(mark, content, 1)
+        text = text.replace(mark, content)
     return text.encode()
 
 

@@ -40,6 +40,8 @@ const layout = (more = {}) => ({
 
 const CONFIG = {
   displaylogo: false,
+  showSendToCloud: false, // nothing leaves this page
+  plotlyServerURL: "",
   responsive: true,
   modeBarButtonsToRemove: ["lasso2d", "autoScale2d", "toggleSpikelines", "hoverCompareCartesian", "hoverClosestCartesian"],
   toImageButtonOptions: { format: "png", scale: 3 },

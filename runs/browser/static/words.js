@@ -13,7 +13,7 @@ function number(value, digits = 6) {
 }
 
 function trimmed(text) {
-  return text.includes("e") ? String(Number(text)) : text;
+  return text.includes("e") ? String(Number(text)) : text.replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
 }
 
 /** An error: two digits. */
