@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -83,13 +85,19 @@ class _Writer:
     """Collects the quantities of a phase; curves with the same times share them."""
 
     def __init__(self, most: int) -> None:
-        self.times: list[list[float]] = []
+        self.times: list[list[float | None]] = []
         self.quantities: list[dict[str, Any]] = []
         self._most = most
         self._known: dict[bytes, int] = {}
 
     def polynomial(
-        self, kind: str, variables: Any, polynomial: PiecewisePolynomial, on_elements: Any, jumps: bool, least: dict[str, float] | None = None
+        self,
+        kind: str,
+        variables: Sequence[Variable],
+        polynomial: PiecewisePolynomial,
+        on_elements: Callable[[np.ndarray], np.ndarray],
+        jumps: bool,
+        least: Mapping[str, float] | None = None,
     ) -> None:
         """Add quantities that are polynomials on elements; without `jumps` they are continuous, and each end is sampled once."""
         elements, coefficients, _ = polynomial.coefficients.shape
@@ -97,10 +105,10 @@ class _Writer:
         tau = np.linspace(-1.0, 1.0, count)
         times, values = polynomial.times(tau), on_elements(tau)
         if jumps:
-            times, values = times.ravel(), values.reshape(-1, values.shape[2])
+            times, values = times.ravel(), np.concatenate(list(values))
         else:
             times = np.append(times[:, :-1].ravel(), times[-1, -1])
-            values = np.vstack([values[:, :-1].reshape(-1, values.shape[2]), values[-1, -1:]])
+            values = np.concatenate([*values[:, :-1], values[-1, -1:]])
         for variable, column in zip(variables, values.T, strict=True):
             t, v = _without_wraps(times, column, variable.period)
             self.add(variable.name, kind, variable.unit, variable, t, v, (least or {}).get(variable.name, 0.0))
@@ -133,7 +141,7 @@ def thinned(values: np.ndarray, most: int) -> np.ndarray:
     """Indices of the samples that stay if there are to be at most `most`: of each of equal pieces the first, least, greatest and last."""
     edges = np.linspace(0, len(values), max(most // 4, 1) + 1).astype(int)
     kept: set[int] = set()
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
+    for first, end in pairwise(edges.tolist()):
         piece = values[first:end]
         if not len(piece):
             continue

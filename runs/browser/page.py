@@ -23,7 +23,7 @@ SCRIPTS = (
 )
 """In the order in which they build on each other."""
 POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; {connections}"
-"""Content Security Policy: nothing from another place. The drawing package compiles its programs for the graphics card, hence 'unsafe-eval'."""
+"""Content Security Policy: nothing from another place. 'unsafe-eval': the drawing package compiles programs for the graphics card."""
 
 
 def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
@@ -43,7 +43,7 @@ def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
     """
     parts = [
         _head(str(data["title"]), POLICY.format(connections="connect-src 'none'")),
-        '<script type="application/json" id="page">'.encode(),
+        b'<script type="application/json" id="page">',
         safe_json(data),
         b"</script>\n",
     ]

@@ -16,7 +16,7 @@ from .curves import curves
 
 SAMPLES, LEAST_SAMPLES = 400, 48
 """Largest number of samples of a curve: in a page with few points, and in one with many."""
-NUMBERS = 12_000_000
+NUMBERS = 3_000_000
 """Numbers that all curves of a page may have together, about."""
 
 

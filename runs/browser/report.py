@@ -36,10 +36,7 @@ def write_page(source: str | PathLike[str], out: str | PathLike[str], *, trust: 
     """
     plotly()
     check_target(out)
-    if Path(source).is_dir():
-        content = study_page(Store.open(source, trust), progress)
-    else:
-        content = front_page(read_front(source))
+    content = study_page(Store.open(source, trust), progress) if Path(source).is_dir() else front_page(read_front(source))
     write_whole(out, content)
     return Path(out)
 

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from macs.front import Front
 from macs.io.console import Steps
 from problems.compiled import Objective
 
 from ..batch.store import Store, StoredRun, Summary, reason
 from ..measures.attainment import attainment, staircase
-from ..measures.convergence import band
+from ..measures.convergence import Band, band
 from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
 from ..report.choices import only_choices
@@ -137,10 +136,13 @@ def convergence_data(comparison: Comparison, reference: Reference) -> list[dict[
         for axis, (_, label) in AXES.items():
             bands = {solver: band(runs, larger=larger) for solver, runs in histories(comparison, reference, name, axis).items()}
             if bands:
-                solvers = {solver: {"runs": b.runs, "x": b.x, "lower": b.lower, "median": b.median, "upper": b.upper} for solver, b in bands.items()}
-                plain = {solver: {key: value if key == "runs" else _finite(value) for key, value in one.items()} for solver, one in solvers.items()}
-                found.append({"indicator": name, "larger": larger, "axis": label, "solvers": plain})
+                solvers = {solver: _band_data(one) for solver, one in bands.items()}
+                found.append({"indicator": name, "larger": larger, "axis": label, "solvers": solvers})
     return found
+
+
+def _band_data(one: Band) -> dict[str, Any]:
+    return {"runs": one.runs, **{name: _finite(getattr(one, name)) for name in ("x", "lower", "median", "upper")}}
 
 
 def _finite(values: Any) -> list[float | None]:

@@ -31,7 +31,8 @@ const layout = (more = {}) => ({
   font: FONT,
   paper_bgcolor: "#fff",
   plot_bgcolor: "#fff",
-  margin: { l: 60, r: 20, t: 30, b: 50 },
+  margin: { l: 60, r: 34, t: 30, b: 50 },
+  modebar: { orientation: "v" }, // beside the figure, not above its legend
   hovermode: "closest",
   hoverlabel: { bgcolor: "#fff", bordercolor: INK, font: FONT, align: "left" },
   legend: { orientation: "h", x: 0, xanchor: "left", y: 1.02, yanchor: "bottom", itemclick: false, itemdoubleclick: false },

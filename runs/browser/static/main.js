@@ -132,9 +132,28 @@ const NOTES = {
   parallel: "Each line is a point; the upper end of every axis is better. Drag along an axis to mark a range that is wanted; a click on the axis ends that.",
 };
 
-/** In a study, which comparison, solvers and runs are shown. */
+/** In a study, which comparison, solvers and run are shown. */
 function buildChoices() {
-  fill(byId("choices"));
+  const { comparisons, kind } = state.data;
+  if (kind === "front") return;
+  const { solvers, runs } = state.comparison;
+  const which = choice("Problem and transcription", comparisons.map((one, k) => [k, one.name]), comparisons.indexOf(state.comparison), (k) => showComparison(comparisons[k]));
+  const boxes = solvers.map((solver, k) => {
+    const toggle = (event) => {
+      if (event.target.checked) state.hidden.delete(solver);
+      else state.hidden.add(solver);
+      emit("filter");
+      redrawStudy();
+    };
+    const sign = element("span", { class: "swatch", style: `color: ${colorOf(k)}`, "aria-hidden": "true" }, SIGNS[k % SIGNS.length]);
+    return element("label", {}, element("input", { type: "checkbox", checked: !state.hidden.has(solver), onchange: toggle }), " ", sign, ` ${solver}`);
+  });
+  const numbers = [...new Set(runs.map((run) => run.number))].sort((a, b) => a - b);
+  const run = choice("Run", [["", "all"], ...numbers.map((one) => [one, one])], state.run, (value) => {
+    state.run = value;
+    emit("filter");
+  });
+  fill(byId("choices"), comparisons.length > 1 ? which : null, element("div", { class: "bar", role: "group", "aria-label": "Solvers" }, boxes), run);
 }
 
 begin();

@@ -27,24 +27,24 @@ function drawParallel(place) {
   const share = (point) => (high > low ? (point.values[colored] - low) / (high - low) : 0.5);
   const color = points.map((point) => {
     if (point === chosen) return 1;
-    return 0.9 * (many ? (solverIndex(point.solver) + 0.5) / solvers.length : share(point));
+    return 0.8 * (many ? (solverIndex(point.solver) + 0.5) / solvers.length : share(point));
   });
   const line = { color, cmin: 0, cmax: 1, colorscale: many ? solverScale(solvers.length) : valueScale() };
   const trace = { type: "parcoords", dimensions, line, labelside: "top", unselected: { line: { color: "#bbb", opacity: 0.25 } } };
   return Plotly.react(place, [trace], layout({ height: 440, margin: { l: 80, r: 80, t: 70, b: 30 } }), CONFIG);
 }
 
-/** From 0 to 0.9 a band of its own for each solver; above, the selected point in black. */
+/** From 0 to 0.8 a band of its own for each solver; above, the selected point in black. */
 function solverScale(count) {
   const scale = [];
-  for (let k = 0; k < count; k += 1) scale.push([(0.9 * k) / count, colorOf(k)], [(0.9 * (k + 1)) / count, colorOf(k)]);
-  return [...scale, [0.9001, "#000"], [1, "#000"]];
+  for (let k = 0; k < count; k += 1) scale.push([(0.8 * k) / count, colorOf(k)], [(0.8 * (k + 1)) / count, colorOf(k)]);
+  return [...scale, [0.9, "#000"], [1, "#000"]];
 }
 
-/** From 0 to 0.9 the colours of values, without the palest; above, the selected point in red. */
+/** From 0 to 0.8 the colours of values, without the palest; above, the selected point in red. */
 function valueScale() {
   const colors = ["#440154", "#3b528b", "#21918c", "#5ec962", "#c2df23"];
-  return [...colors.map((color, k) => [(0.9 * k) / (colors.length - 1), color]), [0.9001, "#D40000"], [1, "#D40000"]];
+  return [...colors.map((color, k) => [(0.8 * k) / (colors.length - 1), color]), [0.9, "#D40000"], [1, "#D40000"]];
 }
 
 /** A range that is marked on an axis becomes a preference. */

@@ -68,7 +68,7 @@ const row = ([words, ...texts]) => element("tr", {}, element("th", { scope: "row
 /** Note, weights, parameters and residuals by constraint. */
 function restOf(point, detail) {
   const found = [];
-  if (detail.note) found.push(element("p", { class: "warning" }, `${detail.note}.`));
+  if (detail.note) found.push(element("p", { class: counts(point) ? "note" : "warning" }, `Note: ${detail.note}.`));
   const { goals } = state.comparison;
   if (detail.weights && goals.length > 1) {
     found.push(folded("Weights for which it is optimal", goals.map((goal, i) => [goal.name, number(detail.weights[i], 4)])));

@@ -1,7 +1,7 @@
 "use strict";
 // The table of points: sorted by any column; rows are selected by pointer or keys. It has all that the figure of the front shows.
 
-const ROWS = 100; // on one page of the table
+const rowsOfPage = () => (state.data.kind === "front" ? 100 : 25);
 const table = { by: 0, descending: false, page: 0 };
 
 /** The columns: title, unit, value of a point, and how a list of values is written. */
@@ -41,9 +41,9 @@ function tableOrder() {
 function showTable() {
   const columns = tableColumns();
   const order = tableOrder();
-  const pages = Math.max(1, Math.ceil(order.length / ROWS));
+  const pages = Math.max(1, Math.ceil(order.length / rowsOfPage()));
   table.page = Math.min(table.page, pages - 1);
-  const rows = order.slice(table.page * ROWS, (table.page + 1) * ROWS);
+  const rows = order.slice(table.page * rowsOfPage(), (table.page + 1) * rowsOfPage());
   const texts = columns.map((one) => one.text(rows.map(one.value)));
   const head = element("tr", {}, columns.map((one, k) => headCell(one, k)));
   const chosen = rows.findIndex((point) => point.key === state.selected);
@@ -83,12 +83,12 @@ function showPages(pages, count) {
     byId("table-pages").querySelectorAll("button")[by < 0 ? 0 : 1].focus();
   };
   if (pages === 1) return fill(byId("table-pages"));
-  const first = table.page * ROWS + 1;
+  const first = table.page * rowsOfPage() + 1;
   fill(
     byId("table-pages"),
     element("button", { type: "button", onclick: turn(-1), disabled: table.page === 0 }, "Previous page"),
     element("button", { type: "button", onclick: turn(1), disabled: table.page === pages - 1 }, "Next page"),
-    element("span", { class: "note" }, `rows ${first} to ${Math.min(first + ROWS - 1, count)} of ${count}`),
+    element("span", { class: "note" }, `rows ${first} to ${Math.min(first + rowsOfPage() - 1, count)} of ${count}`),
   );
 }
 
@@ -117,8 +117,8 @@ function focusRow(row) {
 function markRow() {
   const order = tableOrder();
   const place = order.findIndex((point) => point.key === state.selected);
-  if (place >= 0 && Math.floor(place / ROWS) !== table.page) {
-    table.page = Math.floor(place / ROWS);
+  if (place >= 0 && Math.floor(place / rowsOfPage()) !== table.page) {
+    table.page = Math.floor(place / rowsOfPage());
     showTable();
   }
   for (const row of byId("table").querySelectorAll("tbody tr")) {
