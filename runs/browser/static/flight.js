@@ -42,7 +42,7 @@ async function showFlights() {
 
 function clearPanels() {
   const place = byId("flights-plot");
-  place.querySelectorAll(".panel-plot").forEach((panel) => Plotly.purge(panel));
+  place.querySelectorAll(".panel-plot").forEach(retire);
   place.replaceChildren();
 }
 
@@ -83,7 +83,7 @@ function drawPanels(flights) {
       const figure = panelFigure(flights, quantity);
       const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
       grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
-      Plotly.newPlot(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
+      draw(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
     }
   }
   byId("flights").dataset.drawn = flights.map(({ point }) => point.key).join(" "); // for tests and style sheets

@@ -60,3 +60,16 @@ function hoverText(point) {
   });
   return [`<b>${plotText(pointName(point))}</b>, ${statusOf(point)}`, ...lines].join("<br>");
 }
+
+const pending = new WeakMap();
+
+/** Draw a figure. */
+function draw(place, traces, figure, config = CONFIG) {
+  pending.set(place, Plotly.react(place, traces, figure, config));
+}
+
+/** Give up a figure, once its last drawing has ended: the package still reads what it draws. */
+function retire(place) {
+  const free = () => Plotly.purge(place);
+  Promise.resolve(pending.get(place)).then(free, free);
+}

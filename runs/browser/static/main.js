@@ -109,11 +109,10 @@ function drawFront() {
   const kinds = { two: drawTwo, three: drawThree, parallel: drawParallel };
   const fresh = drawn !== view.kind;
   if (fresh) {
-    Plotly.purge(place);
+    retire(place);
     const empty = place.cloneNode(false);
     place.replaceWith(empty);
     place = empty;
-    place.removeAttribute("class");
     place.setAttribute("class", "plot");
   }
   kinds[view.kind](place);

@@ -31,7 +31,7 @@ function drawParallel(place) {
   });
   const line = { color, cmin: 0, cmax: 1, colorscale: many ? solverScale(solvers.length) : valueScale() };
   const trace = { type: "parcoords", dimensions, line, labelside: "top", unselected: { line: { color: "#bbb", opacity: 0.25 } } };
-  return Plotly.react(place, [trace], layout({ height: 440, margin: { l: 80, r: 80, t: 70, b: 30 } }), CONFIG);
+  draw(place, [trace], layout({ height: 440, margin: { l: 80, r: 80, t: 70, b: 30 } }));
 }
 
 /** From 0 to 0.8 a band of its own for each solver; above, the selected point in black. */

@@ -100,11 +100,12 @@ function drawTwo(place) {
     xaxis: axis(goalLabel(goals[x])),
     yaxis: axis(goalLabel(goals[y])),
     dragmode: "select",
+    modebar: { orientation: view.color === "solver" ? "v" : "h" }, // beside the figure is the scale of colours
     selections: [],
     showlegend: legendWanted(traces),
     newselection: { line: { color: INK, width: 1, dash: "dot" } },
   });
-  return Plotly.react(place, traces, figure, CONFIG);
+  draw(place, traces, figure);
 }
 
 function drawThree(place) {
@@ -112,9 +113,9 @@ function drawThree(place) {
   const { x, y, z } = view;
   const traces = pointTraces({ x, y, z }, "scatter3d", true);
   const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", gridcolor: "#ccc", color: INK });
-  const scene = { xaxis: space(x), yaxis: space(y), zaxis: space(z), uirevision: `${x} ${y} ${z}`, camera: { eye: { x: 1.5, y: 1.5, z: 0.9 } } };
-  const figure = layout({ height: 520, scene, margin: { l: 0, r: 0, t: 30, b: 0 }, showlegend: legendWanted(traces) });
-  return Plotly.react(place, traces, figure, CONFIG);
+  const scene = { xaxis: space(x), yaxis: space(y), zaxis: space(z), uirevision: `${x} ${y} ${z}`, camera: { eye: { x: 1.8, y: 1.8, z: 0.9 } } };
+  const figure = layout({ height: 520, scene, modebar: { orientation: "h" }, margin: { l: 0, r: 0, t: 60, b: 0 }, showlegend: legendWanted(traces) });
+  draw(place, traces, figure);
 }
 
 /** A legend is needed where there is more than one kind of point. */

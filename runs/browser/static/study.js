@@ -8,7 +8,7 @@ function showStudy() {
   const parts = [];
   byId("study").hidden = !(attainment || convergence?.length || tables?.length);
   const place = byId("study-body");
-  place.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.purge(plot));
+  place.querySelectorAll(".js-plotly-plot").forEach(retire);
   if (attainment) parts.push(figureBox("Attainment surfaces", "attainment", "What at least one run (best), half of the runs (median) and all runs (worst) of a solver attain."));
   if (convergence?.length) parts.push(convergenceBox(convergence));
   fill(place, parts, (tables ?? []).map(tableElement));
@@ -66,7 +66,7 @@ function drawAttainment(surfaces) {
     }
   }
   const figure = layout({ height: 440, xaxis: axis(goalLabel(goals[0])), yaxis: axis(goalLabel(goals[1])), showlegend: true, legend: { x: 1.02, y: 1 } });
-  Plotly.react(byId("attainment"), traces, figure, CONFIG);
+  draw(byId("attainment"), traces, figure);
 }
 
 function convergenceBox(all) {
@@ -94,7 +94,7 @@ function drawConvergence(all, k) {
     traces.push({ x: times, y: last(median), mode: "lines", line, name: `${plotText(solver)}, ${counted(runs, "run")}`, hovertemplate: "%{y:.3g} at %{x:.4g}<extra></extra>" });
   }
   const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(Math.max(...positive) / Math.min(...positive)) } : {});
-  Plotly.react(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, legend: { x: 1.02, y: 1 }, showlegend: true }), CONFIG);
+  draw(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, legend: { x: 1.02, y: 1 }, showlegend: true }));
   byId("convergence").setAttribute("aria-label", `${indicator} over ${cost}, ${Object.keys(solvers).join(", ")}`);
 }
 
