@@ -20,5 +20,5 @@ def front_page(front: Front) -> bytes:
     solver = str(front.solver.get("name", "")) or "points"
     run: dict[str, Any] = {"solver": solver, "number": 1, "block": "0", "points": columns(front), "about": about(front)}
     comparison = {"name": name, "goals": goals_data(front.goals), "solvers": [solver], "runs": [run]}
-    data = {"title": name, "kind": "front", "live": False, "comparisons": [comparison]}
+    data = {"title": name, "kind": "front", "comparisons": [comparison]}
     return page(data, {"0": packed(details(front, samples_of([front])))})

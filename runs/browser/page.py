@@ -22,7 +22,7 @@ SCRIPTS = (
     *("study.js", "main.js"),
 )
 """In the order in which they build on each other."""
-POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; {connections}"
+POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'none'"
 """Content Security Policy: nothing from another place. 'unsafe-eval': the drawing package compiles programs for the graphics card."""
 
 
@@ -42,7 +42,7 @@ def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
         The drawing package is not installed.
     """
     parts = [
-        _head(str(data["title"]), POLICY.format(connections="connect-src 'none'")),
+        _head(str(data["title"]), POLICY),
         b'<script type="application/json" id="page">',
         safe_json(data),
         b"</script>\n",

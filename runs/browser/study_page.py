@@ -46,7 +46,7 @@ def study_page(store: Store, progress: bool = False) -> bytes:
                 blocks[name] = packed(details(run.front, samples))
         runs = [run_data(run, names[id_of(run)]) for run in finished_runs(comparison)]
         shown.append(comparison_data(comparison, runs) | measures_data(comparison) | tables_data(comparison, store.definition))
-    data = {"title": summary.name, "kind": "study", "live": False, "progress": progress_data(summary), "comparisons": shown}
+    data = {"title": summary.name, "kind": "study", "progress": progress_data(summary), "comparisons": shown}
     return page(data, blocks)
 
 

@@ -167,7 +167,7 @@ def study_like(runs: int, points: int) -> bytes:
     ]
     comparison = {"name": "many", "goals": goals_data(front.goals), "solvers": [f"solver {k}" for k in range(4)], "runs": told}
     progress = {"total": runs, "finished": runs, "failed": 0, "cells": [], "failures": []}
-    data = {"title": "many", "kind": "study", "live": False, "comparisons": [comparison], "progress": progress}
+    data = {"title": "many", "kind": "study", "comparisons": [comparison], "progress": progress}
     return pages.page(data, {str(k): packed for k in range(runs)})
 
 

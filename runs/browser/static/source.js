@@ -1,5 +1,5 @@
 "use strict";
-// Where data come from: elements of this page, or the server that sent it.
+// Where data come from: compressed blocks in this page, each read when it is first needed.
 
 const loaded = new Map();
 
@@ -14,11 +14,6 @@ function details(run) {
 }
 
 async function read(block) {
-  if (state.data.live) {
-    const answer = await fetch(`runs/${block}`);
-    if (!answer.ok) throw new Error(`the server answers: ${answer.status} ${answer.statusText}`);
-    return answer.json();
-  }
   const place = byId(`block-${block}`);
   if (!place) throw new Error("it is not in this file");
   if (!("DecompressionStream" in window)) throw new Error("this browser is too old: it cannot decompress data");

@@ -19,14 +19,12 @@ const listeners = { comparison: [], filter: [], selection: [] };
 const on = (event, listener) => listeners[event].push(listener);
 const emit = (event) => listeners[event].forEach((listener) => listener());
 
-/** Show a comparison. With `keep`, what is selected stays, as far as it is still there. */
-function showComparison(comparison, keep = false) {
+/** Show a comparison from its beginning: nothing selected, nothing hidden. */
+function showComparison(comparison) {
   state.comparison = comparison;
   state.points = comparison.runs.flatMap((run) => pointsOf(run));
   state.byKey = new Map(state.points.map((point) => [point.key, point]));
-  if (!keep) Object.assign(state, { selected: null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
-  state.kept = state.kept.filter((key) => state.byKey.has(key));
-  if (!state.byKey.has(state.selected)) state.selected = null;
+  Object.assign(state, { selected: null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
   emit("comparison");
 }
 
