@@ -28,7 +28,7 @@ from problems.checks import unknown
 from transcription.inner import NAMED
 
 from ..batch import file as studyfile
-from . import decide_command, study_commands
+from . import browser_commands, decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 from .fallback import saved
 from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
@@ -319,5 +319,6 @@ COMMANDS = {
     "verify": verify,
     "decide": decide_command.decide,
     "study": study_commands.study,
+    "report": browser_commands.report,
     "bench": bench,
 }

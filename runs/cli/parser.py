@@ -30,6 +30,7 @@ examples:
   macs decide front.nc
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
+  macs report front.nc --html front.html
   macs bench inner --quick
 
 exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
@@ -173,6 +174,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_verify(commands)
     _add_decide(commands)
     _add_study(commands)
+    _add_report(commands)
     _add_bench(commands)
     return parser
 
@@ -276,6 +278,13 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     report.add_argument(
         "--join", metavar="NAME=FILE", action="append", help="a front of another program, CSV or .nc; again for more runs and programs"
     )
+
+
+def _add_report(commands: argparse._SubParsersAction[Parser]) -> None:
+    report = _add(commands, "report", "a front or a study as one page for the browser, a file that loads nothing from the network")
+    report.add_argument("source", metavar="FRONT.nc|STUDY", help="a front, a study's folder, or the name of a study that ran into out/NAME")
+    report.add_argument("--html", metavar="FILE", help="the page (default: FRONT.html beside the front; DIR/report/report.html of a study)")
+    report.add_argument("--trust", action="store_true", help=TRUST)
 
 
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
