@@ -106,7 +106,7 @@ def test_the_code_of_a_page_runs_and_prints_what_it_says(page: Path, tmp_path: P
 
 def is_printed(text: str, printed: str) -> bool:
     """Whether this is part of what was printed; "..." in it stands for anything, and spaces for any other number of them."""
-    return OutputChecker().check_output(f"...{text.strip()}...", printed, ELLIPSIS | NORMALIZE_WHITESPACE)
+    return OutputChecker().check_output(f"... {text.strip()} ...", f"| {printed} |", ELLIPSIS | NORMALIZE_WHITESPACE)
 
 
 def check_command(arguments: list[str]) -> None:
