@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint docs mutants fuzz kills clean
+.PHONY: run test test-slow lint docs mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -37,6 +37,11 @@ fuzz: $(READY)
 kills: $(READY)
 	$(BIN)/python tests/runs/kills.py --kills 100
 
+# The wheel and the source distribution, in dist/, built and tried in a fresh environment away from this folder: some minutes, and the network.
+package: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[package]"
+	$(BIN)/python tests/package.py
+
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || \
 	  { echo "MACS needs Python 3.11 or newer; say which one with: make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -45,4 +50,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $(READY)
 
 clean:
-	rm -rf .venv out build docs/api/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf .venv out build dist docs/api/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
