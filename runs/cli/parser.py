@@ -41,6 +41,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 
 density     shooting on equal intervals, and on as many that follow the trajectory: error when simulated, and of the objective
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
+generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 passages    the boundary value problem of aerocapture by our solver and its table, against scipy's solve_bvp at known accuracy
@@ -281,7 +282,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench.description = BENCH
     bench.add_argument(
         "what",
-        metavar="density|front|inner|methods|passages|peers|population|prefer|scale|search|standard|study",
+        metavar="density|front|generation|inner|methods|passages|peers|population|prefer|scale|search|standard|study",
         nargs="?",
         help="which one (default: all)",
     )
