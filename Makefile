@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint mutants fuzz kills package clean
+.PHONY: run test test-slow lint docs mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -20,6 +20,10 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The manual, in out/docs/index.html. A warning is an error; no network is needed once its packages are installed.
+docs: $(READY)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 
 # Changes the lines that judge, one by one, and counts what the tests notice: about an hour, or one with `make mutants MODULE=dominance`.
 mutants: $(READY)
@@ -46,4 +50,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $(READY)
 
 clean:
-	rm -rf .venv out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf .venv out build dist docs/api/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info

@@ -43,6 +43,31 @@ class Front(Points):
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
+
+    Attributes
+    ----------
+    objectives, F : array (n, m)
+        In the user's units and senses; all minimised.
+    violation, defect : array (n,)
+        Largest scaled residual; largest difference of a simulated state.
+    status : array (n,) of str
+    verified : array (n,) of bool
+    stats : dict
+        Costs, seed, and why it ended.
+    message : str
+    closest : Point or None
+
+    Examples
+    --------
+    >>> from macs import Front, sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> len(front), front.names
+    (3, ('flight time', 'horizontal speed'))
+    >>> front.save("front.nc")
+    >>> print(Front.load("front.nc")[1].verified)
+    True
     """
 
     @classmethod
@@ -179,7 +204,7 @@ class Front(Points):
         Returns
         -------
         Front
-            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and `note`s on what is missed.
+            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and a `note` where something is missed.
 
         Raises
         ------

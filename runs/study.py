@@ -64,7 +64,7 @@ class Study:
         One or several, for all problems; {label: one}; or {label of a problem: one or several}, if its keys are the problems' labels.
         Default: the problem's own.
     solvers : names, Solvers, or mapping
-        One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
+        One or several names, such as "macs", or solvers; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
         {label of a solver: terms of its own}: any of transcription (one, or {label of a problem: one}), evaluations, inner and start.
         Reports compare it with the others on each of their transcriptions.
@@ -113,6 +113,13 @@ class Study:
     ------
     ValueError
         A value is wrong; the message names it, before any work.
+
+    Examples
+    --------
+    >>> from runs import Study
+    >>> study = Study("mine", problems="four_bar_truss", solvers=["macs", "nsga2"], evaluations=500, runs=2, seed=1)
+    >>> len(study.cells)
+    2
     """
 
     name: str = field(metadata=_key(Text, decides=True))

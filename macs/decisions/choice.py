@@ -38,6 +38,17 @@ class Step:
         Further numbers by name, such as lambda and kappa.
     message : str
         What is to be known of the step.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint, decide
+    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> len(choice.history) > 0
+    True
     """
 
     name: str
@@ -70,6 +81,17 @@ class Choice:
         What is to be known of the choice; usually empty.
     stopped : str
         What ended the work before its end: Ctrl-C or a time limit; usually empty.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint, decide
+    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> sorted(choice.objectives)
+    ['flight time', 'horizontal speed']
     """
 
     point: Point

@@ -185,7 +185,7 @@ class StageSolver:
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
         point = vectors_points(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = solved_again(point if among is None else unmarked(Points.concatenate([point, among])), verify)
-        spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work")}
+        spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work", "gradient_work")}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
         return found[[0]]
 

@@ -46,6 +46,14 @@ class Evaluation:
         What the evaluation took; see `Counts`.
     itemise : callable, optional
         Function that returns `violations`; called only when they are needed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import Evaluation
+    >>> one = Evaluation(Z=np.zeros((1, 2)), F=np.ones((1, 2)), violation=np.zeros(1), status=np.array(["converged"]))
+    >>> one.F.shape
+    (1, 2)
     """
 
     Z: np.ndarray
@@ -96,6 +104,8 @@ class Counts:
     work : int
         Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
         programs of all sizes. Plain functions take none.
+    gradient_work : int
+        Part of the work that gradient solves took.
     """
 
     evaluations: int = 0
@@ -105,6 +115,7 @@ class Counts:
     failures: Counter[str] = field(default_factory=Counter)
     clocked: int = 0
     work: int = 0
+    gradient_work: int = 0
 
     __repr__ = short_repr
 
@@ -116,6 +127,7 @@ class Counts:
         self.inner_iterations += iterations
         self.clocked += clocked
         self.work += iterations * variables
+        self.gradient_work += iterations * variables
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""
@@ -147,6 +159,13 @@ class Evaluator(ABC):
     counts : Counts
     before_batch : callable
         Function without arguments that is called before each batch; it ends the search by raising an exception.
+
+    Examples
+    --------
+    >>> from macs import MACS, Evaluator
+    >>> from macs.evaluation.blackbox import BlackBox
+    >>> issubclass(BlackBox, Evaluator)
+    True
     """
 
     free: np.ndarray

@@ -52,8 +52,8 @@ def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | 
 
 
 def padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
-    """Arrays of the same rank in one, NaN where they end; `like` is the shape to take where there is none."""
-    shapes = [row.shape for row in rows if row is not None] or [like]
+    """Arrays of the same rank in one, NaN where they end; `like` is the least shape."""
+    shapes = [like, *(row.shape for row in rows if row is not None)]
     padded = np.full((len(rows), *np.max(shapes, axis=0)), np.nan)
     for i, row in enumerate(rows):
         if row is not None:

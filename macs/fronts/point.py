@@ -18,7 +18,26 @@ from .provenance import Source
 
 
 class Point:
-    """One point of a front: a trajectory, or one row of variables of a vector problem or black box. It refers to the data of its front."""
+    """One point of a front: a trajectory, or one row of variables of a vector problem or black box. It refers to the data of its front.
+
+    Attributes
+    ----------
+    objectives : dict
+        By name, in the user's units and senses.
+    trajectory : Trajectory or None
+    verified : bool or None
+        Whether a simulation agrees with it; None: not simulated.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> point = front[2]
+    >>> print(round(point.objectives["flight time"], 3), point.status, point.verified)
+    250.0 converged True
+    """
 
     __slots__ = ("_points", "index")
 

@@ -134,6 +134,7 @@ def costs(counts: Counts, **about: Any) -> dict[str, Any]:
         "fallbacks": counts.fallbacks,
         "failures": dict(counts.failures),
         "work": counts.work,
+        "gradient_work": counts.gradient_work,
         **about,
     }
 
@@ -145,6 +146,7 @@ def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopp
         "gradient_solves": stats["gradient_solves"] + counts.gradient_solves,
         "inner_iterations": stats["inner_iterations"] + counts.inner_iterations,
         "work": stats.get("work", 0) + counts.work,
+        "gradient_work": stats.get("gradient_work", 0) + counts.gradient_work,
         "wall_time": stats["wall_time"] + wall_time,
         "reproducible": stats["reproducible"] and not (counts.clocked or stopped),
         **({"stopped": stopped} if stopped else {}),
@@ -166,7 +168,7 @@ def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         **summed,
         "failures": dict(failures),
-        "work": sum(stats.get("work", 0) for stats in several),
+        **{key: sum(stats.get(key, 0) for stats in several) for key in ("work", "gradient_work")},
         "seed": seeds if len(seeds) > 1 else seeds[0],
         "tolerance": max(stats["tolerance"] for stats in several),
         "reproducible": all(stats["reproducible"] for stats in several),

@@ -36,7 +36,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     lines = text_table(table.headers, table.rows, table.left).split("\n")
     if table.apart:
         lines.insert(len(lines) - table.apart, f"\n{_said_apart(front)}")
-    return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
+    return "\n".join([headline(front), "", *lines, "", *footer(front)]).rstrip()
 
 
 MOST = 30
@@ -53,7 +53,7 @@ def front_html(front: Points, picture: bytes) -> str:
     shown = html_table(table.headers, table.rows[:MOST], table.left, dim)
     notes = [f"{counted(len(front) - MOST, 'more point')}: front.table()"] if len(front) > MOST else []
     notes += [f"Grey: {_said_apart(front)}"] if table.apart else []
-    return html_block(headline(front), shown, [*notes, *_footer(front)], picture, what)
+    return html_block(headline(front), shown, [*notes, *footer(front)], picture, what)
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,8 @@ FEW = 5
 """Number of points whose misses are given in words."""
 
 
-def _footer(front: Points) -> list[str]:
+def footer(front: Points) -> list[str]:
+    """Lines below the table of a front with points: how many are verified, notes and warnings."""
     lines = _simulated(front) if front.was_simulated.all() else _between_nodes(front) if front.dynamic else []
     bad = int((front.status != CONVERGED).sum())
     if bad:

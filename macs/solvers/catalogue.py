@@ -27,6 +27,8 @@ SOLVERS: dict[str, str] = {
     "sweep": "macs.gradient_solvers:Sweep",
 }
 """Module and class of each solver, imported only when needed."""
+PAPER = "paper"
+"""In a study file, `{solver = "macs", paper = true}`: the settings of the paper. Also the name of the method of a class that has them."""
 
 
 def solver_class(name: str) -> type[Solver]:
@@ -39,7 +41,7 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def solver(name: str, **settings: Any) -> Solver:
-    """A solver by name, with its settings.
+    """A solver by name, with its settings; with `paper=True` those of its paper, where it has them (`MACS.paper`), but for those given.
 
     Raises
     ------
@@ -48,7 +50,13 @@ def solver(name: str, **settings: Any) -> Solver:
     """
     kind = solver_class(name)
     known = inspect.signature(kind).parameters
+    paper = settings.pop(PAPER, False)
+    if paper not in (True, False):
+        raise ValueError(f"solver '{name}': {PAPER} must be true or false, not {paper!r}")
+    as_published = getattr(kind, PAPER, None)
+    if paper and as_published is None:
+        raise ValueError(f"solver '{name}' has no settings of a paper")
     for key in settings:
         if key not in known:
             raise ValueError(unknown(f"setting of solver '{name}'", key, known))
-    return kind(**settings)
+    return as_published(**settings) if paper and as_published else kind(**settings)

@@ -34,7 +34,17 @@ class Progress:
         Number of evaluations and gradient solves that did not converge, by status.
     F : array (archive, m)
         Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
-    inner_iterations, gradient_solves : int
+    inner_iterations, gradient_solves, work, gradient_work : int
+        See `Counts`.
+
+    Examples
+    --------
+    >>> from macs import MACS
+    >>> from problems import load
+    >>> seen = []
+    >>> front = MACS().solve(load("four_bar_truss"), evaluations=100, seed=1, callback=lambda progress: seen.append(progress.evaluations))
+    >>> seen[-1] <= 100
+    True
     """
 
     evaluations: int
@@ -47,6 +57,8 @@ class Progress:
     F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
     inner_iterations: int = 0
     gradient_solves: int = 0
+    work: int = 0
+    gradient_work: int = 0
 
     @property
     def front(self) -> Front:

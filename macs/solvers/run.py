@@ -246,4 +246,6 @@ class SearchRun:
             F=self._state.archive.F if self._state is not None else np.empty((0, 0)),
             inner_iterations=counts.inner_iterations,
             gradient_solves=counts.gradient_solves,
+            work=counts.work,
+            gradient_work=counts.gradient_work,
         )

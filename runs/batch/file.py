@@ -48,7 +48,7 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
         There is no such file, it is not TOML, or it has an unknown key, lacks a key, or has an address that
         is not trusted; the message names it.
     """
-    path = _find(source)
+    path = find(source)
     with errors_begin_with(str(source)):
         try:
             data = tomllib.loads(read_whole(path, LARGEST).decode())
@@ -79,7 +79,8 @@ def _addresses(data: Mapping[str, Any]) -> list[str]:
     return [one for one in addresses if isinstance(one, str)] + reference_addresses(data.get("reference"))
 
 
-def _find(source: str | PathLike[str]) -> Path:
+def find(source: str | PathLike[str]) -> Path:
+    """The file of a study: the path itself, or that of a study that comes with the project. Raises ValueError if there is none."""
     path = Path(source)
     if path.suffix == ".toml":
         if not os.path.lexists(path):

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from argparse import Namespace
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, wrong_call_on_value_error
+
+if TYPE_CHECKING:
+    from ..report.pages.page import Page
 
 
 def study(arguments: Namespace) -> int:
@@ -68,8 +73,26 @@ def report(arguments: Namespace) -> int:
         foreign.setdefault(name, []).append(path)
     try:
         with wrong_call_on_value_error():
-            found = write(arguments.folder, foreign=foreign, figures=not arguments.no_figures, progress=True, trust=arguments.trust)
+            page = page_of(arguments) if arguments.page else None
+            drawn = not arguments.no_figures
+            found = write(arguments.folder, foreign=foreign, figures=drawn, progress=True, trust=arguments.trust, page=page)
     except OSError as error:
         raise WrongCall(str(error)) from error
     print(f"{found}\n\n{len(found.files)} files in {Path(arguments.folder) / FOLDER}")
     return DONE
+
+
+def page_of(arguments: Namespace) -> Page:
+    """The page that a report is also written to. Raises ValueError or OSError if it cannot be, or the study's file is not found."""
+    from ..batch.file import find
+    from ..batch.store import Store
+    from ..report.pages.page import Page
+    from ..study import Study
+
+    if arguments.no_figures or arguments.join:
+        raise WrongCall("--page is for a report with figures, of the study's own runs alone: without --no-figures and --join")
+    source = arguments.study or Store.open(arguments.folder, arguments.trust).definition["name"]
+    stated = f" --study {shlex.quote(arguments.study)}" if arguments.study else ""
+    trusted = " --trust" if arguments.trust else ""
+    command = f"macs study report {shlex.quote(arguments.folder)} --page {shlex.quote(arguments.page)}{stated}{trusted}"
+    return Page(arguments.page, command, find(source), Study.load(source, trust=arguments.trust).definition())

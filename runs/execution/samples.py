@@ -12,7 +12,7 @@ from macs.search.rounds import PLANNED
 
 from ..data.schema import checked, read_record, to_record
 
-COUNTS = ("evaluations", "inner_iterations", "gradient_solves")
+COUNTS = ("evaluations", "inner_iterations", "gradient_solves", "work", "gradient_work")
 NUMBER = 30
 """Largest number of samples, evenly spaced in evaluations, besides the one at the end."""
 EVERY = 0.25
@@ -33,6 +33,8 @@ class History(TypedDict, total=False):
     evaluations: list[int]
     inner_iterations: list[int]
     gradient_solves: list[int]
+    work: list[int]
+    gradient_work: list[int]
     elapsed: list[float]
     F: list[list[list[float]]]
 
@@ -76,7 +78,7 @@ class Samples:
         """Add a sample."""
         self._take_up(counts["evaluations"] + 1)
         for key in COUNTS:
-            self.columns[key].append(int(counts[key]))
+            self.columns[key].append(int(counts.get(key, 0)))
         self.columns["elapsed"].append(float(elapsed))
         self.columns["F"].append(F.tolist())
 

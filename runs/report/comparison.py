@@ -90,6 +90,8 @@ class Comparison:
         How many other runs have no front.
     stated : None, str or mapping
         The reference as the study states it.
+    verifies : bool
+        Whether only verified points count.
     """
 
     problem: str
@@ -100,6 +102,7 @@ class Comparison:
     failures: Mapping[str, int]
     left_out: Mapping[str, int]
     stated: Any = None
+    verifies: bool = False
 
     @cached_property
     def against(self) -> Reference:
@@ -133,8 +136,12 @@ class Comparison:
         return self.every[0]
 
     def union(self) -> Reference:
-        """The non-dominated points of all runs. Raises ValueError if there are none."""
-        fronts = self.every
+        """The non-dominated points of all runs. Raises ValueError if there are none.
+
+        In a study that verifies they are the verified ones alone, and so none of foreign solvers, whose points cannot be simulated.
+        """
+        verified = [one.front for ones in self.verified.values() for one in ones]
+        fronts = verified if self.verifies else self.every
         together = union([front if front.source is not None else front.objectives for front in fronts])  # others have no trajectories
         assert isinstance(together, Front)  # as all of them are
         return Reference(together, f"the union of {counted(len(fronts), 'run')}", False)
@@ -181,5 +188,6 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
         fronts |= {name: given for name, given in others.items() if all(front.goals == goals for front in given)}
         failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
         left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
-        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out, store.definition.get("reference")))
+        stated, verifies = store.definition.get("reference"), store.definition.get("verify") is not None
+        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out, stated, verifies))
     return found

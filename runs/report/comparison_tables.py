@@ -10,7 +10,7 @@ import numpy as np
 from ..measures.scale import Scale
 from ..measures.statistics import PairTest, overall, pairwise, summarise
 from .comparison import Comparison
-from .run_measures import samples, spent
+from .run_measures import CHARGED, Charge, samples, spent
 from .tables import Cell, Column, Table, table
 
 
@@ -73,17 +73,24 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
 
 
 def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
-    """A row for each cost and solver: evaluations, inner iterations, gradient solves, work and time of a run."""
+    """A row for each cost and solver: evaluations, inner iterations, gradient solves, work, charged evaluations and time of a run."""
+    charge = Charge.of(comparison)
     rows: list[list[Cell]] = [
         [cost, solver, summary.count, summary.mean, summary.median, summary.best, summary.worst]
-        for cost, solvers in spent(comparison).items()
+        for cost, solvers in spent(comparison, charge).items()
         for solver, values in solvers.items()
         for summary in [summarise(values)]
     ]
     heads: list[Column | str] = [Column("cost", grouped=True), "solver", "runs"]
     heads += [Column(name, digits=4) for name in ("mean", "median", "least", "most")]
-    note = "Work: iterations of IPOPT times variables, or what takes about as long; the same on all machines."
-    return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", [note])}
+    notes = ["Work: iterations of IPOPT times variables, or what takes about as long; the same on all machines."]
+    if charge is not None:
+        notes.append(
+            f"{CHARGED.capitalize()}: all work of a run, gradient solves included, divided by what an evaluation of {charge.solver} takes, "
+            "which takes least of the solvers without gradient solves. Work on transcriptions of different kinds is compared by the "
+            "instructions that it takes."
+        )
+    return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", notes)}
 
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]

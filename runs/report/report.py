@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
 
 from macs.front import Front
 from macs.io.atomic import write_whole
@@ -30,9 +31,10 @@ from .comparison import Comparison, comparisons
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Designs, Flights
 from .goal import Goal, GoalAttainment, goal_attainments
+from .pages.page import Page
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import papers, published_tables
-from .run_measures import AXES, histories
+from .run_measures import AXES, CHARGED, Charge, histories
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -85,6 +87,7 @@ def report(
     figures: bool = True,
     progress: bool = False,
     trust: bool = False,
+    page: Page | None = None,
 ) -> Report:
     """The report on all finished runs of a study: its tables and figures are written into the folder `report` in the study's folder.
 
@@ -102,11 +105,14 @@ def report(
         Whether the terminal shows the progress.
     trust : bool
         Whether addresses in the folder's files may be loaded that are not in the catalogue: that runs the code they name.
+    page : Page, optional
+        Where the report is also written as a page in Markdown.
 
     Raises
     ------
     ValueError
-        The folder contains no study, or no finished run; a reference or foreign front cannot be read; an address is not trusted.
+        The folder contains no study, or no finished run, or for a page not all; a reference or foreign front cannot be read; an address
+        is not trusted.
     OSError
         A file cannot be written.
     """
@@ -114,6 +120,8 @@ def report(
     summary, study = store.summary(), store.definition
     if not summary.finished:
         raise ValueError(f"there is nothing to report on yet: {str(summary).splitlines()[0]}")
+    if page is not None:
+        page.check(store)
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         published = papers(study.get("paper") or [])
@@ -125,7 +133,7 @@ def report(
     others = {name: [_foreign(path, found) for path in paths] for name, paths in (foreign or {}).items()}
     if others:
         found = comparisons(store, others)
-    writer = _Writer(Path(out) / FOLDER)
+    writer = _Writer(Path(out) / FOLDER, page)
     sections = [str(summary), *([keys.note] if keys.note else [])]
     for comparison in _shown(found) if progress else found:
         sections += _section(comparison, study, writer, figures)
@@ -141,6 +149,8 @@ def report(
     sections += [writer.table(name, one) for name, one in published_tables(found, published).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
+    if page is not None:
+        writer.files += page.save(summary, study)
     return Report(text, tuple(writer.files))
 
 
@@ -154,8 +164,7 @@ def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
 
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
     """The tables of a comparison as text, written to files with its figures."""
-    kinds = [tables_of for tables_of in TABLES if tables_of not in OF_FRONTS or not only_choices(comparison)]
-    tables = {name: one for tables_of in kinds for name, one in tables_of(comparison, study).items()}
+    tables = tables_of(comparison, study)
     figures = _figures(comparison) if drawn else {}
     shown: Flights | Designs | None = None
     if study.get("flights", True):
@@ -164,10 +173,18 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
         tables["representatives"] = shown.table()
         figures |= shown.figures() if drawn else {}
     stem = f"{comparison.problem}-{comparison.transcription}"
+    left_out = _left_out(comparison)
+    writer.heading(comparison.name, left_out)
     texts = [writer.table(f"{stem}-{name}", one) for name, one in tables.items()]
     for name, figure in figures.items():
         writer.figure(f"{stem}-{name}", figure)
-    return [f"{comparison.name}\n{'=' * len(comparison.name)}", *_left_out(comparison), *texts]
+    return [f"{comparison.name}\n{'=' * len(comparison.name)}", *left_out, *texts]
+
+
+def tables_of(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
+    """{name of a file: table} of a comparison, but that of the flights that stand for each front."""
+    kinds = [kind for kind in TABLES if kind not in OF_FRONTS or not only_choices(comparison)]
+    return {name: one for kind in kinds for name, one in kind(comparison, study).items()}
 
 
 def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:
@@ -208,9 +225,14 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
         surfaces = {solver: attainment(fronts) for solver, fronts in runs.items() if any(map(len, fronts))}
         if surfaces:
             found["attainment"] = attainment_figure(surfaces, goals=comparison.known.goals, reference=reference.front, truth_name=name)
+    charge = Charge.of(comparison)
     for indicator, larger in (("IGD", False), ("hypervolume", True)):
         for axis, (_, label) in AXES.items():
-            runs_so_far = histories(comparison, reference, indicator, axis)
+            runs_so_far = histories(comparison, reference, indicator, axis, charge)
+            if axis == "evaluations":
+                runs_so_far = {_with_solves(comparison, solver): runs for solver, runs in runs_so_far.items()}
+            elif axis == CHARGED and charge is not None:
+                label = f"{CHARGED}, of {charge.solver}"
             if runs_so_far:
                 stem = f"{indicator.lower()}-over-{axis.replace(' ', '-')}"
                 ylabel = f"{indicator} (normalised)"
@@ -218,22 +240,32 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
     return found
 
 
-class _Writer:
-    """Writes into one folder, each file whole."""
+def _with_solves(comparison: Comparison, solver: str) -> str:
+    """The name of a solver in a figure over evaluations, which do not count its gradient solves: with their number, if it makes any."""
+    solves = [run.front.stats["gradient_solves"] for run in comparison.runs[solver]]
+    return f"{solver} + {counted(int(np.median(solves)), 'gradient solve')}" if any(solves) else solver
 
-    def __init__(self, folder: Path) -> None:
+
+class _Writer:
+    """Writes into one folder, each file whole, and what is on a page to that."""
+
+    def __init__(self, folder: Path, page: Page | None = None) -> None:
         folder.mkdir(exist_ok=True)
-        self._folder, self.files = folder, list[Path]()
+        self._folder, self._page, self.files = folder, page, list[Path]()
         self._used: Counter[tuple[str, str]] = Counter()
 
     def table(self, name: str, one: Table) -> str:
         """Write a table in its three forms; returns its text."""
+        if self._page is not None:
+            self._page.table(one)
         self.files += one.save(self._folder / self._free("table", name))
         return one.text()
 
     def figure(self, name: str, figure: Figure) -> None:
         """Write a figure, as a picture and for print."""
         stem = self._free("figure", name)
+        if self._page is not None:
+            self._page.figure(stem, figure)
         for suffix in ("png", "pdf"):
             content = io.BytesIO()
             figure.savefig(content, format=suffix, dpi=200)
@@ -246,6 +278,11 @@ class _Writer:
         stem = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-")
         self._used[kind, stem] += 1
         return stem if self._used[kind, stem] == 1 else f"{stem}-{self._used[kind, stem]}"
+
+    def heading(self, title: str, lines: Sequence[str]) -> None:
+        """Begin a part of the page."""
+        if self._page is not None:
+            self._page.heading(title, lines)
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file."""

@@ -1,4 +1,4 @@
-"""Tables, written as text for terminals, as CSV for programs and as LaTeX (booktabs) for papers."""
+"""Tables, written as text for terminals, as CSV for programs, as LaTeX (booktabs) for papers and as Markdown for pages."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from macs.io.text import text_table
 
 COUNTED = 1e9
 """Whole numbers below are written in full."""
+BAR = r"\|"
+"""A bar within a cell of Markdown."""
 Cell = str | float | int | None
 """An entry of a table: text, a number, or None if there is none."""
 
@@ -83,9 +85,14 @@ class Table:
         headers = [[column.title for column in self.columns]]
         if any(column.unit for column in self.columns):
             headers.append([f"[{column.unit}]" if column.unit else "" for column in self.columns])
-        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        _, cells, left = self.shown()
         below = ["", *self.notes] if self.notes else []
-        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *below])
+        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, left), *below])
+
+    def shown(self) -> tuple[list[str], list[list[str]], list[bool]]:
+        """Heads with units, cells as text, and whether each column is flush left."""
+        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        return [label(column.title, column.unit) for column in self.columns], cells, self._left()
 
     def csv(self) -> str:
         """CSV: one header line, numbers in full, empty cells only where there is no value; without caption and notes."""
@@ -108,6 +115,16 @@ class Table:
         lines += [r"    \bottomrule", r"  \end{tabular}"]
         lines += [rf"  \par\smallskip\footnotesize {escaped(note)}" for note in self.notes]
         return "\n".join([*lines, r"\end{table}", ""])
+
+    def markdown(self) -> str:
+        """A table in Markdown, with its caption above and its notes below."""
+        heads = [label(column.title, column.unit) for column in self.columns]
+        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        rule = [":---" if left else "---:" for left in self._left()]
+        rows = [heads, rule, *cells]
+        lines = [f"| {' | '.join(cell.replace('|', BAR) for cell in row)} |" for row in rows]
+        above = [f"**{self.caption}**", ""] if self.caption else []
+        return "\n".join([*above, *lines, *(line for note in self.notes for line in ("", note))]) + "\n"
 
     def save(self, stem: str | PathLike[str]) -> list[Path]:
         """Write `stem`.txt, .csv and .tex, each whole or not at all; the label of the last is `tab:` and the file's name."""

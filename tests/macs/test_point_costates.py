@@ -14,6 +14,7 @@ from synthetic_fronts import black_box
 from macs import MACS, Front, optimize, sweep
 from macs.fronts import files
 from macs.fronts.dataset import phase_dataset, root_dataset
+from macs.fronts.points import Points
 from macs.io.atomic import sealed, unsealed
 from problems import Problem, load
 from problems.cases import goddard
@@ -273,3 +274,14 @@ def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):
     assert main(["show", str(tmp_path / "front.nc"), "--point", "3", "--plot", str(tmp_path / "flight.png")]) == 0
     assert f"{ascents[3].weights['flight time']:.6g}" in capsys.readouterr().out
     assert (tmp_path / "flight.png").stat().st_size > 1000
+
+
+def test_costates_beside_a_longer_trajectory_without_any_are_saved(tmp_path):
+    short = optimize(load("goddard"), parse("dfet:2x3"), objective="flight time", starts=1)
+    long = optimize(load("goddard"), parse("dfet:6x3"), objective="horizontal speed", starts=1)
+    both = Front.of(Points.concatenate([short.alone(), long.alone().replace(costates=[None])]))
+    both.save(tmp_path / "front.nc")
+    first, second = Front.load(tmp_path / "front.nc")
+    assert second.costates is None and short.costates is not None
+    for name, values in short.costates["ascent"].items():
+        np.testing.assert_array_equal(first.costates["ascent"][name], values)

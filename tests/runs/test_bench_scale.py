@@ -60,16 +60,11 @@ def test_what_grows_faster_than_asked_is_named():
         Row("third", "points", {"time": [0.5], "memory": [1.5]}),
         Row("fourth", "points", {"unfinished": [1.0]}),
     ]
-    assert scale.superlinear(rows[:1]) == []
-    assert scale.superlinear(rows) == [
-        "second: time grows with the power 2.00 of nodes",
-        "third: memory grows with the power 1.50 of points",
-        "fourth: it did not come to its end",
-    ]
-    text = scale.report(rows)
-    assert "exponents: asked at most 1.1 each, by the median, measured 2.00 of time at most, MISSED" in text
-    assert all(len(line) <= 140 for line in text.splitlines())
-    assert "at most, met" in scale.report(rows[:1])
+    assert all(one.met for one in scale.targets(rows[:1]))
+    found = [("2.00 (second)", False), ("1.50 (third)", False), ("fourth", False)]
+    assert [(one.measured, one.met) for one in scale.targets(rows)] == found
+    assert all(len(line) <= 140 for line in scale.report(rows).splitlines())
+    assert "MISSED" in scale.report(rows) and "MISSED" not in scale.report(rows[:1])
 
 
 def test_a_repetition_is_prepared_anew_and_all_sizes_come_before_the_next(capsys):

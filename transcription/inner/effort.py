@@ -24,23 +24,23 @@ CALL, STEP = 8_000, 20_000
 @remembered
 def propagation(nlp: NLP) -> float:
     """Of a propagation whose objectives and constraints are evaluated."""
-    return (nlp.reduced.instructions + CALL) / _iteration(nlp)
+    return (nlp.reduced.instructions + CALL) / iteration(nlp)
 
 
 @remembered
 def evaluation(nlp: NLP) -> float:
     """Of an evaluation of the objectives and constraints alone."""
-    return (work(nlp.functions) + CALL) / _iteration(nlp)
+    return (work(nlp.functions) + CALL) / iteration(nlp)
 
 
 @remembered
 def newton_step(nlp: NLP) -> float:
     """Of a step of Newton's method, its propagation included."""
-    return propagation(nlp) + (nlp.reduced.instructions_of_derivatives + STEP) / _iteration(nlp)
+    return propagation(nlp) + (nlp.reduced.instructions_of_derivatives + STEP) / iteration(nlp)
 
 
 @remembered
-def _iteration(nlp: NLP) -> float:
-    """Instructions that take as long as an iteration of IPOPT."""
+def iteration(nlp: NLP) -> float:
+    """Instructions that take as long as an iteration of IPOPT: by these, programs of different kinds are comparable."""
     entries = nlp.dense if too_dense(nlp) else nlp.functions.jac_sparsity(1, 0).nnz()
     return PASSES * work(nlp.functions) + FIXED + ENTRY * entries

@@ -87,7 +87,7 @@ def draw_flight(
 
 def _draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
     """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one."""
-    worth = max(_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    worth = max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
     for ax, name in zip(axes, [*states, None], strict=True):
         everything: list[np.ndarray] = []
         ranges: list[np.ndarray] = []
@@ -141,7 +141,7 @@ def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
     return values if np.ptp(values) >= least else np.array([0.0, least])
 
 
-def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
+def costates_worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
     """How much the largest costate of each state is worth over the range of the state, all states together."""
     return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 

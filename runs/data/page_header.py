@@ -1,0 +1,83 @@
+"""Header of a page of measured results: the command that made it, and of what content, version and date."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from datetime import date
+from os import PathLike
+from pathlib import Path
+
+from macs.fronts.provenance import versions
+from macs.io.atomic import read_whole
+
+LARGEST = 2**24
+"""Bytes that a file may have of which a digest is made."""
+OPENS, CLOSES = "<!-- ", " -->"
+"""Of a comment, which a page as it is shown does not have."""
+NAMES = {"command": "made by", "digest": "digest", "version": "version", "date": "date"}
+"""Word of each entry on the page."""
+
+
+@dataclass(frozen=True)
+class PageHeader:
+    """The first lines of a page of measured results, a comment:
+
+    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md
+    digest: the SHA-256 of the files that state what is measured, see `digest`
+    version: 0.1.0
+    date: 2026-01-31 -->
+
+    Attributes
+    ----------
+    command : str
+        That makes the page.
+    digest : str
+        Of the study file, or of the files of a bench. The page is out of date once theirs is another.
+    version : str
+        Of this package.
+    date : str
+        Year-month-day.
+
+    Raises
+    ------
+    ValueError
+        If an entry is empty, or has characters that could end its line or the comment.
+    """
+
+    command: str
+    digest: str
+    version: str
+    date: str
+
+    def __post_init__(self) -> None:
+        for name, word in NAMES.items():
+            value = getattr(self, name)
+            if not value.strip() or len(value.splitlines()) > 1 or ">" in value:
+                raise ValueError(f"header of a page: '{word}' must be one line without '>', not {value!r}")
+
+    @classmethod
+    def now(cls, command: str, files: Sequence[str | PathLike[str]]) -> PageHeader:
+        """The header of a page that this command makes today, of what these files state."""
+        return cls(command, digest(*files), versions()["macs-trajectories"], date.today().isoformat())
+
+    @classmethod
+    def read(cls, text: str) -> PageHeader:
+        """The header of a page with this text. Raises ValueError if it begins with none."""
+        lines = text.split(CLOSES, 1)[0].removeprefix(OPENS).splitlines() if text.startswith(OPENS) and CLOSES in text else []
+        found = dict(line.split(": ", 1) for line in lines if ": " in line)
+        if len(lines) != len(NAMES) or list(found) != list(NAMES.values()):
+            raise ValueError(f"the page does not begin with a comment of {', '.join(NAMES.values())}")
+        return cls(*(found[NAMES[one.name]] for one in fields(cls)))
+
+    def __str__(self) -> str:
+        return OPENS + "\n".join(f"{word}: {getattr(self, name)}" for name, word in NAMES.items()) + CLOSES
+
+
+def digest(*files: str | PathLike[str]) -> str:
+    """The SHA-256, in hexadecimal digits, of the content of files, one after the other. Raises OSError if one cannot be read."""
+    found = hashlib.sha256()
+    for one in files:
+        found.update(read_whole(Path(one), LARGEST))
+    return found.hexdigest()

@@ -1,0 +1,1 @@
+"""Pages in Markdown that keep a report in the project's documentation."""

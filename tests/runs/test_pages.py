@@ -1,0 +1,167 @@
+"""Pages of studies, and what only verified points and counted work may decide in reports."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from misbehaving import Plain
+
+from macs import MACS, NSGA2
+from macs.front import Front
+from macs.fronts.points import Points
+from runs import Study
+from runs.batch.store import Store
+from runs.cli import main
+from runs.data.page_header import PageHeader
+from runs.report.comparison import comparisons
+from runs.report.run_measures import AXES, CHARGED, Charge, histories, spent
+from runs.report.tables import Column, table
+
+TOML = """name = "small"
+description = "A small study"
+problems = ["goddard"]
+transcriptions = ["dfet:2x3"]
+inner = "projection"
+evaluations = 100
+runs = 2
+seed = 1
+note = "Of no use but here."
+
+[solvers]
+plain = {solver = "macs", refine = false}
+gradients = {solver = "macs", mesh = "fixed"}
+"as published" = {solver = "macs", paper = true}
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory) -> Path:
+    """A study file, and its finished runs in `out`."""
+    base = tmp_path_factory.mktemp("pages")
+    (base / "small.toml").write_text(TOML)
+    assert Study.load(base / "small.toml").run(base / "out").finished == 6
+    return base
+
+
+def page_of(place: Path, *more: str) -> int:
+    return main(["study", "report", str(place / "out"), "--page", str(place / "small.md"), "--study", str(place / "small.toml"), *more])
+
+
+def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
+    assert page_of(place) == 0
+    text = (place / "small.md").read_text()
+    header = PageHeader.read(text)
+    assert header.digest == hashlib.sha256(TOML.encode()).hexdigest()
+    assert header.command == f"macs study report {place / 'out'} --page {place / 'small.md'} --study {place / 'small.toml'}"
+    for words in ("# small", "A small study", "Of no use but here.", "6 runs", "casadi", "## goddard, dfet:2x3", "| indicator | solver |"):
+        assert words in text, words
+    pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
+    assert len(pictures) == 2 and all((place / one).read_bytes().startswith(b"\x89PNG") for one in pictures)
+
+
+def test_no_page_of_a_study_that_has_changed_or_is_not_finished(place, capsys):
+    file, page = place / "small.toml", place / "small.md"
+    page.unlink(missing_ok=True)
+    for changed, words in (
+        (TOML.replace("= 100", "= 101"), "contains another study"),
+        (TOML.replace("Of no", "Of much"), "note of the study changed after its last run"),
+    ):
+        file.write_text(changed)
+        assert page_of(place) == 2 and words in capsys.readouterr().err
+    file.write_text(TOML)
+    lost = next(Store.open(place / "out").runs()).path
+    content, record = lost.read_bytes(), lost.with_suffix(".json").read_bytes()
+    lost.unlink()
+    try:
+        assert page_of(place) == 2 and "1 run of" in capsys.readouterr().err
+    finally:
+        lost.write_bytes(content)
+        lost.with_suffix(".json").write_bytes(record)
+    assert page_of(place, "--no-figures") == 2 and not page.exists()
+
+
+def test_the_paper_settings_have_a_word(place):
+    solvers = {cell.solver: cell.details["solver"]["settings"] for cell in Store.open(place / "out").cells}
+    assert solvers["as published"] == MACS.paper().about()["settings"] != solvers["plain"]
+    for wrong, words in (
+        ({"solver": "nsga2", "paper": True}, "no settings of a paper"),
+        ({"solver": "macs", "paper": 1.5}, "true or false"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            Study("wrong", problems="goddard", solvers={"one": wrong}, evaluations=10, runs=1, seed=1)
+
+
+def test_gradient_solves_are_charged_by_counted_work(place):
+    [comparison] = comparisons(Store.open(place / "out"), {})
+    charge = Charge.of(comparison)
+    assert charge is not None
+    each = {solver: np.mean([run.front.stats["work"] / 100 for run in comparison.runs[solver]]) for solver in ("plain", "as published")}
+    assert charge.unit == pytest.approx(min(each.values())) and charge.solver == min(each, key=each.get)
+    costs = spent(comparison, charge)
+    for run, charged in zip(comparison.runs["gradients"], costs[CHARGED]["gradients"], strict=True):
+        stats = run.front.stats
+        assert stats["gradient_solves"] > 0 and 0 < stats["gradient_work"] < stats["work"]
+        assert charged == pytest.approx(stats["work"] / charge.unit) and charged > stats["evaluations"]
+    assert np.mean(costs[CHARGED][charge.solver]) == pytest.approx(100)
+    reached = histories(comparison, comparison.against, "IGD", CHARGED, charge)
+    assert [float(moments[-1]) for moments, _ in reached["gradients"]] == pytest.approx(costs[CHARGED]["gradients"])
+    assert CHARGED in AXES and not histories(comparison, comparison.against, "IGD", CHARGED)
+
+
+def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(tmp_path):
+    study = Study(
+        "mixed",
+        problems="goddard",
+        transcriptions="shooting:20",
+        solvers={"nsga2": NSGA2(population=10), "polished": Plain(refine=True, polish_on="dfet:2x3", polish_every=10)},
+        inner="propagate",
+        evaluations=60,
+        runs=1,
+        seed=1,
+    )
+    study.run(tmp_path / "out")
+    [comparison] = comparisons(Store.open(tmp_path / "out"), {})
+    charge = Charge.of(comparison)
+    assert charge is not None
+    (plain,), (polished,) = comparison.runs["nsga2"], comparison.runs["polished"]
+    assert charge(plain.cell, plain.front.stats) == pytest.approx(60)
+    own, of_gradients = charge.prices[polished.cell]
+    assert own != of_gradients and charge.prices[plain.cell] == (own, own)
+    stats = polished.front.stats
+    assert stats["gradient_work"] > 0
+    more = stats["gradient_work"] * of_gradients / charge.unit
+    assert charge(polished.cell, stats) == pytest.approx(60 + more, rel=1e-2)
+
+
+def test_unions_hold_verified_points_only(place, tmp_path):
+    shutil.copytree(place / "out", tmp_path / "out")
+    store = Store.open(tmp_path / "out")
+    [before] = comparisons(store, {})
+    # A point that is better than all, and that a simulation did not confirm, joins a run.
+    run = before.runs["plain"][0]
+    best = np.min([front.F.min(axis=0) for front in before.every if len(front)], axis=0) - 1.0
+    false = run.front[[0]].replace(F=best[None], verified=np.array([False]))
+    joined = Front.of(Points.concatenate([run.front, false])).sorted()
+    joined.save(run.path)
+    run.path.with_suffix(".json").unlink()
+    [after] = comparisons(Store.open(tmp_path / "out"), {})
+    assert after.verified["plain"][0].claimed == before.verified["plain"][0].claimed + 1
+    np.testing.assert_array_equal(after.union().front.F, before.union().front.F)
+    # Confirmed, it would be the whole union.
+    joined.replace(verified=np.ones(len(joined), dtype=bool), simulated_F=joined.F).save(run.path)
+    [confirmed] = comparisons(Store.open(tmp_path / "out"), {})
+    np.testing.assert_array_equal(confirmed.union().front.F, best[None])
+    # The same by a program of which nothing can be simulated.
+    [foreign] = comparisons(Store.open(place / "out"), {"theirs": [false]})
+    assert len(foreign.fronts["theirs"][0]) == 1 and foreign.union().what == "the union of 6 runs"
+    np.testing.assert_array_equal(foreign.union().front.F, before.union().front.F)
+
+
+def test_markdown_of_a_table():
+    text = table([Column("name"), Column("size", "m")], [["a|b", 1.5], ["c", None]], "A caption.", ["A note."]).markdown()
+    rows = ["| name | size [m] |", "| :--- | ---: |", r"| a\|b | 1.50 |", "| c | - |"]
+    assert text.splitlines() == ["**A caption.**", "", *rows, "", "A note."]
