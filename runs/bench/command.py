@@ -12,11 +12,13 @@ from macs.io.interrupts import Stopped
 from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
 from .page import header_of, write_page
+from .scale import generation
 
 BENCHMARKS: dict[str, Any] = {
     **{name: functions.Contest(name) for name in functions.NAMES},
     "density": density,
     "front": fronts,
+    "generation": generation,
     "inner": inner,
     "methods": methods,
     "passages": passages,
@@ -71,6 +73,7 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
+        "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),
         "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
         "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
         "passages": lambda: passages.bench_passages(rows, passages.QUICK if quick else passages.Effort()),

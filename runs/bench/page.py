@@ -11,7 +11,7 @@ from macs.io.atomic import write_whole
 
 from ..data.page_header import PageHeader
 
-PLACES = {"front": "fronts", "many": "functions", "uf": "functions", "zdt": "functions", "constrained": "functions"}
+PLACES = {"front": "fronts", "generation": "scale.generation"} | dict.fromkeys(("many", "uf", "zdt", "constrained"), "functions")
 """Modules that are not called as the benchmark."""
 SHARED = ("cases", "measured")
 """Modules that several benchmarks have in common."""
@@ -29,7 +29,7 @@ def sources(kind: str) -> list[Path]:
         raise ValueError(f"there is no benchmark '{kind}'") from None
     own = Path(found.__file__ or "")
     files = sorted(own.parent.glob("*.py")) if own.name == "__init__.py" else [own]
-    return files + [own.parents[own.name == "__init__.py"] / f"{name}.py" for name in SHARED]
+    return files + [Path(__file__).with_name(f"{name}.py") for name in SHARED]
 
 
 def header_of(kind: str, quick: bool, path: str | PathLike[str]) -> PageHeader:

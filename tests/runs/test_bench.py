@@ -72,6 +72,7 @@ def small(monkeypatch):
     monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
     monkeypatch.setattr(command.scale.growth.bench_scale, "__defaults__", ((replace(SERIES[0], quick=(4, 8, 12)),),))
     monkeypatch.setattr(command.scale.growth, "ASKED", 99.0)
+    monkeypatch.setattr(command.generation.bench_generation, "__defaults__", ((command.generation.SERIES[-1],),))
     monkeypatch.setattr(command.inner, "INNER", UNASKED[:2])
     monkeypatch.setattr(command.inner, "QUICK", TINY)
     monkeypatch.setattr(search, "CASES", (search.Search("goddard", 40, 40, 0.0, goddard.reference),))
@@ -295,6 +296,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert {row["benchmark"] for row in table} == {
         "density",
         "front",
+        "generation",
         "inner",
         "methods",
         "passages",
@@ -342,7 +344,11 @@ def test_an_interrupt_ends_the_steps():
     [
         (
             ["bench", "studies"],
-            ["studies", "study", "constrained, density, front, inner, many, methods, passages, peers, population, prefer, scale"],
+            [
+                "studies",
+                "study",
+                "constrained, density, front, generation, inner, many, methods, passages, peers, population, prefer, scale",
+            ],
         ),
         (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
         (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from runs.bench import command, scale
 from runs.bench.measured import Row
-from runs.bench.scale import child, growth
+from runs.bench.scale import child, generation, growth
 from runs.bench.scale.chains import masses, ride
 from runs.bench.scale.series import SERIES
 from runs.cli import main
@@ -92,3 +93,28 @@ def test_the_command(capsys, monkeypatch):
     assert main(["bench", "scale", "--quick"]) == 1
     assert "MISSED" in capsys.readouterr().out
     assert "scale" in command.KINDS
+
+
+def test_generations_grow_as_their_work_does():
+    def prepare(size: int):
+        def run(generations: int) -> None:
+            began = time.process_time()
+            while time.process_time() - began < 5e-6 * size * size * generations:
+                pass
+
+        return run
+
+    quadratic = generation.Growing("quadratic", "things", "Np^2", prepare, (), (20, 40, 80))
+    rows: list[Row] = []
+    generation.bench_generation(rows, generation.Effort(rounds=1, quick=True), [quadratic])
+    assert rows[0].of("exponent") == pytest.approx(2.0, abs=0.2) and rows[0].of("seconds") == pytest.approx(5e-6 * 6400, rel=0.2)
+    assert "quadratic" in generation.report(rows) and "section IV-D" in generation.report(rows)
+
+
+@pytest.mark.parametrize("one", generation.SERIES, ids=lambda one: one.name)
+def test_each_series_of_generations_runs(one):
+    one.prepare(one.quick[0])(2)
+
+
+def test_the_ride_has_the_limits_that_are_asked_for():
+    assert [len(generation.limited(count).compile().phases[0].paths) for count in (3, 6)] == [3, 6]
