@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint mutants fuzz kills clean
+.PHONY: run test test-slow lint docs mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -21,6 +21,10 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The manual, in out/docs/index.html. A warning is an error; no network is needed once its packages are installed.
+docs: $(READY)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+
 # Changes the lines that judge, one by one, and counts what the tests notice: about an hour, or one with `make mutants MODULE=dominance`.
 mutants: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,mutants]"
@@ -33,6 +37,11 @@ fuzz: $(READY)
 kills: $(READY)
 	$(BIN)/python tests/runs/kills.py --kills 100
 
+# The wheel and the source distribution, in dist/, built and tried in a fresh environment away from this folder: some minutes, and the network.
+package: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[package]"
+	$(BIN)/python tests/package.py
+
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || \
 	  { echo "MACS needs Python 3.11 or newer; say which one with: make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -41,4 +50,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $(READY)
 
 clean:
-	rm -rf .venv out build .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf .venv out build dist docs/api/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info

@@ -14,12 +14,11 @@ from problems.vector import CompiledVectorProblem
 from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
-from .evaluation.evaluator import CONVERGED
 from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
-from .fronts.tables import front_table, headline
+from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
@@ -44,6 +43,31 @@ class Front(Points):
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
+
+    Attributes
+    ----------
+    objectives, F : array (n, m)
+        In the user's units and senses; all minimised.
+    violation, defect : array (n,)
+        Largest scaled residual; largest difference of a simulated state.
+    status : array (n,) of str
+    verified : array (n,) of bool
+    stats : dict
+        Costs, seed, and why it ended.
+    message : str
+    closest : Point or None
+
+    Examples
+    --------
+    >>> from macs import Front, sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> len(front), front.names
+    (3, ('flight time', 'horizontal speed'))
+    >>> front.save("front.nc")
+    >>> print(Front.load("front.nc")[1].verified)
+    True
     """
 
     @classmethod
@@ -55,6 +79,13 @@ class Front(Points):
 
     def __repr__(self) -> str:
         return f"<Front: {headline(self)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the table and a small picture."""
+        from .fronts.front_plot import front_figure
+        from .fronts.pictures.style import rendered
+
+        return front_html(self, rendered(front_figure(self), "png", 80))
 
     def refine_mesh(
         self,
@@ -173,7 +204,7 @@ class Front(Points):
         Returns
         -------
         Front
-            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and `note`s on what is missed.
+            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and a `note` where something is missed.
 
         Raises
         ------
@@ -275,7 +306,7 @@ class Front(Points):
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
-        return draw_designs(self.decision, self.variables, self.objectives, self.goals, self.status == CONVERGED, title, figure)
+        return draw_designs(self, title, figure)
 
     def to_xarray(self, phase: str | None = None) -> xarray.Dataset:
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.

@@ -111,6 +111,15 @@ def optimize(
     ------
     ValueError
         If the problem is not stated correctly, an argument is not valid, or a peak is neither minimised nor bounded above; before any work.
+
+    Examples
+    --------
+    >>> from macs import optimize
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> best = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed", starts=1)
+    >>> round(best.objectives["horizontal speed"], 4)
+    0.9039
     """
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("optimize", problem, transcription, terms, objective=objective)
@@ -151,6 +160,12 @@ def payoff(
     ------
     ValueError
         As for `optimize`.
+
+    Examples
+    --------
+    >>> import macs, problems
+    >>> len(macs.payoff(problems.load("goddard"), starts=1))
+    2
     """
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("payoff", problem, transcription, terms)
@@ -201,6 +216,12 @@ def sweep(
     ------
     ValueError
         As for `optimize`; also for an unknown method, fewer points than objectives, and a problem with one objective.
+
+    Examples
+    --------
+    >>> import macs, problems
+    >>> len(macs.sweep(problems.load("goddard"), points=3, starts=1))
+    3
     """
     check_count("points", points, 2)
     if method not in METHODS:

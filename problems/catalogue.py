@@ -59,17 +59,47 @@ LARGEST = 2**24
 
 
 def names() -> tuple[str, ...]:
-    """The names of the cases that come with the project."""
+    """The names of the cases that come with the project.
+
+    Examples
+    --------
+    >>> from problems import names
+    >>> "goddard" in names()
+    True
+    """
     return tuple(CASES)
 
 
 def describe(name: str) -> str:
-    """One line on a case of the catalogue."""
+    """One line on a case of the catalogue.
+
+    Parameters
+    ----------
+    name : str
+        One of `names()`.
+
+    Examples
+    --------
+    >>> from problems import describe
+    >>> describe("goddard")
+    'ascent from a flat airless body: time against horizontal speed'
+    """
     return CASES[name][1]
 
 
 def is_catalogued(address: str) -> bool:
-    """True for a name of the catalogue and for the address of one of its cases: then `load` runs no code but the project's own."""
+    """True for a name of the catalogue and for the address of one of its cases: then `load` runs no code but the project's own.
+
+    Parameters
+    ----------
+    address : str
+
+    Examples
+    --------
+    >>> from problems import is_catalogued
+    >>> is_catalogued("goddard"), is_catalogued("my_problem.py:build")
+    (True, False)
+    """
     return address in CASES or any(address == own for own, _ in CASES.values())
 
 
@@ -95,6 +125,12 @@ def load(name: str, **data: Any) -> Any:
     ------
     ValueError
         There is no such case, file, module or function, or it is none that makes a Problem.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> load("goddard")
+    Problem('goddard', ...)
     """
     address = CASES[name][0] if name in CASES else name
     place, _, function_name = address.rpartition(":")

@@ -26,6 +26,21 @@ class Variable:
 
     `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
     quantity of which `bounds` are exactly one period.
+
+    Parameters
+    ----------
+    name : str
+    lower, upper : float
+    unit : str
+    scale : float
+    period : float, optional
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> problem = load("goddard").compile()
+    >>> problem.phases[0].controls[0].name
+    'u'
     """
 
     name: str
@@ -49,7 +64,21 @@ class Variable:
 
 @dataclass(frozen=True)
 class Limit:
-    """One named row `lower <= expression <= upper`; an equality where both are the same. Infinite where there is no limit."""
+    """One named row `lower <= expression <= upper`; an equality where both are the same. Infinite where there is no limit.
+
+    Parameters
+    ----------
+    name : str
+    lower, upper : float
+    scale : float
+        What counts as one in residuals.
+
+    Examples
+    --------
+    >>> from problems import Limit
+    >>> Limit("speed", 0.0, 5.0).upper
+    5.0
+    """
 
     name: str
     lower: float
@@ -67,7 +96,22 @@ def verified_scale(limit: Variable | Limit) -> float:
 
 @dataclass(frozen=True)
 class Objective:
-    """A named objective as the user stated it; the compiled function returns `sign` times its value, which is always minimised."""
+    """A named objective as the user stated it; the compiled function returns `sign` times its value, which is always minimised.
+
+    Parameters
+    ----------
+    name, unit : str
+    sense : "minimize" or "maximize"
+    scale : float, optional
+        The difference that counts as one.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> problem = load("goddard").compile()
+    >>> problem.goals[1].sense
+    'maximize'
+    """
 
     name: str
     unit: str = ""
@@ -81,7 +125,19 @@ class Objective:
 
 @dataclass(frozen=True)
 class Link:
-    """`tf` and the final `states` of phase `first` are `t0` and the initial states of phase `second` (indices of phases)."""
+    """`tf` and the final `states` of phase `first` are `t0` and the initial states of phase `second` (indices of phases).
+
+    Parameters
+    ----------
+    first, second : int
+    states : tuple of str
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> load("standard/delta_iii").compile().links[0].first
+    0
+    """
 
     first: int
     second: int
@@ -107,10 +163,24 @@ def in_time(count: int, links: Sequence[Link]) -> list[int]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompiledPhase(Deriving):
-    """One phase.
+    """One phase as plain data and Functions.
 
     Every Function takes `(x, u, t, s)`: states (nx), controls (nu), time, and `s = [t0, tf, *parameters]`. `dynamics` returns the rates
     (nx) per `time_unit`; `paths`, `initials`, `finals`, `integrands`, `peaks` return columns, one row for each expression of that kind.
+
+    Attributes
+    ----------
+    name, time_unit : str
+    t0, tf : Variable
+    states, controls : tuple of Variable
+    paths : tuple of Limit
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> problem = load("goddard").compile()
+    >>> problem.phases[0].name, len(problem.phases[0].states)
+    ('ascent', 4)
     """
 
     name: str
@@ -154,6 +224,22 @@ class CompiledProblem(Deriving):
     """A whole problem. `objectives` and `constraints` take `(q of phase 1, ..., q of phase n, parameters)`.
 
     `objectives` returns the column that is minimised (m); `constraints` the column that `limits` bounds.
+
+    Attributes
+    ----------
+    name : str
+    phases : tuple of CompiledPhase
+    parameters : tuple of Variable
+    goals : tuple of Objective
+    limits : tuple of Limit
+    links : tuple of Link
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> problem = load("goddard").compile()
+    >>> [goal.name for goal in problem.goals]
+    ['flight time', 'horizontal speed']
     """
 
     name: str

@@ -31,6 +31,15 @@ class Phase:
     name : str
     time, t0, tf : MX
         Time, and the times at which the phase begins and ends: always symbols, usable in any expression of the phase.
+
+    Examples
+    --------
+    >>> from problems import Problem
+    >>> glide = Problem("coast").phase("glide", t0=0.0, tf=(1.0, 2.0))
+    >>> x = glide.state("x", bounds=(0, 10), initial=0, unit="m")
+    >>> glide.dynamics(x=1.0)
+    >>> glide
+    Phase('glide', states=[x], controls=[])
     """
 
     def __init__(

@@ -25,8 +25,8 @@ class Problem:
 
     Every mistake that can be seen at once raises a ValueError that names it; the rest is found by `compile`, before any work.
 
-    Tables are `casadi.interpolant`s. One of splines ("bspline") is 0 outside its grid, without a word, and a solver may try whatever the
-    bounds of the states allow, or a little more between the nodes: its grid has to be wider than that, as in `standard/climb`.
+    Tables are made by `casadi.interpolant`. One of splines ("bspline") is 0 outside its grid, without a word, and a solver may try whatever
+    the bounds of the states allow, or a little more between the nodes: its grid has to be wider than that, as in `standard/climb`.
 
     Attributes
     ----------
@@ -37,6 +37,7 @@ class Problem:
 
     Examples
     --------
+    >>> from problems import Problem
     >>> problem = Problem("coast")
     >>> phase = problem.phase("glide", t0=0.0, tf=(1.0, 2.0))
     >>> x = phase.state("x", bounds=(0, 10), initial=0)

@@ -63,6 +63,12 @@ class CompiledVectorProblem:
     limit_units : tuple of c str
     address, data
         As of `CompiledProblem`.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> [variable.name for variable in load("four_bar_truss").compile().variables]
+    ['area 1', 'area 2', 'area 3', 'area 4']
     """
 
     name: str

@@ -37,6 +37,7 @@ class VectorProblem:
 
     Examples
     --------
+    >>> from problems import VectorProblem
     >>> problem = VectorProblem("Schaffer")
     >>> problem.variable("x", bounds=(-10, 10), unit="m")
     >>> problem.minimize("near", unit="m2")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.fronts.verified import VERIFY
+from macs.io.html import html_block, html_table
 from problems.checks import short_repr
 from transcription import Smooth
 
@@ -63,7 +64,7 @@ class Study:
         One or several, for all problems; {label: one}; or {label of a problem: one or several}, if its keys are the problems' labels.
         Default: the problem's own.
     solvers : names, Solvers, or mapping
-        One or several names, such as "macs", or `Solver`s; or {label: one of them}, or {label: {"solver": name, settings...}}.
+        One or several names, such as "macs", or solvers; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
         {label of a solver: terms of its own}: any of transcription (one, or {label of a problem: one}), evaluations, inner and start.
         Reports compare it with the others on each of their transcriptions.
@@ -112,6 +113,13 @@ class Study:
     ------
     ValueError
         A value is wrong; the message names it, before any work.
+
+    Examples
+    --------
+    >>> from runs import Study
+    >>> study = Study("mine", problems="four_bar_truss", solvers=["macs", "nsga2"], evaluations=500, runs=2, seed=1)
+    >>> len(study.cells)
+    2
     """
 
     name: str = field(metadata=_key(Text, decides=True))
@@ -144,6 +152,13 @@ class Study:
 
     def __repr__(self) -> str:
         return short_repr(self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a row for each cell."""
+        rows = [[*cell.labels, "auto" if cell.evaluations is None else f"{cell.evaluations}", str(self.runs)] for cell in self.cells]
+        heads = ["problem", "transcription", "solver", "evaluations of a run", "runs"]
+        table = html_table([heads], rows, [True, True, True, False, False])
+        return html_block(f"study {self.name}", table, [self.description] if self.description else [])
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():

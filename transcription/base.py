@@ -43,6 +43,12 @@ class Transcription(ABC):
         How it is written there, for messages.
     registered : dict
         The methods that have a word, by name of the class.
+
+    Examples
+    --------
+    >>> from transcription import DFET, Transcription
+    >>> isinstance(DFET(4, 6), Transcription)
+    True
     """
 
     word: ClassVar[str | tuple[str, ...]] = ""
@@ -182,6 +188,14 @@ class NLP(Deriving):
         derivatives are sparse.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> nlp = DFET(4, 6).transcribe(load("goddard"))
+    >>> len(nlp.free)  # what a search may alter: 28 coefficients of the control, and tf
+    29
     """
 
     problem: CompiledProblem

@@ -9,7 +9,19 @@ from .base import Transcription
 
 
 def parse(text: str) -> Transcription:
-    """A transcription from one word, as on the command line. Raises ValueError that shows how it is written."""
+    """A transcription from one word, as on the command line. Raises ValueError that shows how it is written.
+
+    Parameters
+    ----------
+    text : str
+        Such as "dfet:4x6".
+
+    Examples
+    --------
+    >>> from transcription import DFET, parse
+    >>> parse("dfet:4x6") == DFET(4, 6)
+    True
+    """
     name, mesh, *options = (*text.split(":"), "")[: max(2, text.count(":") + 1)]
     method = next((one for one in Transcription.registered.values() if name.lower() in one.words()), None)
     numbers = mesh.split("x")
@@ -24,12 +36,34 @@ def parse(text: str) -> Transcription:
 
 
 def stated(given: str | Mapping[str, Any]) -> Transcription:
-    """A transcription as a case or a study file states it: in one word, or as a table that `from_dict` takes."""
+    """A transcription as a case or a study file states it: in one word, or as a table that `from_dict` takes.
+
+    Parameters
+    ----------
+    given : str or mapping
+
+    Examples
+    --------
+    >>> from transcription import DFET, stated
+    >>> stated("dfet:4x6") == DFET(4, 6)
+    True
+    """
     return parse(given) if isinstance(given, str) else from_dict(given)
 
 
 def word(method: Transcription) -> str | None:
-    """A transcription in one word, such that `parse` gives it again; None if it has no such word."""
+    """A transcription in one word, such that `parse` gives it again; None if it has no such word.
+
+    Parameters
+    ----------
+    method : Transcription
+
+    Examples
+    --------
+    >>> from transcription import DFET, word
+    >>> word(DFET(4, 6))
+    'dfet:4x6'
+    """
     if type(method).__name__ not in Transcription.registered:
         return None
     text = method.to_word()
@@ -37,7 +71,18 @@ def word(method: Transcription) -> str | None:
 
 
 def from_dict(data: Mapping[str, Any]) -> Transcription:
-    """A transcription from what `Transcription.to_dict` gave. Raises ValueError if there is no such method or setting."""
+    """A transcription from what `Transcription.to_dict` gave. Raises ValueError if there is no such method or setting.
+
+    Parameters
+    ----------
+    data : mapping
+
+    Examples
+    --------
+    >>> from transcription import DFET, from_dict
+    >>> from_dict(DFET(4, 6).to_dict()) == DFET(4, 6)
+    True
+    """
     method = data.get("method")
     if method not in Transcription.registered:
         raise ValueError(f"unknown transcription {method!r}; there are {', '.join(Transcription.registered)}")

@@ -34,6 +34,12 @@ class Meshed(Transcription):
     orders_controls, moves_edges : bool
         Whether the method uses the `control_order` of a mesh, and its `moving` edges and `constant` controls; what it does not use is
         refused.
+
+    Examples
+    --------
+    >>> from transcription import DFET, Meshed, SingleShooting
+    >>> isinstance(DFET(4, 6), Meshed), isinstance(SingleShooting(40), Meshed)
+    (True, False)
     """
 
     elements: int

@@ -46,6 +46,14 @@ class Smooth:
     ------
     ValueError
         Where a setting is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from problems import load
+    >>> from transcription import SingleShooting, Smooth
+    >>> Smooth(spread=0.1).draw(load("goddard"), SingleShooting(40), 3, np.random.default_rng(1)).shape[0]
+    3
     """
 
     spread: float = 0.2

@@ -40,6 +40,15 @@ class AGEMOEA2(Ranked):
     ------
     ValueError
         If a setting is outside its range, numba is not installed, or there is a single objective.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import AGEMOEA2
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = AGEMOEA2(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int = 100

@@ -58,6 +58,15 @@ class CTAEA(Directed):
     ------
     ValueError
         If a setting is outside its range or, once the number of objectives is known, if population and divisions do not match.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import CTAEA
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = CTAEA(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int | None = None

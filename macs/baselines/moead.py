@@ -63,6 +63,15 @@ class MOEAD(Directed):
     ------
     ValueError
         If a setting is outside its range or, once the number of objectives is known, if population and divisions do not match.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import MOEAD
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = MOEAD(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int | None = None

@@ -96,6 +96,15 @@ class MOPSO(PopulationSolver):
     ------
     ValueError
         If a setting is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import MOPSO
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = MOPSO(particles=20, archive=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     particles: int = 100

@@ -37,6 +37,15 @@ class NSGA2(Ranked):
     ------
     ValueError
         If a setting is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import NSGA2
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = NSGA2(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int = 100

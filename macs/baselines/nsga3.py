@@ -61,6 +61,15 @@ class NSGA3(Directed):
     ------
     ValueError
         If a setting is outside its range or, once the number of objectives is known, if population and directions do not match.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import NSGA3
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = NSGA3(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int | None = None

@@ -74,6 +74,15 @@ class RVEA(Directed):
     ------
     ValueError
         If a setting is outside its range or, once the number of objectives is known, if population and vectors do not match.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import RVEA
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = RVEA(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int | None = None

@@ -37,6 +37,15 @@ class SMSEMOA(Baseline):
     ------
     ValueError
         If a setting is outside its range, or there is a single objective.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import SMSEMOA
+    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
+    >>> front = SMSEMOA(population=10).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
+    >>> front.objectives.shape[1]
+    2
     """
 
     population: int = 100

@@ -23,10 +23,11 @@ from ..preferences import (
 )
 from .choice import Choice, Step
 from .decide import decide
-from .dialogue import Dialogue, Turn
+from .dialogue import Dialogue
 from .front_rates import front_rates, plot_rates
 from .satisfy import satisfy
 from .trade_offs import TradeOffs, trade_offs
+from .turn import Turn
 
 __all__ = [
     "Around",

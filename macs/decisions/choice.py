@@ -12,6 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
+from ..io.html import html_block, html_table
 from ..io.text import text_table
 from ..preferences import Preference, Ranges
 from ..preferences.ranges import confidence
@@ -37,6 +38,17 @@ class Step:
         Further numbers by name, such as lambda and kappa.
     message : str
         What is to be known of the step.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint, decide
+    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> len(choice.history) > 0
+    True
     """
 
     name: str
@@ -69,6 +81,17 @@ class Choice:
         What is to be known of the choice; usually empty.
     stopped : str
         What ended the work before its end: Ctrl-C or a time limit; usually empty.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint, decide
+    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> sorted(choice.objectives)
+    ['flight time', 'horizontal speed']
     """
 
     point: Point
@@ -110,6 +133,12 @@ class Choice:
 
     def __repr__(self) -> str:
         return f"<Choice by {self.preference!r}: {self.point.title}; value {self.value:.6g}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: each objective with its degree, and the point."""
+        degrees = [[name, degree_text(degree)] for name, degree in self.degrees.items()]
+        table = html_table([["objective", "degree"]], degrees, [True, False])
+        return html_block(repr(self.preference), table, [self.message] if self.message else []) + self.point._repr_html_()
 
     def table(self) -> str:
         """The choice as plain text: each objective with its range and its degree, the steps, and the message."""

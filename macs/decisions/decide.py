@@ -70,6 +70,17 @@ def decide(
     ValueError
         For a black box, which has no derivatives; a preference with unknown names or targets beyond the ranges; points of another problem;
         peaks that would have to be raised; and as `optimize`.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint, decide
+    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> print(choice.point.verified)
+    True
     """
     if preference is None and isinstance(transcription, Preference):
         transcription, preference = None, transcription

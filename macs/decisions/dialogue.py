@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -32,6 +32,7 @@ from .choice import Choice, degree_text
 from .decide import decide
 from .dialogue_file import FORMAT, VERSION, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write
 from .improving import around, improved, neutral
+from .turn import Turn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,28 +45,6 @@ DISTINCT = 1e-3
 """Part of a range by which alternatives differ."""
 ONLY_RANKED = "only points that are known were ranked, since there is no problem to solve"
 BLACK_BOX = "only points that are known were ranked, since a black box has no derivatives"
-
-
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """One turn of a dialogue.
-
-    Attributes
-    ----------
-    asked : str
-        What the person asked for, in words.
-    preference : Preference
-        What it means.
-    choice : Choice or None
-        What was chosen by it; None: nothing yet.
-    alternatives : tuple of Choice
-        Others about it.
-    """
-
-    asked: str
-    preference: Preference
-    choice: Choice | None = None
-    alternatives: tuple[Choice, ...] = ()
 
 
 class Dialogue:
@@ -96,6 +75,21 @@ class Dialogue:
     ------
     ValueError
         For a front without feasible points, and a problem that is not that of the front.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Dialogue, ReferencePoint
+    >>> dialogue = Dialogue(front)  # without the problem, points are ranked
+    >>> choice = dialogue.prefer(ReferencePoint({"flight time": 180.0}))
+    >>> choice = dialogue.choose()
+    >>> choice = dialogue.improve("horizontal speed")
+    >>> dialogue.save("dialogue.json")
+    >>> len(Dialogue.load("dialogue.json").history) == len(dialogue.history)
+    True
     """
 
     def __init__(

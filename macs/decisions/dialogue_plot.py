@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, label, new_figure
+from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, new_figure
 from ..preferences import Preference, Ranges
 from ..preferences.pictures.degree_plot import draw_degrees
 from .choice import Choice
@@ -89,6 +89,6 @@ def _draw_values(ax: Any, goal: Objective, ranges: Ranges, values: np.ndarray, c
     ax.set_xlim(0.6, len(values) + 0.4)
     ax.set_xticks(turns, [str(turn) for turn in turns] if last else [""] * len(turns))
     ax.margins(y=0.12)
-    ax.set_title(f"{label(goal.name, goal.unit)}, {goal.sense[:3]}", loc="left", color=color)
+    ax.set_title(f"{axis_label(goal.name, goal.unit)}, {goal.sense[:3]}", loc="left", color=color)
     if last:
         ax.set_xlabel("turn")

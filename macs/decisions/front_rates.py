@@ -16,7 +16,23 @@ if TYPE_CHECKING:
 
 def front_rates(front: Points) -> np.ndarray:
     """dJ_i/dJ_j (n, m, m) at all points of a front, the other objectives held, in the user's units and senses; see `TradeOffs.rate`. Not
-    numbers at points without `weights`."""
+    numbers at points without `weights`.
+
+    Parameters
+    ----------
+    front : Front
+        Points with their `weights`.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import front_rates
+    >>> front_rates(front).shape
+    (3, 2, 2)
+    """
     m = len(front.goals)
     weights = [np.full(m, np.nan) if point.weights is None else np.array(list(point.weights.values())) for point in front]
     ranges = np.nan_to_num(np.ptp(front.F, axis=0)) if len(front) else np.zeros(m)
@@ -38,6 +54,17 @@ def plot_rates(front: Points, figure: object = None) -> Sequence[Axes]:
     ------
     ValueError
         If there is only one objective, or no point has weights.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import plot_rates
+    >>> axes = plot_rates(front)
+    >>> len(axes) > 0
+    True
     """
     from .trade_off_plots import draw_rates
 

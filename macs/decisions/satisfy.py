@@ -66,6 +66,18 @@ def satisfy(
     ------
     ValueError
         As `decide`; and if the preference is another one.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzySatisfactory, satisfy
+    >>> goals = FuzzySatisfactory({}, priorities=["horizontal speed", "flight time"])
+    >>> choice = satisfy(load("goddard"), DFET(6, 6, basis="bernstein"), goals, start=front, starts=1)
+    >>> choice.degrees["horizontal speed"] > 0
+    True
     """
     if preference is None and isinstance(transcription, FuzzySatisfactory):
         transcription, preference = None, transcription

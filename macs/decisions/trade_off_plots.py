@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, better, label, new_figure
+from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, label, new_figure, title_and_legend
 from ..fronts.points import Points
 
 DASH = 0.05
@@ -65,7 +65,7 @@ def _two(front: Points, rates: np.ndarray, figure: Any) -> Sequence[Any]:
             below.plot(x[beyond], sizes[beyond], marker, color=COLORS[1], ms=4.5, mfc="none", label="beyond" if marker == "^" else "")
     below.set_ylabel(_rate_label(goals[1], goals[0]))
     below.set_xlabel(better(goals[0]))
-    below.legend(frameon=False)
+    title_and_legend(below, "")
     above.set_title(f"{_title(front)}; dashes: slopes at the points", loc="left", color=GREY)
     return [above, below]
 
@@ -150,7 +150,7 @@ def _round(value: float) -> float:
 
 def _rate_label(of: Objective, by: Objective) -> str:
     units = f"{of.unit or '1'} per {by.unit or '1'}" if of.unit or by.unit else ""
-    return label(f"rate of {of.name}\nby {by.name}", units)
+    return axis_label(f"rate of {of.name}\nby {by.name}", units)
 
 
 def _title(front: Points) -> str:

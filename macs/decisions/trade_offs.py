@@ -61,6 +61,16 @@ def trade_offs(point: Point, *, problem: Problem | CompiledProblem | None = None
     ------
     ValueError
         If the point has neither weights nor a trajectory, as those of black boxes, or `problem` is another one.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import trade_offs
+    >>> trade_offs(front[1]).rate("horizontal speed", "flight time") > 0  # km/s for a second more
+    True
     """
     if point.source is None:
         raise ValueError(f"point {point.index} is of a black box: without derivatives there are no trade-offs")
@@ -83,6 +93,17 @@ class TradeOffs:
     point : Point
     problem : CompiledProblem or None
         None: the one that the front of the point knows, or finds.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import trade_offs
+    >>> found = trade_offs(front[1])
+    >>> found.rate("flight time", "horizontal speed") > 0
+    True
     """
 
     point: Point

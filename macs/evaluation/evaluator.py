@@ -46,6 +46,14 @@ class Evaluation:
         What the evaluation took; see `Counts`.
     itemise : callable, optional
         Function that returns `violations`; called only when they are needed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from macs import Evaluation
+    >>> one = Evaluation(Z=np.zeros((1, 2)), F=np.ones((1, 2)), violation=np.zeros(1), status=np.array(["converged"]))
+    >>> one.F.shape
+    (1, 2)
     """
 
     Z: np.ndarray
@@ -151,6 +159,13 @@ class Evaluator(ABC):
     counts : Counts
     before_batch : callable
         Function without arguments that is called before each batch; it ends the search by raising an exception.
+
+    Examples
+    --------
+    >>> from macs import MACS, Evaluator
+    >>> from macs.evaluation.blackbox import BlackBox
+    >>> issubclass(BlackBox, Evaluator)
+    True
     """
 
     free: np.ndarray

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,9 +10,21 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..evaluation.evaluator import CONVERGED
 from ..io.atomic import write_whole
-from .pictures.style import COLORS, GREY, STYLE, better, blank_figure, label, new_figure, wrapped
+from .pictures.kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
+from .pictures.style import (
+    COLORS,
+    GREY,
+    STYLE,
+    axis_label,
+    axis_number,
+    better,
+    blank_figure,
+    new_figure,
+    rendered,
+    title_and_legend,
+    wrapped,
+)
 from .points import Points
 
 if TYPE_CHECKING:
@@ -22,25 +33,25 @@ if TYPE_CHECKING:
     from .points import Points
 
 
-NOT_VERIFIED, NOT_FEASIBLE = "not verified", "not feasible"
-"""Words of the legend."""
-
-
 def save_picture(what: Any, path: str | PathLike[str]) -> None:
     """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
-    figure = blank_figure()
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if isinstance(what, Points):
-            figure.set_size_inches(*_size(what))
-            draw_front(what, figure.add_subplot())
+            figure = front_figure(what)
         else:
+            figure = blank_figure()
             what.plot(figure=figure)
-    suffix = Path(path).suffix.lstrip(".").lower()
-    picture = io.BytesIO()
-    figure.savefig(picture, format=suffix, dpi=200)
-    write_whole(path, picture.getvalue())
+    write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
+
+
+def front_figure(front: Points) -> Any:
+    """A figure without a window of a front."""
+    figure = blank_figure()
+    figure.set_size_inches(*_size(front))
+    draw_front(front, figure.add_subplot())
+    return figure
 
 
 def _size(front: Points) -> tuple[float, float]:
@@ -69,7 +80,7 @@ def draw_front(front: Points, ax: Axes | None = None) -> Axes:
             _parallel(front, ax)
         else:
             _scatter(front, ax)
-        ax.set_title(_title(front), loc="left", color=GREY)
+        title_and_legend(ax, _title(front))
     return ax
 
 
@@ -80,22 +91,20 @@ def _title(front: Points) -> str:
     return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
 
 
-def _kinds(front: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masks (n,) of the points that are drawn in full, of those that were simulated and are not verified, and of those not feasible."""
-    feasible = front.status == CONVERGED
-    apart = feasible & front.was_simulated & ~front.verified
-    return feasible & ~apart, apart, ~feasible
-
-
 def _scatter(front: Points, ax: Any) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     if not len(front):
         words = wrapped(front.message, 0.8 * ax.bbox.width / ax.figure.dpi)
         ax.text(0.5, 0.9, words, transform=ax.transAxes, ha="center", va="top", color=GREY)
         front = front if front.closest is None else front.closest.alone()
-    values, (good, apart, infeasible) = front.objectives, _kinds(front)
+    values, (good, apart, infeasible) = front.objectives, kinds(front)
     if values.shape[1] == 1:
         values = np.column_stack([np.arange(len(values)), values])
     goals = front.goals if len(front.goals) > 1 else (Objective("point"), *front.goals)
+    if len(front.goals) == 1:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        ax.set_xlim(-0.5, max(len(values), 1) - 0.5)
     third = values.shape[1] == 3 and ax.name != "3d"
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
@@ -103,7 +112,6 @@ def _scatter(front: Points, ax: Any) -> None:
     for rows, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
         if rows.any():
             ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
-            ax.legend(frameon=False)
     if third and good.any():
         ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
@@ -113,15 +121,14 @@ def _scatter(front: Points, ax: Any) -> None:
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:
-    """Mark the best point of each of two objectives, with a legend."""
-    F = np.where(_kinds(front)[0][:, None], front.F, np.inf)
+    """Mark the best point of each of two objectives; the legend has its value."""
+    F = np.where(kinds(front)[0][:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
         text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {goal.unit}' if goal.unit else ''} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
-    ax.legend(frameon=True, framealpha=0.85, edgecolor="none", loc="best")
 
 
 def _parallel(front: Points, ax: Any) -> None:
@@ -129,7 +136,7 @@ def _parallel(front: Points, ax: Any) -> None:
     feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
     import matplotlib
 
-    F, values, (good, apart, infeasible) = front.F, front.objectives, _kinds(front)
+    F, values, (good, apart, infeasible) = front.F, front.objectives, kinds(front)
     finite = np.where(np.isfinite(F) & (good | (not good.any()))[:, None], F, np.nan)
     if len(front) and not np.isnan(finite).all():
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
@@ -142,18 +149,16 @@ def _parallel(front: Points, ax: Any) -> None:
     for rows, name, look in ((apart, NOT_VERIFIED, "--"), (infeasible, NOT_FEASIBLE, ":")):
         for k, row in enumerate(height[rows]):
             ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
-    if apart.any() or infeasible.any():
-        ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     signs = np.array([goal.sign for goal in front.goals])
     for k in range(values.shape[1]):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
         for level, value in ((1.015, best[k] * signs[k]), (-0.015, worst[k] * signs[k])):
-            ax.text(k, level, f"{value + 0.0:.4g}", ha="center", va="bottom" if level > 0.5 else "top", fontsize=8)
+            ax.text(k, level, axis_number(value), ha="center", va="bottom" if level > 0.5 else "top", fontsize=8)
     ax.grid(False)
     ax.set_xlim(-0.3, len(front.goals) - 0.7)
     ax.set_ylim(-0.12, 1.12)
     room = ax.bbox.width / ax.figure.dpi / len(front.goals)
-    names = [f"{wrapped(label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in front.goals]
+    names = [f"{wrapped(axis_label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in front.goals]
     ax.set_xticks(range(len(front.goals)), names)
     ax.set_yticks([0, 1], ["worst", "best"])
     ax.tick_params(length=0)

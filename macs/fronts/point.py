@@ -12,14 +12,32 @@ from transcription.trajectories.costates import Costates
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
 from ..evaluation.reevaluated import Reevaluation, reevaluation
 from .columns import number
 from .provenance import Source
 
 
 class Point:
-    """One point of a front: a trajectory, or one row of variables of a vector problem or black box. It refers to the data of its front."""
+    """One point of a front: a trajectory, or one row of variables of a vector problem or black box. It refers to the data of its front.
+
+    Attributes
+    ----------
+    objectives : dict
+        By name, in the user's units and senses.
+    trajectory : Trajectory or None
+    verified : bool or None
+        Whether a simulation agrees with it; None: not simulated.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> point = front[2]
+    >>> print(round(point.objectives["flight time"], 3), point.status, point.verified)
+    250.0 converged True
+    """
 
     __slots__ = ("_points", "index")
 
@@ -126,6 +144,11 @@ class Point:
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
     @property
+    def dynamic(self) -> bool:
+        """Whether it is of a problem with trajectories."""
+        return bool(self._points.dynamic)
+
+    @property
     def trajectory(self) -> Trajectory | None:
         """The trajectory; None for a black box."""
         return self._points.trajectories[self.index]
@@ -201,23 +224,33 @@ class Point:
 
     def plot(self, figure: Any = None) -> np.ndarray:
         """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
-        there are any. Without dynamics, axes with each variable along its front, and this point in it."""
+        there are any. Without dynamics, axes with each variable along its front, and this point in it.
+
+        The title says whether a point is not verified or not feasible; then the nodes of its trajectory are hollow.
+        """
         from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
+        from .pictures.kinds import remark
 
+        said = remark(self)
+        title = f"{self.title}; {said}" if said else self.title
         if not self._points.dynamic:
-            front = self._points
-            feasible = front.status == CONVERGED
-            return draw_designs(front.decision, front.variables, front.objectives, front.goals, feasible, self.title, figure, [self.index])
+            return draw_designs(self._points, title, figure, [self.index])
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
-        return draw_flight(self.trajectory, self.title, figure, self.costates)
+        return draw_flight(self.trajectory, title, figure, self.costates, hollow=bool(said))
 
     @property
     def title(self) -> str:
         """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
         named = zip(self.goals, self.objectives.values(), strict=True)
         return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a table of the objectives and a small picture."""
+        from .pictures.notebook import point_html
+
+        return point_html(self)
 
     def __repr__(self) -> str:
         return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.html import html_block, html_table
 from ..io.text import call, counted, duration, numbers, text_table
 from .verified import AGAIN, MISSES, objective_scales
 
@@ -30,6 +32,47 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
             raise ValueError(f"column '{header}' has {len(values)} entries, the front has {len(front)} points")
     if not len(front):
         return "\n".join([headline(front), "", *_nothing(front)])
+    table = _table(front, columns or {})
+    lines = text_table(table.headers, table.rows, table.left).split("\n")
+    if table.apart:
+        lines.insert(len(lines) - table.apart, f"\n{_said_apart(front)}")
+    return "\n".join([headline(front), "", *lines, "", *footer(front)]).rstrip()
+
+
+MOST = 30
+"""Most rows of a front in a notebook."""
+
+
+def front_html(front: Points, picture: bytes) -> str:
+    """HTML of a front for notebooks: headline, table, remarks and a picture of it, a PNG."""
+    what = f"front: {headline(front)}"
+    if not len(front):
+        return html_block(headline(front), "", _nothing(front)[:1], picture, what)
+    table = _table(front, {})
+    dim = range(len(front) - table.apart, len(front))
+    shown = html_table(table.headers, table.rows[:MOST], table.left, dim)
+    notes = [f"{counted(len(front) - MOST, 'more point')}: front.table()"] if len(front) > MOST else []
+    notes += [f"Grey: {_said_apart(front)}"] if table.apart else []
+    return html_block(headline(front), shown, [*notes, *footer(front)], picture, what)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Cells of the table of a front; the last `apart` rows are of points that are not verified."""
+
+    headers: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[str]]
+    left: Sequence[bool]
+    apart: int
+
+
+def _said_apart(front: Points) -> str:
+    again = AGAIN if _is_vector(front) else MISSES
+    return f"Not verified: {again}these differ by more than {front.stats['verify']:g}."
+
+
+def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
+    """The cells, a row for each point, with further columns."""
     simulated = front.was_simulated
     titles, units, cells, left = ["#"], [""], [[str(i) for i in range(len(front))]], [False]
 
@@ -51,7 +94,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
             add("defect", how, _small(front.defect))
         add("violation", how, _small(front.simulated_violation))
         add("objectives", "off by", _small(off.max(axis=1)))
-    for header, values in (columns or {}).items():
+    for header, values in columns.items():
         add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
     certified = [point.optimality for point in front]
     if any(value is not None for value in certified):
@@ -64,11 +107,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     apart = np.flatnonzero(simulated & ~front.verified)
     order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
     rows = list(zip(*cells, strict=True))
-    lines = text_table([titles, units], [rows[i] for i in order], left).split("\n")
-    if len(apart) > 0:
-        again = AGAIN if _is_vector(front) else MISSES
-        lines.insert(len(lines) - len(apart), f"\nNot verified: {again}these differ by more than {front.stats['verify']:g}.")
-    return "\n".join([headline(front), "", *lines, "", *_footer(front)]).rstrip()
+    return _Table([titles, units], [rows[i] for i in order], left, len(apart))
 
 
 def _is_vector(front: Points) -> bool:
@@ -135,7 +174,8 @@ FEW = 5
 """Number of points whose misses are given in words."""
 
 
-def _footer(front: Points) -> list[str]:
+def footer(front: Points) -> list[str]:
+    """Lines below the table of a front with points: how many are verified, notes and warnings."""
     lines = _simulated(front) if front.was_simulated.all() else _between_nodes(front) if front.dynamic else []
     bad = int((front.status != CONVERGED).sum())
     if bad:

@@ -44,6 +44,17 @@ def to_dict(preference: Preference) -> dict[str, Any]:
     ------
     ValueError
         For a preference of a class of the user's own.
+
+    Parameters
+    ----------
+    preference : Preference
+
+    Examples
+    --------
+    >>> from macs.decisions import WeightedSum, from_dict, to_dict
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
+    >>> to_dict(wish)["method"], from_dict(to_dict(wish)) == wish
+    ('WeightedSum', True)
     """
     name = type(preference).__name__
     if METHODS.get(name) is not type(preference):
@@ -58,6 +69,18 @@ def from_dict(data: Any) -> Preference:
     ------
     ValueError
         In one line, for an unknown method, class or setting, one that is missing, and values that the class refuses.
+
+    Parameters
+    ----------
+    data : dict
+        With "method" and "settings".
+
+    Examples
+    --------
+    >>> from macs.decisions import WeightedSum, from_dict, to_dict
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
+    >>> to_dict(wish)["method"], from_dict(to_dict(wish)) == wish
+    ('WeightedSum', True)
     """
     _check_keys(data, ("method", "settings"), "a preference")
     method = data.get("method")

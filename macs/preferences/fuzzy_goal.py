@@ -36,6 +36,17 @@ class FuzzyGoal(Preference):
         By name, in the objective's unit: how far from the target the membership is 0. Default: at the worst value of the range.
     aggregate : "min" or "sum"
         Whether the least membership is maximised (Zimmermann) or their sum (Tiwari and others).
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzyGoal
+    >>> wish = FuzzyGoal({"flight time": 150.0, "horizontal speed": 0.7})
+    >>> print(wish.rank(front).order)  # best first
+    [1 0 2]
     """
 
     targets: Mapping[str, Target]

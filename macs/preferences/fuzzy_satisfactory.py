@@ -43,6 +43,17 @@ class FuzzySatisfactory(Preference):
         Weight of kappa, at least 0.
     ordered : bool
         Whether the order is a hard limit, kappa <= 0.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzySatisfactory
+    >>> wish = FuzzySatisfactory({}, priorities=["horizontal speed", "flight time"])
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
     """
 
     targets: Mapping[str, Target]

@@ -36,6 +36,17 @@ class GoalProgramming(Preference):
         By name of those that have targets, not negative. One that is not named has weight 1.
     priorities : sequence, optional
         Names of those that have targets, most important first; a tuple of names is one level.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import GoalProgramming
+    >>> wish = GoalProgramming({"flight time": 150.0, "horizontal speed": 0.7})
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
     """
 
     targets: Mapping[str, Target]

@@ -50,6 +50,17 @@ class Nimbus(Preference):
         Whether the values of `to` are enough. By default better ones still count. If they are enough, the largest excess over them is
         minimised, at least 0; where all are reached, the largest loss of the others is minimised, counted from their current values.
         `improve` has to be empty.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Nimbus
+    >>> wish = Nimbus(front[1], improve=["horizontal speed"], until={"flight time": 200.0})
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
     """
 
     current: Mapping[str, float]

@@ -26,6 +26,22 @@ class Preference(ABC):
 
     The same formulas rank points that exist (`rank`) and are minimised on the problem itself (`macs.decisions.decide`): they are applied to
     numbers and to symbols of CasADi alike.
+
+    Parameters
+    ----------
+    **settings
+        Those of each class.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Preference, WeightedSum
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
+    >>> print(isinstance(wish, Preference), len(wish.rank(front).order))
+    True 3
     """
 
     DEGREE: ClassVar[str] = "degree"

@@ -45,6 +45,17 @@ class Ranking:
     message : str
         What is to be known about the best point: that it exceeds hard limits, as all points do; that no simulation confirms it, and by how
         much confirmed points exceed the hard limits, if there are any.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import WeightedSum
+    >>> ranking = WeightedSum({"flight time": 1, "horizontal speed": 0}).rank(front)
+    >>> print(ranking.order[0])
+    0
     """
 
     front: Points

@@ -37,6 +37,17 @@ class ReferencePoint(Preference):
         aspiration.
     augmentation : float
         Above 0, the point is properly Pareto-optimal: no trade-off is beyond 1 / augmentation, in units of a_i.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint
+    >>> wish = ReferencePoint({"flight time": 150.0})
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
     """
 
     aspiration: Mapping[str, float]

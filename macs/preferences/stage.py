@@ -50,6 +50,17 @@ class Stage:
     after_zero : bool
         Whether the stage follows only if the value of the stage before is zero. Then every target is met and many points are equally good;
         the stage chooses among them.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Ranges, WeightedSum
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 1})
+    >>> len(wish.stages(front.goals, Ranges.of(front)))
+    1
     """
 
     name: str

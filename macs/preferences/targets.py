@@ -27,6 +27,17 @@ class Around:
         In the objective's unit.
     tolerance : float or pair of floats, optional
         How far below and above the membership of a fuzzy goal is zero. Default: the ends of the objective's range.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Around, FuzzyGoal
+    >>> wish = FuzzyGoal({"flight time": Around(180.0, tolerance=50.0)})
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
     """
 
     value: float

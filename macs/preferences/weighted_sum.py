@@ -29,6 +29,17 @@ class WeightedSum(Preference):
     ----------
     weights : dict
         By name of objectives, not negative. An objective that is not named has weight 0.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import WeightedSum
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
+    >>> print(wish.rank(front).order)  # best first
+    [2 1 0]
     """
 
     weights: Mapping[str, float]

@@ -1,10 +1,12 @@
-"""Breeding: offspring of the points of the archive, by several operators. An operator is used more often if the archive keeps its
-offspring.
+"""Breeding: offspring of the points of the archive, by several operators.
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. No operator is
 best on every problem. Crossover suits separable problems with many local fronts, differences suit coupled variables. So all are used, and
-those more often whose offspring the archive keeps, see `credit`.
+with at most three objectives those more often whose offspring the archive keeps.
+
+With more objectives nearly every new point is non-dominated, and a point elsewhere on a poor front stays as long as one nearer to the true
+front: what stays says little of progress. The shares are then fixed, most of them crossover's, and mates are drawn from the whole archive.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..evaluation.box import Box
-from .credit import Offspring, judged, operator_shares
+from ..pareto.niches import MANY
 from .state import remember
 from .trials import Trials
 
@@ -23,7 +25,8 @@ FEW = 4
 
 
 NEAR, WIDE = 20, 0.3
-"""Mates are drawn from so many nearest points, or with this probability from all (Zhang and Li 2007; Li and Zhang 2009)."""
+"""Mates are drawn from so many nearest points, or with this probability from all (Zhang and Li 2007; Li and Zhang 2009); with many
+objectives always from all (Deb and Jain 2014)."""
 
 
 DIFFERENCE = 0.5
@@ -34,16 +37,29 @@ INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 """Distribution indices; a higher index puts offspring nearer to their parents (Deb and Agrawal 1995)."""
 
 
-def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+FROM_MATE = 0.25
+"""Part of the crossed coordinates in which a child is near the mate."""
+
+
+INDEX_MANY, FROM_MATE_MANY = 30.0, 0.5
+"""The same of crossover with many objectives (Deb and Jain 2014)."""
+
+
+LEAST_SHARE, FORGET = 0.05, 0.1
+"""Least share of an operator in the offspring, so that it can succeed later; fraction of the credit that is forgotten in each iteration."""
+
+
+def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator, wide: float = WIDE) -> np.ndarray:
     """Three different points of the pool (p, d) for each of X (k, d), mostly near it and never equal to it: (3, k, d).
 
-    If the pool has too few other points, the point itself takes their places; its difference to itself is zero.
+    With the probability `wide` they are drawn from the whole pool. If it has too few other points, the point itself takes their places; its
+    difference to itself is zero.
     """
     squared = box.squared_distances(X, pool)
     squared[squared == 0.0] = np.inf
     order = np.argsort(squared, axis=1, kind="stable")
     others = np.isfinite(squared).sum(axis=1)
-    eligible = np.where(rng.random(len(X)) < WIDE, others, np.minimum(others, NEAR))
+    eligible = np.where(rng.random(len(X)) < wide, others, np.minimum(others, NEAR))
     rank = np.arange(len(pool))
     score = np.where(rank < eligible[:, None], rng.random(order.shape), 1.0)
     picked = np.argsort(score, axis=1)[:, :3]
@@ -55,17 +71,29 @@ def mates(box: Box, X: np.ndarray, pool: np.ndarray, rng: np.random.Generator) -
     return np.where(found.T[:, :, None], pool[rows.T], X)
 
 
-def crossover(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def crossover(
+    box: Box,
+    X: np.ndarray,
+    mates: np.ndarray,
+    rng: np.random.Generator,
+    index: float = INDEX_CROSSOVER,
+    from_mate: float = FROM_MATE,
+) -> np.ndarray:
     """Children (k, d) by simulated binary crossover (Deb and Agrawal 1995): half of the coordinates are crossed with those of the first
     mate.
 
-    In three of four of these coordinates a child is near its parent, in the others near the mate. Distances scale with the difference of
-    parent and mate.
+    In a part `from_mate` of these coordinates a child is near the mate, in the others near its parent. Distances scale with the difference
+    of parent and mate, and are the shorter, the higher the `index`.
     """
     u = rng.random(X.shape)
-    ratio = np.where(u < 0.5, 2.0 * u, 0.5 / (1.0 - u)) ** (1.0 / (INDEX_CROSSOVER + 1.0))
-    share = 0.5 * np.where(rng.random(X.shape) < 0.25, 1.0 + ratio, 1.0 - ratio)
+    ratio = np.where(u < 0.5, 2.0 * u, 0.5 / (1.0 - u)) ** (1.0 / (index + 1.0))
+    share = 0.5 * np.where(rng.random(X.shape) < from_mate, 1.0 + ratio, 1.0 - ratio)
     return X + np.where(rng.random(X.shape) < 0.5, share * box.difference(mates[0], X), 0.0)
+
+
+def crossover_many(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Children (k, d) by crossover as it suits many objectives: nearer to both parents, and from both alike."""
+    return crossover(box, X, mates, rng, INDEX_MANY, FROM_MATE_MANY)
 
 
 def differential(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -93,6 +121,40 @@ OPERATORS: tuple[tuple[Operator, bool], ...] = ((crossover, True), (differential
 """The operators, each with whether its offspring also mutate."""
 
 
+OPERATORS_MANY: tuple[tuple[Operator, bool], ...] = ((crossover_many, True), *OPERATORS[1:])
+"""The same with many objectives."""
+
+
+SHARES_MANY = np.array([1.0 - (len(OPERATORS_MANY) - 1) * LEAST_SHARE] + [LEAST_SHARE] * (len(OPERATORS_MANY) - 1))
+"""Shares of the operators with many objectives."""
+
+
+def no_credit(count: int) -> np.ndarray:
+    """Initial credit (count, 2), equal for all operators: one success in five trials."""
+    return np.tile([1.0, 5.0], (count, 1))
+
+
+def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Credit of the operators (o, 2): number of offspring that stayed in the archive, and of all offspring; older ones count less.
+
+    Parameters
+    ----------
+    credit : array (o, 2)
+        Credit so far.
+    operator, kept : arrays (k,) of int and bool
+        Operator of each child, and whether the child stayed.
+    """
+    tried = np.bincount(operator, minlength=len(credit))
+    won = np.bincount(operator, weights=kept, minlength=len(credit))
+    return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
+
+
+def operator_shares(credit: np.ndarray) -> np.ndarray:
+    """Probabilities (o,) of the operators: by their success rates, with a least share for each (Thierens 2005)."""
+    rate = (credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)
+    return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
+
+
 def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Points (k, d) after polynomial mutation (Deb and Goyal 1996) of one coordinate on average; they may be outside the box."""
     u = rng.random(X.shape)
@@ -100,7 +162,9 @@ def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return X + np.where(rng.random(X.shape) < 1.0 / X.shape[1], np.copysign(size, u - 0.5), 0.0)
 
 
-def breed(box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def breed(
+    box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np.random.Generator, many: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """One offspring of each parent, and the operator that made it.
 
     Parameters
@@ -113,6 +177,8 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np
     shares : array (number of operators,)
         Probabilities of the operators.
     rng : numpy.random.Generator
+    many : bool
+        Whether the objectives are many, see `OPERATORS_MANY`.
 
     Returns
     -------
@@ -122,9 +188,9 @@ def breed(box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np
         Row in `OPERATORS` of the operator that made each.
     """
     operator = rng.choice(len(OPERATORS), size=len(X), p=shares)
-    others = mates(box, X, pool, rng)
+    others = mates(box, X, pool, rng, 1.0 if many else WIDE)
     trial = X.copy()
-    for index, (propose, mutates) in enumerate(OPERATORS):
+    for index, (propose, mutates) in enumerate(OPERATORS_MANY if many else OPERATORS):
         rows = np.flatnonzero(operator == index)
         if rows.size:
             children = propose(box, X[rows], others[:, rows], rng)
@@ -138,7 +204,8 @@ def _moving_coordinates(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def breed_archive(trials: Trials) -> None:
-    """Breed offspring of the archive's points, from as many parents as possible; update the credit of operators by earlier offspring."""
+    """Breed offspring of the archive's points, from as many parents as possible; update the credit of the operators, unless shares are
+    fixed."""
     state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
     archive, rng = state.archive, state.rng
     count = settings.offspring(len(archive), archive.F.shape[1])
@@ -148,10 +215,12 @@ def breed_archive(trials: Trials) -> None:
     rows = np.concatenate(rounds)[:count]
     points = box.to_unit(archive.Z[:, evaluator.free])
     pool = points if len(points) > FEW else np.vstack([points, trials.positions()])
-    trial, operator = breed(box, points[rows], pool, operator_shares(state.credit, archive.F.shape[1]), rng)
+    many = archive.F.shape[1] > MANY
+    trial, operator = breed(box, points[rows], pool, SHARES_MANY if many else operator_shares(state.credit), rng, many)
     bred, result = trials.evaluate(archive.Z[rows], points[rows], trial)
     if result is None:
         return
     remember(state, trials.seen, settings, evaluator)
-    young = state.bred.joined(Offspring(result.F, operator[bred], np.full(len(bred), state.iteration)))
-    state.bred, state.credit = judged(young, state.credit, archive=state.archive.F, iteration=state.iteration)
+    if not many:
+        kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
+        state.credit = updated_credit(state.credit, operator[bred], kept)

@@ -31,8 +31,7 @@ from ..refinement.mending import mended
 from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver
 from . import gradient_action
-from .breeding import OPERATORS, breed_archive
-from .credit import Offspring, no_credit
+from .breeding import OPERATORS, breed_archive, no_credit
 from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
@@ -105,7 +104,6 @@ class MACS(Settings, Solver):
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
             credit=no_credit(len(OPERATORS)),
-            bred=Offspring.none(m),
             effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,

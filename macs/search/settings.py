@@ -16,7 +16,7 @@ from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
-FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 0.5
+FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 1.0
 """Default of `breeding` with at most three objectives, and with more."""
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
@@ -51,7 +51,8 @@ class Settings:
     actions). The best trade-offs are kept in an archive and spread evenly along the front; offspring of the archive's points add to the
     search. If the problem has derivatives, gradient solves refine agents during the search and polish the archive at its end.
 
-    `MACS()` suits most problems. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
+    `MACS()` suits most problems. Five settings matter first: `agents`, `archive`, `refine`, `mesh` and `prefer`; all others are further
+    settings, under Other Parameters. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
     Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
 
     Parameters
@@ -65,16 +66,24 @@ class Settings:
         Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, see
         `refine_every`, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
         `stats["gradient_solves"]` counts all solves.
-    polish_on : str, optional
-        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
-        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
-        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
-        polished again each time.
     mesh : {"mended", "fixed", "adaptive"}, default "mended"
         What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
         points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
         of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
         Without derivatives ("refine=False") points are not mended.
+    prefer : Preference or dict, optional
+        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
+        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
+        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
+        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
+
+    Other Parameters
+    ----------------
+    polish_on : str, optional
+        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
+        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
+        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
+        polished again each time.
     mesh_tolerance : float, default 1e-7
         With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
         [1e-10, 1].
@@ -127,7 +136,7 @@ class Settings:
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
     breeding : float, optional
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
-        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 0.5 with more than
+        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 1 with more than
         three objectives. 0 in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
@@ -138,16 +147,20 @@ class Settings:
         energy: the archive then has the best points near evenly spread directions, see `macs.pareto.niches`.
     ceiling : int, default 100 000
         Largest number of evaluations of a search without one of its own (`evaluations=None`), which otherwise ends when it is done.
-    prefer : Preference or dict, optional
-        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
-        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
-        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
-        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
 
     Raises
     ------
     ValueError
         If a setting is outside its range; the message names it.
+
+    Examples
+    --------
+    >>> from macs import MACS
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = MACS(archive=5).solve(load("goddard"), DFET(4, 6), evaluations=100, seed=1)
+    >>> print(len(front), front.verified.all())
+    5 True
     """
 
     agents: int = 10

@@ -13,7 +13,6 @@ from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
-from .credit import Offspring
 from .guide import guide_of
 from .rounds import Rounds
 from .settings import Settings
@@ -103,9 +102,7 @@ class SearchState:
     experience : array (k, d)
         Displacements of the last improvements of all agents, in units of span, oldest first.
     credit : array (o, 2)
-        For each breeding operator, the number of offspring that stayed in the archive and of all offspring; see `credit.updated_credit`.
-    bred : Offspring
-        Offspring that is too young to be judged.
+        For each breeding operator, the number of offspring that stayed in the archive and of all offspring; see `breeding.updated_credit`.
     effort : array (w + 1, 4)
         What the inner solvers, and the gradient solves, have brought for how much work; see `effort`.
     iteration, evaluations, refinements : int
@@ -144,7 +141,6 @@ class SearchState:
     directions: np.ndarray
     experience: np.ndarray
     credit: np.ndarray
-    bred: Offspring
     effort: np.ndarray
     iteration: int
     evaluations: int

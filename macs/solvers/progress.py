@@ -36,6 +36,15 @@ class Progress:
         Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
     inner_iterations, gradient_solves, work, gradient_work : int
         See `Counts`.
+
+    Examples
+    --------
+    >>> from macs import MACS
+    >>> from problems import load
+    >>> seen = []
+    >>> front = MACS().solve(load("four_bar_truss"), evaluations=100, seed=1, callback=lambda progress: seen.append(progress.evaluations))
+    >>> seen[-1] <= 100
+    True
     """
 
     evaluations: int

@@ -41,7 +41,19 @@ Callback = Callable[[Progress], Any]
 
 
 class Solver(SearchMethod):
-    """Search method with two calls for its user: `solve` for problems, with or without trajectories, `minimize` for plain functions."""
+    """Search method with two calls for its user: `solve` for problems, with or without trajectories, `minimize` for plain functions.
+
+    Parameters
+    ----------
+    **settings
+        Those of each class.
+
+    Examples
+    --------
+    >>> from macs import NSGA2, Solver
+    >>> isinstance(NSGA2(), Solver)
+    True
+    """
 
     def solve(
         self,

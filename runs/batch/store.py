@@ -32,6 +32,7 @@ from filelock import FileLock, Timeout
 from macs.front import Front
 from macs.fronts.files import LARGEST as LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
+from macs.io.html import html_block, html_table
 from macs.io.text import duration, text_table
 
 from ..data.addresses import load_front
@@ -125,6 +126,11 @@ class StoredRun:
         return load_front(self.path, self.trust)
 
 
+HEADS = ["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]
+LEFT = [True] * 3 + [False] * 4
+"""Of the table of a summary: titles of columns, and which are aligned left."""
+
+
 @dataclass(frozen=True)
 class Summary:
     """The state of a study.
@@ -167,6 +173,18 @@ class Summary:
 
     def __str__(self) -> str:
         """A table of the cells, and why runs failed."""
+        rows, reasons = self._rows_and_reasons()
+        lines = [f"{self.name}: {self.finished} of {len(self.runs)} runs finished", "", text_table([HEADS], rows, LEFT)]
+        return "\n".join([*lines, *([""] if reasons else []), *reasons])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same."""
+        rows, reasons = self._rows_and_reasons()
+        title = f"{self.name}: {self.finished} of {len(self.runs)} runs finished"
+        return html_block(title, html_table([HEADS], rows, LEFT), reasons)
+
+    def _rows_and_reasons(self) -> tuple[list[list[str]], list[str]]:
+        """A row for each cell, and why runs failed, of which not too many are named."""
         rows, reasons = [], []
         for cell, runs in self.cells.items():
             times = [run.wall_time for run in runs if run.finished and run.wall_time]
@@ -175,11 +193,8 @@ class Summary:
             rows.append([*cell.labels, *(str(counts[kind]) for kind in ("finished", "failed", "missing")), median])
             failed = (run for run in runs if not run.finished and run.status != MISSING)
             reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LONGEST] for run in failed]
-        headers = [["problem", "transcription", "solver", "finished", "failed", "missing", "median time"]]
-        lines = [f"{self.name}: {self.finished} of {len(self.runs)} runs finished", "", text_table(headers, rows, [True] * 3 + [False] * 4)]
-        lines += ["", *reasons[:MOST]] if reasons else []
-        lines += [f"and {len(reasons) - MOST} more"] if len(reasons) > MOST else []
-        return "\n".join(lines)
+        more = [f"and {len(reasons) - MOST} more"] if len(reasons) > MOST else []
+        return rows, [*reasons[:MOST], *more]
 
 
 class Store:

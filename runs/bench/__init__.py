@@ -3,5 +3,6 @@ meshes by a density in `density`; transcriptions in `methods`; populations simul
 batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
 
 from .command import KINDS, bench
+from .page import header_of, sources
 
-__all__ = ["KINDS", "bench"]
+__all__ = ["KINDS", "bench", "header_of", "sources"]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 from macs.io.interrupts import Stopped
 
-from . import density, fronts, inner, methods, passages, peers, population, prefer, scale, search, standard, study
+from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
+from .page import header_of, write_page
 from .scale import generation
 
-BENCHMARKS = {
+BENCHMARKS: dict[str, Any] = {
+    **{name: functions.Contest(name) for name in functions.NAMES},
     "density": density,
     "front": fronts,
     "generation": generation,
@@ -26,37 +30,47 @@ BENCHMARKS = {
     "standard": standard,
     "study": study,
 }
-KINDS = tuple(BENCHMARKS)
+KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 
 
-def bench(kinds: Sequence[str], quick: bool, path: str | None) -> bool:
+def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None = None) -> bool:
     """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
 
-    Returns whether no two verified optima of one problem disagree, which no noise explains, and no cost grows faster than linearly, which
-    little does: exponents do not depend on the speed of the machine.
+    The report of a single one is also written to `page`, if there is one and it was not interrupted. Returns whether all targets are met,
+    see `Target`.
     """
+    header = header_of(kinds[0], quick, page) if page else None
     measured: list[tuple[str, Row]] = []
+    missed: list[str] = []
     for kind in kinds:
         rows: list[Row] = []
         ended = _run(kind, rows, quick)
         measured += [(kind, row) for row in rows]
         if rows:
-            print(BENCHMARKS[kind].report(rows), end="\n\n", flush=True)
+            text = BENCHMARKS[kind].report(rows)
+            print(text, end="\n\n", flush=True)
+            if page and header and not ended:
+                write_page(page, kind, header, text)
+                print(f"page in {page}")
+            missed += [f"{kind}: {one.what}" for one in BENCHMARKS[kind].targets(rows) if not one.met]
         if ended:
             print("interrupted: these are the values measured until then", file=sys.stderr)
             break
     if path:
         save(path, measured)
         print(f"values in {path}")
-    of = {kind: [row for one, row in measured if one == kind] for kind in ("methods", "scale")}
-    return not methods.disagreements(of["methods"]) and not scale.superlinear(of["scale"])
+    if missed and len(kinds) > 1:
+        print("MISSED:", *missed, sep="\n  ")
+    return not missed
 
 
 def _run(kind: str, rows: list[Row], quick: bool) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
     cases = [case for case in inner.INNER if case.quick or not quick]
+    sets = {name: BENCHMARKS[name] for name in functions.NAMES}
     work: dict[str, Callable[[], None]] = {
+        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),

@@ -17,7 +17,7 @@ from transcription import parse
 from transcription.meshes.scales import state_scales
 from transcription.trajectories.trajectory import PhaseTrajectory
 
-from .measured import Column, Row, short, table
+from .measured import Column, Row, Target, short, table
 
 EQUAL, DENSE = "equal", "density"
 MESHES = 3
@@ -146,6 +146,11 @@ def report(rows: Sequence[Row]) -> str:
         f"smaller defect by the density: {better} of {len(pairs)}; median ratio {short(float(np.median(ratios))) if len(pairs) else '-'}",
     ]
     return "\n".join(lines)
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """None: what the density is worth depends on the trajectory, and on some it is worth nothing."""
+    return []
 
 
 def worst(row: Row) -> str:

@@ -15,7 +15,7 @@ from macs.io.text import text_table
 
 from ..report.tables import short
 
-__all__ = ["Column", "Row", "save", "short", "table"]
+__all__ = ["Column", "Row", "Target", "save", "short", "table", "verdicts"]
 
 
 @dataclass
@@ -61,6 +61,33 @@ def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:
         cells.append([row.case if first else "", row.who, *(write(row) for _, _, write in columns)])
     headers = [["case", "", *(column[0] for column in columns)], ["", "", *(column[1] for column in columns)]]
     return text_table(headers, cells, [True, True] + [False] * len(columns))
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a benchmark asks, and what it measured: by medians of rounds or seeds, so that neither the best nor the worst one decides.
+
+    Attributes
+    ----------
+    what : str
+        Of which case, or of what.
+    asked, measured : str
+    met : bool
+        False, too, for what could not be measured.
+    """
+
+    what: str
+    asked: str
+    measured: str
+    met: bool
+
+
+def verdicts(targets: Sequence[Target]) -> list[str]:
+    """Lines of a table of what is asked; none if nothing is."""
+    if not targets:
+        return []
+    cells = [[one.what, one.asked, one.measured, "met" if one.met else "MISSED"] for one in targets]
+    return text_table([["", "asked", "measured", ""]], cells, [True] * 4).splitlines()
 
 
 def save(path: str | Path, measured: Sequence[tuple[str, Row]]) -> None:

@@ -18,8 +18,8 @@ from problems.problem import Problem
 from transcription import Meshed, MultipleShooting, Transcription, parse
 from transcription.base import CONVERGED
 
-from .apart import CRASHED, LATE, lines_apart
-from .measured import Column, Row, table
+from ..execution.apart import CRASHED, LATE, lines_apart
+from .measured import Column, Row, Target, table, verdicts
 
 METHODS = ("dfet:16x3", "gauss:16x4", "radau:16x4", "lobatto:16x4", "chebyshev:16x4", "multiple-shooting:120x2:linear")
 """Where each begins: with as many points on as many intervals, or as many nodes of linear controls."""
@@ -126,9 +126,10 @@ def _within(method: Transcription) -> float:
     return AGREE if isinstance(method, Meshed) and method.moves_edges else COARSER
 
 
-def disagreements(rows: Sequence[Row]) -> int:
-    """Problems on which verified optima disagree."""
-    return sum(row.who.startswith(DISAGREED) for row in rows)
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """No two verified optima of one problem disagree."""
+    different = [row.case for row in rows if row.who.startswith(DISAGREED)]
+    return [Target("verified, but different", "none", ", ".join(different) or "none", not different)]
 
 
 def report(rows: Sequence[Row]) -> str:
@@ -142,7 +143,9 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
-        f"agree: {agreed} of {len(rows)}; ended early: {ended}; verified, but different: asked none, measured {disagreements(rows)}",
+        f"agree: {agreed} of {len(rows)}; ended early: {ended}",
+        "",
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
 

@@ -12,7 +12,7 @@ from macs.io.console import Steps
 from problems.cases.aerocapture.passage import PASSAGE, Passage, Passages, passages
 from problems.cases.aerocapture.passage_table import tabulated
 
-from .measured import Column, Row, short, table
+from .measured import Column, Row, Target, short, table, verdicts
 from .rivals.by_solve_bvp import solved
 
 SINGLY, TOGETHER, TABLE = "ours, one by one", "ours, in one call", "table, in one call"
@@ -81,13 +81,18 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
+        *verdicts(targets(rows)),
     ]
-    for row in rows:
-        if row.who in ASKED:
-            speed = row.of("speed")
-            verdict = "met" if speed >= ASKED[row.who] else "MISSED"
-            lines.append(f"{row.who}: asked at least {ASKED[row.who]:.0f} times as fast, {short(speed)}, {verdict}")
     return "\n".join(lines)
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """Ours are so many times as fast."""
+    return [
+        Target(row.who, f"at least {ASKED[row.who]:.0f} times as fast", short(row.of("speed")), row.of("speed") >= ASKED[row.who])
+        for row in rows
+        if row.who in ASKED
+    ]
 
 
 COLUMNS: tuple[Column, ...] = (

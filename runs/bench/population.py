@@ -15,12 +15,12 @@ from transcription.inner import Propagate
 from transcription.numerics.compiling import compiler
 
 from .inner import compiling
-from .measured import Column, Row, short, table
+from .measured import Column, Row, Target, short, table, verdicts
 
 CASE, METHOD = "reentry_case1", "shooting:200"
 SINGLY, TOGETHER, COMPILED = "one by one", "in one call", "in one call, compiled"
-ASKED = 2_500
-"""Candidates a second in one call, without a compiler, on the machine that this was written on when it is idle."""
+ASKED = 4.0
+"""Times as fast as one by one in one call, without a compiler. Candidates a second would depend on the machine."""
 
 
 @dataclass(frozen=True)
@@ -74,17 +74,21 @@ def _propagator(method: Transcription, when: str) -> Callable[[np.ndarray], None
 
 def report(rows: Sequence[Row]) -> str:
     """The measured values, and the targets."""
-    speed = next(row for row in rows if row.who == TOGETHER).of("candidates", np.max)
-    verdict = "met" if speed >= ASKED else "MISSED"
     lines = [
         "POPULATIONS: the candidates of a population search, propagated and scored in one call, against one after the other, in turn;",
         "median, least and greatest of few rounds. Candidates a second depend on the machine and its load.",
         "",
         table(rows, COLUMNS),
         "",
-        f"in one call, without a compiler: asked at least {ASKED} candidates a second, at best {speed:.0f}, {verdict}",
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """One call is so many times as fast as one by one, by the median of the rounds."""
+    speed = next(row for row in rows if row.who == TOGETHER).of("speed")
+    return [Target("in one call, without a compiler", f"at least {ASKED:g} times as fast", short(speed), speed >= ASKED)]
 
 
 COLUMNS: tuple[Column, ...] = (

@@ -22,7 +22,7 @@ from transcription import parse
 
 from ..measures.interest import Interest
 from ..measures.references import union
-from .measured import Column, Row, short, table
+from .measured import Column, Row, Target, short, table, verdicts
 
 GUIDED, EVEN = "guided", "even"
 ASKED = 1 / 3
@@ -222,7 +222,6 @@ def compared(case: Guided, fronts: dict[str, list[Front]]) -> list[Row]:
 
 def report(rows: Sequence[Row]) -> str:
     """The measured values, and the target."""
-    ratios = {row.case: row for row in rows if row.who == GUIDED}
     lines = [
         "PREFERENCES: MACS guided by a preference, and even, at equal evaluations. Missing: what a front does not dominate of the",
         "hypervolume that the region of interest of a dense front does, up to the nadir of that region. The region is where the value",
@@ -232,13 +231,15 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
-        *(
-            f"{case}: missing, guided, asked at most {ASKED:.2f} of what an even search misses, measured {row.spread('ratio')}, "
-            f"{'met' if row.of('ratio') <= ASKED else 'MISSED'}"
-            for case, row in ratios.items()
-        ),
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """A guided search misses little of what an even one misses, on each case."""
+    asked = f"missing, guided: at most {ASKED:.2f} of what an even search misses"
+    return [Target(row.case, asked, row.spread("ratio"), row.of("ratio") <= ASKED) for row in rows if row.who == GUIDED]
 
 
 COLUMNS: tuple[Column, ...] = (

@@ -15,8 +15,8 @@ from problems import load
 from problems.cases.standard import SHARE, Published, cases, published
 from problems.catalogue import STANDARD
 
-from .apart import CRASHED, LATE, lines_apart
-from .measured import Column, Row, short, table
+from ..execution.apart import CRASHED, LATE, lines_apart
+from .measured import Column, Row, Target, short, table, verdicts
 
 RIGHT, WRONG, UNVERIFIED, FAILED = "right", "WRONG", "not verified", "FAILED"
 QUICK = ("linear_tangent", "breakwell", "moon_landing", "schwartz")
@@ -93,8 +93,6 @@ def compared(case: str, record: Published, found: dict[str, float | str]) -> Row
 
 def report(rows: Sequence[Row]) -> str:
     """The measured values, and the targets."""
-    right, wrong = (sum(row.who == who for row in rows) for who in (RIGHT, WRONG))
-    most = max(row.of("memory") if "memory" in row.values else 0.0 for row in rows)
     lines = [
         "PUBLISHED PROBLEMS: the optimum that the defaults find, against the published one. Error: of the value as simulated, relative to",
         f"the published one, or to its scale; right within {SHARE:g}, or what the published digits are good for. Violation: largest one",
@@ -102,15 +100,20 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
-        f"right and verified: asked at least 17 of 18, measured {right} of {len(rows)}, {_verdict(18 * right >= 17 * len(rows))}",
-        f"wrong, but verified: asked none, measured {wrong}, {_verdict(not wrong)}",
-        f"memory: asked at most {MEMORY:g} MB each, measured {most:.0f} MB, {_verdict(most <= MEMORY)}",
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
 
 
-def _verdict(met: bool) -> str:
-    return "met" if met else "MISSED"
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """Nearly all right, none that is believed wrongly, and within the memory."""
+    right, wrong = (sum(row.who == who for row in rows) for who in (RIGHT, WRONG))
+    most = max(row.of("memory") if "memory" in row.values else 0.0 for row in rows)
+    return [
+        Target("right and verified", "at least 17 of 18", f"{right} of {len(rows)}", 18 * right >= 17 * len(rows)),
+        Target("wrong, but verified", "none", str(wrong), not wrong),
+        Target("memory", f"at most {MEMORY:g} MB each", f"{most:.0f} MB", most <= MEMORY),
+    ]
 
 
 def _value(name: str) -> Column:

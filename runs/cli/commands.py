@@ -28,7 +28,7 @@ from problems.checks import unknown
 from transcription.inner import NAMED
 
 from ..batch import file as studyfile
-from . import decide_command, study_commands
+from . import browser_commands, decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 from .fallback import saved
 from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
@@ -158,7 +158,13 @@ def bench(arguments: Namespace) -> int:
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)
-    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv) else FAILED
+    if arguments.page:
+        if not arguments.what:
+            raise WrongCall("--page: of which one? a page is of a single benchmark")
+        check_target(arguments.page)
+        with wrong_call_on_value_error():
+            benchmarks.header_of(kinds[0], arguments.quick, arguments.page)
+    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv, arguments.page) else FAILED
 
 
 # Arguments
@@ -313,5 +319,6 @@ COMMANDS = {
     "verify": verify,
     "decide": decide_command.decide,
     "study": study_commands.study,
+    "report": browser_commands.report,
     "bench": bench,
 }

@@ -30,6 +30,7 @@ examples:
   macs decide front.nc
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
+  macs report front.nc --html front.html
   macs bench inner --quick
 
 exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
@@ -39,23 +40,26 @@ was wrong, 130 ended by Ctrl-C"""
 BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
+constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
 density     shooting on equal intervals, and on as many that follow the trajectory: error when simulated, and of the objective
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
 generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 passages    the boundary value problem of aerocapture by our solver and its table, against scipy's solve_bvp at known accuracy
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations
 scale       how time and memory grow with elements, nodes, phases, variables, points and agents: exponents beside the limit of 1.1
-search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and equal wall time
+search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and counted work
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
+uf          UF1 to UF10 of CEC 2009, likewise: IGD as in the competition
+zdt         ZDT1-4 and 6, likewise
 study       a study with two processes against one, and how much longer it takes than its runs do
 
-Targets are printed beside the measured values. The exit code is 0 whether they are reached or not, since a single measurement on a noisy
-machine proves little; but it is 1 where methods find different optima, both verified, and where a cost grows faster than linearly. Ctrl-C
-prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
+What is asked is printed beside the measured values, and judged by medians of rounds or seeds. The exit code is 1 where anything is missed.
+Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
 benchmark and that of populations show both."""
 
 
@@ -74,7 +78,7 @@ macs study run STUDY     makes the runs that are missing. Stopped, killed, or wi
                          are neither made again nor changed. A run that crashes, hangs beyond the study's time_limit or is killed is
                          recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
 macs study status DIR    the number of finished, failed and missing runs, and the reasons of failures.
-macs study report DIR    tables, statistics and figures.
+macs study report DIR    tables, statistics and figures; with --page FILE.md also a page of them, once all runs are finished.
 
 A study file or a study's folder may name code by address (my_problem.py:build). Outside the catalogue it is loaded only with --trust.
 
@@ -171,6 +175,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_verify(commands)
     _add_decide(commands)
     _add_study(commands)
+    _add_report(commands)
     _add_bench(commands)
     return parser
 
@@ -276,20 +281,28 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     )
 
 
+def _add_report(commands: argparse._SubParsersAction[Parser]) -> None:
+    report = _add(commands, "report", "a front or a study as one page for the browser, a file that loads nothing from the network")
+    report.add_argument("source", metavar="FRONT.nc|STUDY", help="a front, a study's folder, or the name of a study that ran into out/NAME")
+    report.add_argument("--html", metavar="FILE", help="the page (default: FRONT.html beside the front; DIR/report/report.html of a study)")
+    report.add_argument("--trust", action="store_true", help=TRUST)
+
+
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
     bench.add_argument(
         "what",
-        metavar="density|front|generation|inner|methods|passages|peers|population|prefer|scale|search|standard|study",
+        metavar="KIND",
         nargs="?",
-        help="which one (default: all)",
+        help="one of those above (default: all, which takes hours)",
     )
     bench.add_argument(
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
     bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
+    bench.add_argument("--page", metavar="FILE.md", help="write the report of a single one as a page too, with the command that made it")
 
 
 def _unknown_option(word: str, parser: Parser) -> str:

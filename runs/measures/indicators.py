@@ -36,6 +36,22 @@ def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool 
 
     A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
     about a quarter of their spacing. With `curve=False` it is its points alone, always, as most published tables have it.
+
+    Parameters
+    ----------
+    front, reference : Front or array (n, m)
+    normalise : bool
+        Whether objectives are divided by the ranges of the reference.
+    curve : bool
+        Whether a dense reference of two objectives is the curve through its points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from runs import gd
+    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
+    >>> round(gd(np.array([[0.1, 1.0]]), truth), 3)
+    0.1
     """
     F, R = _pair(front, reference, normalise)
     return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
@@ -45,19 +61,67 @@ def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool
     """Inverted generational distance: mean distance of the reference from the nearest point of the front. Infinite for an empty front.
 
     Where the reference is a curve (see `gd`, also for `curve`), the mean is taken evenly along its length.
+
+    Parameters
+    ----------
+    front, reference : Front or array (n, m)
+    normalise : bool
+        Whether objectives are divided by the ranges of the reference.
+    curve : bool
+        Whether a dense reference of two objectives is the curve through its points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from runs import igd
+    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
+    >>> round(igd(truth, truth), 3)
+    0.0
     """
     F, R = _pair(front, reference, normalise)
     return float(moocore.igd(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
 def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
-    """As `igd`, but an objective counts only where a point is worse than the reference in it (Ishibuchi et al. 2015)."""
+    """As `igd`, but an objective counts only where a point is worse than the reference in it (Ishibuchi et al. 2015).
+
+    Parameters
+    ----------
+    front, reference : Front or array (n, m)
+    normalise : bool
+        Whether objectives are divided by the ranges of the reference.
+    curve : bool
+        Whether a dense reference of two objectives is the curve through its points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from runs import igd_plus
+    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
+    >>> round(igd_plus(truth, truth), 3)
+    0.0
+    """
     F, R = _pair(front, reference, normalise)
     return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
 def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True) -> float:
-    """By how much the front would have to improve in every objective to be nowhere worse than the reference. Infinite if it is empty."""
+    """By how much the front would have to improve in every objective to be nowhere worse than the reference. Infinite if it is empty.
+
+    Parameters
+    ----------
+    front, reference : Front or array (n, m)
+    normalise : bool
+        Whether objectives are divided by the ranges of the reference.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from runs import additive_epsilon
+    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
+    >>> round(additive_epsilon(truth + 0.1, truth), 3)
+    0.1
+    """
     F, R = _pair(front, reference, normalise)
     return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
@@ -67,6 +131,22 @@ def hypervolume(front: Points, reference: Points, *, point: float = POINT, norma
 
     With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
     a tenth of the reference's range.
+
+    Parameters
+    ----------
+    front, reference : Front or array (n, m)
+    normalise : bool
+        Whether objectives are divided by the ranges of the reference.
+    point : float
+        Corner in each objective, in ranges of the reference from its ideal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from runs import hypervolume
+    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
+    >>> round(hypervolume(truth, truth), 3)
+    0.21
     """
     F, R = _pair(front, reference, normalise)
     if not len(F):

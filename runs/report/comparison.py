@@ -110,9 +110,15 @@ class Comparison:
         return self.reference(self.stated)
 
     @property
+    def shown(self) -> str:
+        """The problem as captions name it: by its label or, where that is an address of code ("rocket.py:build"), by its own name."""
+        source = self.known.source
+        return source.name if source is not None and ".py:" in self.problem else self.problem
+
+    @property
     def name(self) -> str:
-        """The labels in one line."""
-        return f"{self.problem}, {self.transcription}"
+        """Problem and transcription in one line."""
+        return f"{self.shown}, {self.transcription}"
 
     def place(self, solver: str) -> str:
         """The transcription that a solver works on, by label."""

@@ -12,7 +12,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
-from macs.fronts.pictures.style import COLORS, label
+from macs.fronts.pictures.style import COLORS, axis_label, title_and_legend
 from macs.fronts.point import Point
 from macs.pareto.energy import spread
 
@@ -90,13 +90,13 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
             grid[0, column].set_title(title, loc="left", fontsize=6.5)
         for ax, name in zip(grid[:, 0], rows, strict=True):
             # A long label on one line would run into those above and below.
-            ax.set_ylabel(fill(label(name, units.get(name, "")), LABEL, break_long_words=False, break_on_hyphens=False))
+            ax.set_ylabel(fill(axis_label(name, units.get(name, "")), LABEL, break_long_words=False, break_on_hyphens=False))
             ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         for ax in grid[-1]:
             ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         figure.align_ylabels(grid[:, 0])
         unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
-        figure.supxlabel(label("time", unit), fontsize=8)
+        figure.supxlabel(axis_label("time", unit), fontsize=8)
         _legend(figure, flights[0], [name for name, beside in laws.items() if any(law is not None for law in beside)], solver)
     return figure
 
@@ -135,7 +135,7 @@ def paths_figure(points: Sequence[Point], track: Track, *, laws: Laws = MappingP
             lines = [line for law in beside if law is not None and (line := _track(track, law))]
             for i, line in enumerate(lines):
                 ax.plot(*line.values(), color="black", lw=0.9, ls=dashes, zorder=4, label=name if i == 0 else None)
-        ax.legend(frameon=False, loc="best")
+        title_and_legend(ax, "")
     return figure
 
 

@@ -264,7 +264,5 @@ class Designs:
     def figures(self) -> dict[str, Figure]:
         """{name of a file: figure}: each variable along the front."""
         figure = blank_figure()
-        front = self.front
-        title = f"{self.solver}: variables along the front of all runs"
-        draw_designs(front.decision, front.variables, front.objectives, front.goals, front.status == CONVERGED, title, figure)
+        draw_designs(self.front, f"{self.solver}: variables along the front of all runs", figure)
         return {"variables": figure}

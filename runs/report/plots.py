@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.fronts.pictures.style import COLORS, GREY, better, wrapped
+from macs.fronts.pictures.style import COLORS, GREY, better, title_and_legend, wrapped
 from macs.io.text import counted
 from problems.compiled import Objective
 
@@ -108,8 +108,6 @@ def attainment_figure(
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
     margin = 0.04 * np.where(high > low, high - low, 1.0)
     ends = np.where(signs > 0, high + margin, low - margin)
-    # A front leaves the corner free where everything is worst.
-    corner = f"{'upper' if signs[1] > 0 else 'lower'} {'right' if signs[0] > 0 else 'left'}"
     columns = min(3, len(surfaces))
     rows = -(-len(surfaces) // columns)
     with style():
@@ -124,8 +122,7 @@ def attainment_figure(
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
             ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
-            ax.set_title(wrapped(_runs(solver, surface.runs, 0), width, 8.0), loc="left")
-            ax.legend(frameon=False, loc=corner)
+            title_and_legend(ax, wrapped(_runs(solver, surface.runs, 0), width, 8.0))
         for ax in grid[len(surfaces) :]:
             ax.remove()
     return figure

@@ -164,8 +164,7 @@ def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
 
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
     """The tables of a comparison as text, written to files with its figures."""
-    kinds = [tables_of for tables_of in TABLES if tables_of not in OF_FRONTS or not only_choices(comparison)]
-    tables = {name: one for tables_of in kinds for name, one in tables_of(comparison, study).items()}
+    tables = tables_of(comparison, study)
     figures = _figures(comparison) if drawn else {}
     shown: Flights | Designs | None = None
     if study.get("flights", True):
@@ -180,6 +179,12 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
     for name, figure in figures.items():
         writer.figure(f"{stem}-{name}", figure)
     return [f"{comparison.name}\n{'=' * len(comparison.name)}", *left_out, *texts]
+
+
+def tables_of(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
+    """{name of a file: table} of a comparison, but that of the flights that stand for each front."""
+    kinds = [kind for kind in TABLES if kind not in OF_FRONTS or not only_choices(comparison)]
+    return {name: one for kind in kinds for name, one in kind(comparison, study).items()}
 
 
 def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:

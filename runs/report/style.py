@@ -50,12 +50,16 @@ def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
 
 
 def _covers(figure: Any, ax: Any, within: Any) -> bool:
-    """Whether lines or markers of the axes are behind their legend."""
+    """Whether lines, markers or areas of the axes are behind their legend."""
     figure.draw_without_rendering()
     box = within.get_window_extent()
     for line in ax.get_lines():
         path = line.get_path().transformed(line.get_transform())
         joined = line.get_linestyle() != "None"
         if path.intersects_bbox(box, filled=False) if joined else box.count_contains(path.vertices):
+            return True
+    for area in (*ax.collections, *ax.patches):
+        paths = area.get_paths() if hasattr(area, "get_paths") else [area.get_path()]
+        if any(path.transformed(area.get_transform()).intersects_bbox(box, filled=True) for path in paths if len(path.vertices)):
             return True
     return False

@@ -85,9 +85,14 @@ class Table:
         headers = [[column.title for column in self.columns]]
         if any(column.unit for column in self.columns):
             headers.append([f"[{column.unit}]" if column.unit else "" for column in self.columns])
-        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        _, cells, left = self.shown()
         below = ["", *self.notes] if self.notes else []
-        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, self._left()), *below])
+        return "\n".join([*([self.caption, ""] if self.caption else []), text_table(headers, cells, left), *below])
+
+    def shown(self) -> tuple[list[str], list[list[str]], list[bool]]:
+        """Heads with units, cells as text, and whether each column is flush left."""
+        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
+        return [label(column.title, column.unit) for column in self.columns], cells, self._left()
 
     def csv(self) -> str:
         """CSV: one header line, numbers in full, empty cells only where there is no value; without caption and notes."""

@@ -275,7 +275,7 @@ def test_fronts_of_one_problem_merge_and_those_of_others_do_not(front):
 
 def test_pictures_have_a_panel_for_each_variable(front, tmp_path):
     axes = front.plot_variables()
-    assert [ax.get_ylabel() for ax in axes] == ["x [m]", "y"] and axes[0].figure.get_supxlabel() == "near [m2]"
+    assert [ax.get_ylabel() for ax in axes] == ["x [m]", "y"] and axes[0].figure.get_supxlabel() == "near [m²]"
     drawn = axes[0].collections[0].get_offsets()
     assert np.allclose(drawn, np.column_stack([front.objectives[:, 0], front.decision[:, 0]]))
     circled = front[3].plot()[0].collections[-1].get_offsets()

@@ -61,16 +61,11 @@ def test_what_grows_faster_than_asked_is_named():
         Row("third", "points", {"time": [0.5], "memory": [1.5]}),
         Row("fourth", "points", {"unfinished": [1.0]}),
     ]
-    assert scale.superlinear(rows[:1]) == []
-    assert scale.superlinear(rows) == [
-        "second: time grows with the power 2.00 of nodes",
-        "third: memory grows with the power 1.50 of points",
-        "fourth: it did not come to its end",
-    ]
-    text = scale.report(rows)
-    assert "exponents: asked at most 1.1 each, by the median, measured 2.00 of time at most, MISSED" in text
-    assert all(len(line) <= 140 for line in text.splitlines())
-    assert "at most, met" in scale.report(rows[:1])
+    assert all(one.met for one in scale.targets(rows[:1]))
+    found = [("2.00 (second)", False), ("1.50 (third)", False), ("fourth", False)]
+    assert [(one.measured, one.met) for one in scale.targets(rows)] == found
+    assert all(len(line) <= 140 for line in scale.report(rows).splitlines())
+    assert "MISSED" in scale.report(rows) and "MISSED" not in scale.report(rows[:1])
 
 
 def test_a_repetition_is_prepared_anew_and_all_sizes_come_before_the_next(capsys):
@@ -109,10 +104,13 @@ def test_generations_grow_as_their_work_does():
 
         return run
 
-    quadratic = generation.Growing("quadratic", "things", "Np^2", prepare, (), (20, 40, 80))
+    quadratic = generation.Growing("quadratic", "things", "Np^2", 2, prepare, (), (20, 40, 80))
     rows: list[Row] = []
     generation.bench_generation(rows, generation.Effort(rounds=1, quick=True), [quadratic])
     assert rows[0].of("exponent") == pytest.approx(2.0, abs=0.2) and rows[0].of("seconds") == pytest.approx(5e-6 * 6400, rel=0.2)
+    wrong = Row("re-entry, 120 individuals", "nodes", {"exponent": [0.9, 1.3, 1.4]})
+    right = Row("re-entry, 200 nodes", "individuals", {"exponent": [0.9, 1.3, 1.4]})
+    assert [one.met for one in generation.targets([wrong, right])] == [False, True]
     assert "quadratic" in generation.report(rows) and "section IV-D" in generation.report(rows)
 
 

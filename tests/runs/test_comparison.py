@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from zlib import crc32
 
@@ -55,6 +56,13 @@ def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("brakes") / "out"
     assert study().run(out, executor=Inline()).finished == 4
     return out
+
+
+def test_captions_name_a_problem_that_has_an_address_by_its_own_name(folder):
+    comparison = comparisons(Store.open(folder), {})[0]
+    addressed = replace(comparison, problem="brakes.py:build")
+    assert addressed.shown == "braking" and addressed.name == "braking, dfet:1x2"
+    assert replace(comparison, problem="heavy").name == "heavy, dfet:1x2", "a label that somebody chose"
 
 
 def test_only_verified_points_count(folder):

@@ -81,6 +81,14 @@ class Collocation(Meshed):
     ValueError
         For numbers that are no positive integers, unknown points, controls of a higher degree than there are points for, or edges that do
         not increase from 0 to 1.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> from transcription import Collocation
+    >>> nlp = Collocation(1, 20, points="gauss").transcribe(load("goddard"))
+    >>> len(nlp.variables) >= len(nlp.free)
+    True
     """
 
     intervals: int

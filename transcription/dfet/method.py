@@ -58,6 +58,14 @@ class DFET(Meshed):
     ------
     ValueError
         For numbers that are not positive integers, an unknown basis, or edges that do not increase from 0 to 1.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> nlp = DFET(4, 6).transcribe(load("goddard"))
+    >>> len(nlp.variables) >= len(nlp.free)
+    True
     """
 
     elements: int

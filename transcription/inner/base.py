@@ -38,6 +38,17 @@ class InnerResult:
         What `NLP.residuals` returns there, from which the violation of each constraint follows; None: to be computed from z.
     work : float, optional
         What all of it took, in iterations of IPOPT on the same program; None: all iterations were of IPOPT.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> from transcription.inner import inner_solver
+    >>> nlp = DFET(4, 6).transcribe(load("goddard"))
+    >>> candidates = (nlp.lower + 0.5 * nlp.span)[nlp.free][None]
+    >>> inner_solver("projection").solve(nlp, candidates).status.shape
+    (1,)
     """
 
     z: np.ndarray
@@ -62,6 +73,17 @@ class InnerSolver(ABC):
     changes a result.
 
     The result for one candidate depends on that candidate, its warm start and the composition of the batch, and on nothing else.
+
+    Parameters
+    ----------
+    **settings
+        Those of each class.
+
+    Examples
+    --------
+    >>> from transcription.inner import InnerSolver, inner_solver
+    >>> isinstance(inner_solver("projection"), InnerSolver)
+    True
     """
 
     def __init_subclass__(cls) -> None:

@@ -162,6 +162,14 @@ class SingleShooting(Shooting):
         Of each phase, equally spaced, both ends among them.
     scheme, steps, control, control_nodes, path_points
         See `Shooting`; `steps` are those between two nodes.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> from transcription import SingleShooting
+    >>> nlp = SingleShooting(40, control="linear").transcribe(load("goddard"))
+    >>> len(nlp.variables) >= len(nlp.free)
+    True
     """
 
     nodes: int
@@ -195,6 +203,14 @@ class MultipleShooting(Meshed, Shooting):
     ------
     ValueError
         As for `Shooting`; also for edges that do not increase from 0 to 1, and for another order than that of the scheme.
+
+    Examples
+    --------
+    >>> from problems import load
+    >>> from transcription import MultipleShooting
+    >>> nlp = MultipleShooting(20).transcribe(load("goddard"))
+    >>> len(nlp.variables) >= len(nlp.free)
+    True
     """
 
     intervals: int

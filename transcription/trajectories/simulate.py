@@ -36,6 +36,16 @@ class Simulation:
         The simulated one.
     quantities : tuple of arrays
         What objectives and constraints see of each phase.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> check = front[1].simulate()
+    >>> check.max_defect < 1e-3 and check.violation < 1e-3
+    True
     """
 
     defect: Mapping[str, Mapping[str, float]]

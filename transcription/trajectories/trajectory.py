@@ -25,6 +25,14 @@ class PiecewisePolynomial:
         Of `k` quantities in the basis, on each element.
     basis : str
         One of `polynomials.BASES`: "lobatto", "legendre" (values at those nodes) or "bernstein".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from transcription import PiecewisePolynomial
+    >>> line = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[0.0], [2.0]]]), "lobatto")
+    >>> float(line(0.5)[0])
+    1.0
     """
 
     edges: np.ndarray
@@ -78,6 +86,24 @@ class PhaseTrajectory:
     `states` (n, nx), `controls` (n, nu) and `paths` (n, npath) are the values there; `state`, which is continuous, and `control`
     interpolate. A periodic control is continued beyond its bounds inside an element, so that it interpolates the short way round. All in
     the user's units.
+
+    Parameters
+    ----------
+    name, time_unit : str
+    time, states, controls, paths : array
+    state, control : PiecewisePolynomial
+    state_variables, control_variables : tuple of Variable
+    path_limits : tuple of Limit
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> flight = front[1].trajectory["ascent"]
+    >>> print(len(flight.time) == len(flight["y"]), round(float(flight["y"][-1]), 3))
+    True 10.0
     """
 
     name: str
@@ -153,7 +179,23 @@ class PhaseTrajectory:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Mapping[str, PhaseTrajectory]):
-    """A whole trajectory: its phases by name, in the order in which they were declared, and its static parameters."""
+    """A whole trajectory: its phases by name, in the order in which they were declared, and its static parameters.
+
+    Parameters
+    ----------
+    phases : tuple of PhaseTrajectory
+    parameters : mapping
+        Values by name.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> list(front[1].trajectory), front[1].trajectory.parameters
+    (['ascent'], {})
+    """
 
     phases: tuple[PhaseTrajectory, ...]
     parameters: Mapping[str, float]
@@ -162,6 +204,12 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
         phases = ", ".join(f"'{phase.name}' {phase.t0:g} to {phase.tf:g} {phase.time_unit}" for phase in self.phases)
         parameters = "".join(f", {name}={value:g}" for name, value in self.parameters.items())
         return f"Trajectory({phases}{parameters})"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a table for each phase, with a small line of each quantity over time."""
+        from .html import trajectory_html
+
+        return trajectory_html(self)
 
     def __getitem__(self, name: str) -> PhaseTrajectory:
         for phase in self.phases:

@@ -10,7 +10,8 @@ import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from .style import COLORS, GREY, STYLE, label, new_figure, wrapped
+from .limits import draw_limits
+from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, plain, wrapped
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -20,17 +21,32 @@ DENSE = np.linspace(-1.0, 1.0, 41)
 """Points in [-1, 1] of each element at which its polynomials are drawn."""
 
 
+LEAST = 1e-3
+"""Least part of the span of its bounds by which a state counts as moving where that is a measure for its costate."""
+
+
 FLAT = 0.02
 """Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
 
 
-def draw_flight(trajectory: Trajectory, title: str, figure: Any = None, costates: Costates | None = None) -> np.ndarray:
+NODES = 60
+"""Most nodes of a phase that are drawn as dots: more would hide the line."""
+
+
+PANEL = (3.6, 1.75)
+"""Inches: width and height of a panel."""
+
+
+def draw_flight(
+    trajectory: Trajectory, title: str, figure: Any = None, costates: Costates | None = None, hollow: bool = False
+) -> np.ndarray:
     """Axes, one for each panel, with all phases on one time axis: a panel for each state, control and path constraint; from a new row on,
     if there are any, one for each costate and one for the Hamiltonian.
 
-    Lines are the polynomials of the transcription on each element, so that jumps are visible; dots are its nodes. Dashed lines are bounds,
-    if they are not too far from the values; the text above each panel always gives them. Above the Hamiltonian are the weights of the
-    objectives.
+    Lines are the polynomials of the transcription on each element, so that jumps are visible; dots are its nodes, unless there are many.
+    Dashed lines are bounds and limits, if they are not too far from the values; the text above each panel always gives them. A constant is
+    drawn within its bounds, or on a range about it. Costates and the Hamiltonian are of the sum of the objectives times their weights,
+    which are above the latter.
 
     Parameters
     ----------
@@ -41,6 +57,8 @@ def draw_flight(trajectory: Trajectory, title: str, figure: Any = None, costates
         Empty figure to draw into. Default: a new one.
     costates : Costates, optional
         Of the trajectory.
+    hollow : bool
+        Whether the dots are hollow: of a trajectory that is not verified.
     """
     import matplotlib
 
@@ -51,54 +69,79 @@ def draw_flight(trajectory: Trajectory, title: str, figure: Any = None, costates
         above = -(-len(panels) // columns)
         rows = above if costates is None else above - (-(len(states) + 1) // columns)
         if figure is None:
-            figure = new_figure(3.6 * columns + 0.4, 1.75 * rows + 0.6)
+            figure = new_figure(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
         else:
-            figure.set_size_inches(3.6 * columns + 0.4, 1.75 * rows + 0.6)
+            figure.set_size_inches(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for ax, (name, kind) in zip(grid, panels, strict=False):
-            _draw_panel(ax, trajectory, name, kind)
+            _draw_panel(ax, trajectory, name, kind, hollow)
         used = list(range(len(panels)))
         if costates is not None:
             used += range(above * columns, above * columns + len(states) + 1)
-            draw_costates(grid[used[len(panels) :]], trajectory, costates, states)
+            _draw_costates(grid[used[len(panels) :]], trajectory, costates, states)
         for ax in np.delete(grid, used):
             ax.remove()
         _finish(figure, grid, used, columns, trajectory, title)
     return grid[used]
 
 
-def draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
+def _draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
     """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one."""
-    worth = max(_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    worth = max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
     for ax, name in zip(axes, [*states, None], strict=True):
         everything: list[np.ndarray] = []
         ranges: list[np.ndarray] = []
+        units: list[str] = []
         for k, phase in enumerate(trajectory.phases):
             own, color = costates[phase.name], COLORS[k % len(COLORS)]
             if name is None:
                 values = own.hamiltonian
                 ranges.append(phase.time)
+                units.append(phase.time_unit)
                 ax.plot(phase.time, values, color=color, lw=1.0)
             elif name in own:
                 values = own[name]
-                ranges.append(phase[name])
+                units.append(next(v.unit for v in phase.state_variables if v.name == name))
+                ranges.append(_range_of(phase, name))
                 times, line = _dense(own.polynomial.edges, own.polynomial.on_element, own.names.index(name), None)
                 ax.plot(times, line, color=color, lw=1.3)
                 everything.append(line[np.isfinite(line)])
             else:
                 continue
-            ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
+            _dots(ax, phase.time, values, color)
             everything.append(values)
         drawn, unit = np.concatenate(everything), float(np.ptp(np.concatenate(ranges)))
         least = FLAT * worth / unit if unit > 0 else 0.0
         middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least, 1e-12)
         ax.set_ylim(middle - 1.12 * half, middle + 1.12 * half)
-        ax.set_ylabel("Hamiltonian" if name is None else f"costate of {name}")
+        per = f"per {units[0]}" if len(set(units)) == 1 and units[0] else ""
+        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", per))
     weights = ", ".join(f"{weight:.3g}" for weight in costates.weights)
-    axes[-1].set_title(f"weights {weights}", loc="right", fontsize=7, color=GREY, pad=2)
+    axes[-1].set_title(f"weights of the objectives: {weights}", loc="right", fontsize=7, color=GREY, pad=2)
 
 
-def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
+def _beside(name: str, unit: str) -> str:
+    """The label of a vertical axis, in lines no longer than a panel is high."""
+    return wrapped(axis_label(name, unit), PANEL[1] - 0.25)
+
+
+def _dots(ax: Any, times: np.ndarray, values: np.ndarray, color: str, hollow: bool = False) -> None:
+    """Nodes as dots, if there are not too many; hollow ones in any case, but no more than that."""
+    if hollow:
+        every = -(-len(values) // NODES)
+        ax.plot(times, values, "o", color=color, ms=3.2, mfc="white", mew=0.7, markevery=every, zorder=3)
+    elif len(values) <= NODES:
+        ax.plot(times, values, ".", color=color, ms=3.5)
+
+
+def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
+    """Values of a state; two values a thousandth of its bounds apart if it moves less."""
+    values, variable = phase[name], next(v for v in phase.state_variables if v.name == name)
+    least = LEAST * variable.span
+    return values if np.ptp(values) >= least else np.array([0.0, least])
+
+
+def costates_worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
     """How much the largest costate of each state is worth over the range of the state, all states together."""
     return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 
@@ -122,7 +165,7 @@ def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
     return phase.time, phase[name]
 
 
-def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str) -> None:
+def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str, hollow: bool) -> None:
     drawn: list[np.ndarray] = []
     limits: list[tuple[PhaseTrajectory, Variable | Limit]] = []
     for k, phase in enumerate(trajectory.phases):
@@ -138,11 +181,11 @@ def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str) -> None:
         values, (times, line) = phase[name], along(phase, name)
         ax.plot(times, line, color=color, lw=0.9 if kind == "path" else 1.3)
         drawn.append(line[np.isfinite(line)])
-        ax.plot(phase.time, values, ".", color=color, ms=3.5 if len(values) < 50 else 2.0)
+        _dots(ax, phase.time, values, color, hollow)
         drawn.append(values)
         limits.append((phase, owners[kind][index]))
-    _bounds(ax, np.concatenate(drawn), limits)
-    ax.set_ylabel(label(name, getattr(limits[0][1], "unit", "")))
+    draw_limits(ax, np.concatenate(drawn), [((phase.t0, phase.tf), limit.lower, limit.upper) for phase, limit in limits])
+    ax.set_ylabel(_beside(name, getattr(limits[0][1], "unit", "")))
     ranges = dict.fromkeys(_range(limit) for _, limit in limits)
     ax.set_title("; ".join(ranges), loc="right", fontsize=7, color=GREY, pad=2)
 
@@ -163,27 +206,9 @@ def _dense(
     return np.concatenate(times), np.concatenate(values)
 
 
-def _bounds(ax: Any, values: np.ndarray, limits: list[tuple[PhaseTrajectory, Variable | Limit]]) -> None:
-    """Draw dashed lines at the bounds that are at most one range of the values away from them."""
-    values = values[np.isfinite(values)]
-    low, high = (values.min(), values.max()) if len(values) else (0.0, 1.0)
-    reach = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
-    near = [
-        (phase, bound)
-        for phase, limit in limits
-        for bound in dict.fromkeys((limit.lower, limit.upper))
-        if np.isfinite(bound) and low - reach <= bound <= high + reach
-    ]
-    for phase, bound in near:
-        ax.plot([phase.t0, phase.tf], [bound, bound], color=GREY, lw=0.8, ls=(0, (5, 3)), zorder=1)
-        low, high = min(low, bound), max(high, bound)
-    margin = 0.06 * max(high - low, reach)
-    ax.set_ylim(low - margin, high + margin)
-
-
 def _range(limit: Variable | Limit) -> str:
     """The bounds as text: in [0, 40], = 3, or the finite one alone."""
-    low, high = (f"{value + 0.0:.4g}".replace("-", "\N{MINUS SIGN}") for value in (limit.lower, limit.upper))
+    low, high = axis_number(limit.lower), axis_number(limit.upper)
     if np.isinf(limit.lower):
         return f"\N{LESS-THAN OR EQUAL TO} {high}"
     if np.isinf(limit.upper):
@@ -198,7 +223,8 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
         for phase in trajectory.phases[1:]:
             ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
         ax.tick_params(labelbottom=i + columns not in used)
-    figure.supxlabel(label("time", unit), fontsize=9)
+    figure.supxlabel(axis_label("time", unit), fontsize=9)
+    figure.align_ylabels()
     ax = grid[0]
     first, last = trajectory.phases[0].t0, max(phase.tf for phase in trajectory.phases)
     margin = 0.015 * (last - first) or 1.0  # phases without duration are seen, too
@@ -206,6 +232,6 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
     if len(trajectory) > 1:
         from matplotlib.lines import Line2D
 
-        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=name) for k, name in enumerate(trajectory)]
+        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(trajectory)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
-    figure.suptitle(wrapped(title, figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+    figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")

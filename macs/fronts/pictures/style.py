@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import re
 import textwrap
 from typing import Any
 
@@ -16,6 +18,13 @@ GREY = "#666666"
 
 LETTER = 0.6
 """Width of a letter, of its size: more than that of most words, so that lines end before the picture does."""
+
+
+POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU)\^?(-?\d)\b")
+"""A unit of length, time, angle or temperature with its power, as it is typed: m2, s^2."""
+
+
+RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 STYLE = {
@@ -56,9 +65,32 @@ def blank_figure() -> Any:
     return Figure(figsize=(5.5, 4.0), layout="constrained")
 
 
+def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
+    """A figure as the content of a file of a format."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format=suffix, dpi=dpi)
+    return picture.getvalue()
+
+
 def label(name: str, unit: str) -> str:
-    """Label of an axis: `name [unit]`."""
+    """Name of a column or a line: `name [unit]`."""
     return f"{name} [{unit}]" if unit else name
+
+
+def axis_label(name: str, unit: str) -> str:
+    """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
+    return plain(label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def plain(text: str) -> str:
+    """Words of the user for a picture: of two dollars matplotlib would make mathematics."""
+    return text.replace("$", r"\$") if text.count("$") > 1 else text
+
+
+def axis_number(value: float) -> str:
+    """A number beside an axis: four digits, five of large ones, without powers of ten from a ten-thousandth to a million."""
+    text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e6 else f"{value:.0f}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:
@@ -68,5 +100,23 @@ def wrapped(text: str, width: float, size: float = 9.0) -> str:
 
 def better(goal: Objective) -> str:
     """Label of an axis with an arrow towards better values; on a vertical axis, left means down."""
-    text = label(goal.name, goal.unit)
+    text = axis_label(goal.name, goal.unit)
     return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"
+
+
+def title_and_legend(ax: Any, title: str, columns: int = 3) -> None:
+    """Write the title of axes and below it, above the axes, where no data can be, their legend in at most so many columns."""
+    handles, names = ax.get_legend_handles_labels()
+    pad = None
+    if handles:
+        room = ax.bbox.width / ax.figure.dpi
+        names = [wrapped(plain(name), room - 0.4, 8.0) for name in names]
+        for count in range(min(columns, len(names)), 0, -1):
+            place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+            legend = ax.legend(handles, names, frameon=False, ncols=count, handletextpad=0.4, **place)
+            box = legend.get_window_extent()
+            if box.width <= ax.bbox.width:
+                break
+        pad = 72.0 * box.height / ax.figure.dpi + 4.0
+    if title:
+        ax.set_title(plain(title), loc="left", color=GREY, pad=pad)

@@ -93,6 +93,17 @@ class Smaller(ObjectiveClass):
     """Smaller is better (class 1S): `Smaller(J1, J2, J3, J4, J5)`, increasing.
 
     Up to J1 the objective is ideal, then desirable, tolerable, undesirable, highly undesirable, and beyond J5 unacceptable.
+
+    Parameters
+    ----------
+    *boundaries : float
+        J1 to J5, increasing.
+
+    Examples
+    --------
+    >>> from macs.decisions import Smaller
+    >>> Smaller(120, 140, 170, 210, 260).boundaries
+    (120.0, 140.0, 170.0, 210.0, 260.0)
     """
 
     SENSE = "minimize"
@@ -108,7 +119,19 @@ class Smaller(ObjectiveClass):
 
 
 class Larger(ObjectiveClass):
-    """Larger is better (class 2S): `Larger(J1, J2, J3, J4, J5)`, decreasing."""
+    """Larger is better (class 2S): `Larger(J1, J2, J3, J4, J5)`, decreasing.
+
+    Parameters
+    ----------
+    *boundaries : float
+        J1 to J5, decreasing.
+
+    Examples
+    --------
+    >>> from macs.decisions import Larger
+    >>> Larger(0.9, 0.8, 0.6, 0.4, 0.1).boundaries
+    (0.9, 0.8, 0.6, 0.4, 0.1)
+    """
 
     RISING = False
     SENSE = "maximize"
@@ -124,7 +147,19 @@ class Larger(ObjectiveClass):
 
 
 class Value(ObjectiveClass):
-    """A value is best (class 3S): `Value(J5, J4, J3, J2, J1, J2, J3, J4, J5)`, increasing; the fifth is the ideal value J1."""
+    """A value is best (class 3S): `Value(J5, J4, J3, J2, J1, J2, J3, J4, J5)`, increasing; the fifth is the ideal value J1.
+
+    Parameters
+    ----------
+    *boundaries : float
+        Nine, increasing.
+
+    Examples
+    --------
+    >>> from macs.decisions import Value
+    >>> len(Value(1, 2, 3, 4, 5, 6, 7, 8, 9).boundaries)
+    9
+    """
 
     NUMBER = 9
 
@@ -138,7 +173,19 @@ class Value(ObjectiveClass):
 
 
 class Range(ObjectiveClass):
-    """A range is best (class 4S): `Range(J5, J4, J3, J2, J1, J1, J2, J3, J4, J5)`, increasing; the range between the two J1 is ideal."""
+    """A range is best (class 4S): `Range(J5, J4, J3, J2, J1, J1, J2, J3, J4, J5)`, increasing; the range between the two J1 is ideal.
+
+    Parameters
+    ----------
+    *boundaries : float
+        Ten, increasing.
+
+    Examples
+    --------
+    >>> from macs.decisions import Range
+    >>> len(Range(1, 2, 3, 4, 5, 6, 7, 8, 9, 10).boundaries)
+    10
+    """
 
     NUMBER = 10
 

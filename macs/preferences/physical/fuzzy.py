@@ -35,6 +35,17 @@ class FuzzyPhysicalProgramming(PhysicalProgramming):
         a class.
     printed : bool
         Whether the Gaussian is centred at the nearest boundary, as eq. (35) is printed: that function jumps half-way between boundaries.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzyPhysicalProgramming, Smaller
+    >>> wish = FuzzyPhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)}, spread={"flight time": 5.0})
+    >>> print(wish.rank(front).order)  # best first
+    [0 1 2]
     """
 
     _: KW_ONLY

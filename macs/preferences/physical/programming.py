@@ -41,6 +41,17 @@ class PhysicalProgramming(Preference):
     beta : float
         Factor of the steps between the values at the boundaries, with one for other objectives. It is raised until each preference function
         is convex, and so monotone, on each side: `functions[name].beta`.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import PhysicalProgramming, Smaller
+    >>> wish = PhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)})
+    >>> print(wish.rank(front).order)  # best first
+    [0 1 2]
     """
 
     classes: Mapping[str, ObjectiveClass]

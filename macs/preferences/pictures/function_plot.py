@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ...fronts.pictures.style import COLORS, GREY, STYLE, better, label, new_figure
+from ...fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure
 from .bands import shade_ranges
 
 SAMPLES = 801
@@ -101,4 +101,4 @@ def _draw(curve: Curve, ax: Any, points: np.ndarray, best: int | None, logarithm
     if logarithmic:
         ax.set_yscale("log")
     ax.set_xlim(curve.low, curve.high)
-    ax.set_xlabel(better(curve.goal) if curve.directed else label(curve.goal.name, curve.goal.unit))
+    ax.set_xlabel(better(curve.goal) if curve.directed else axis_label(curve.goal.name, curve.goal.unit))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...fronts.pictures.style import COLORS, GREY, STYLE, better, label, new_figure
+from ...fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure, title_and_legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +41,7 @@ def draw_ranking(front: Any, order: np.ndarray, apart: Mapping[str, np.ndarray],
         place[order] = np.arange(len(order))
         draw = _parallel if len(front.goals) > 2 else _scatter
         draw(front, place, apart, ax)
-        ax.set_title(title, loc="left", color=GREY)
+        title_and_legend(ax, title)
     return ax
 
 
@@ -56,7 +56,6 @@ def _scatter(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax:
             ax.scatter(x[rows], y[rows], s=26, facecolors="none", edgecolors=color, linewidths=0.9, zorder=2, label=name)
     best = int(np.argmin(place))
     ax.scatter(x[best], y[best], s=130, facecolors="none", edgecolors=BEST, linewidths=1.6, zorder=4, label=f"best (#{best})")
-    ax.legend(frameon=True, framealpha=0.85, edgecolor="none", loc="best")
     if met.any():
         _bar(drawn, ax)
     ax.set_xlabel("rank" if J.shape[1] == 1 else better(front.goals[0]))
@@ -82,7 +81,6 @@ def _parallel(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax
         if met[i] and i != best:
             ax.plot(height[i], color=shade(norm(place[i] + 1)), lw=1.0, alpha=0.85)
     ax.plot(height[best], color=BEST, lw=2.2, marker="o", ms=4, label=f"best (#{best})", zorder=4)
-    ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     _bar(ScalarMappable(norm, shade), ax)
     for k, goal in enumerate(front.goals):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
@@ -91,7 +89,7 @@ def _parallel(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax
     ax.grid(False)
     ax.set_xlim(-0.3, len(front.goals) - 0.7)
     ax.set_ylim(-0.12, 1.12)
-    ax.set_xticks(range(len(front.goals)), [f"{label(goal.name, goal.unit)}\n{goal.sense[:3]}" for goal in front.goals])
+    ax.set_xticks(range(len(front.goals)), [f"{axis_label(goal.name, goal.unit)}\n{goal.sense[:3]}" for goal in front.goals])
     ax.set_yticks([0, 1], ["worst", "best"])
     ax.tick_params(length=0)
     for side in ("left", "bottom"):

@@ -17,7 +17,7 @@ from transcription import Transcription, parse
 from transcription.stopping import stopped_by
 
 from ...measures.indicators import hypervolume
-from ..measured import Column, Row, short, table
+from ..measured import Column, Row, Target, short, table, verdicts
 from .cases import CASES, Case
 
 POINTS = 10
@@ -26,6 +26,9 @@ SWEEP, SWEEPS = "sweep", "sweep, ten starts"
 SAME, END = 0.99, 1e-3
 """A front is as good as another one with this part of its hypervolume, up to 1.1 of the ranges of both, and ends that are worse by no more
 than this part of the ranges."""
+
+ASKED = 1.3
+"""Times the time of the better other inner level, at most."""
 
 
 @dataclass(frozen=True)
@@ -113,24 +116,39 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
-        *_verdicts(rows),
+        *_beside_sweeps(rows),
+        "",
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
 
 
-def _verdicts(rows: Sequence[Row]) -> list[str]:
-    found = {(row.case, row.who): row for row in rows}
-    lines = []
-    for case in dict.fromkeys(row.case for row in rows):
-        rivals = [found[case, who] for who in (PROPAGATE, PROJECTION)]
-        best = min((row.of("ratio") for row in rivals if row.of("good") == 1.0), default=np.inf)
-        said = "no other inner level is as good" if np.isinf(best) else f"{short(1 / best)} times as long as the better other inner level"
-        one = found[case, SWEEP]
-        told = (
-            f"{short(1 / one.of('ratio'))} times as long as a sweep from one start" if one.of("good") == 1.0 else "one start is not enough"
-        )
-        lines.append(f"{case}: {said} (asked 1.3 at most); {told}")
-    return lines
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """The search that chooses its inner level takes little more time than the better one of them, where one is as good."""
+    made = []
+    for case, found in _by_case(rows).items():
+        others = [found[who].of("ratio") for who in (PROPAGATE, PROJECTION) if found[who].of("good") == 1.0]
+        value = f"{short(1 / min(others))} times" if others else "none is as good"
+        asked = f"at most {ASKED:g} times as long as the better other inner level"
+        made.append(Target(case, asked, value, not others or 1 / min(others) <= ASKED))
+    return made
+
+
+def _beside_sweeps(rows: Sequence[Row]) -> list[str]:
+    """What a sweep from one start takes, where its front is as good."""
+    return [
+        f"{case}: {short(1 / one.of('ratio'))} times as long as a sweep from one start"
+        if (one := found[SWEEP]).of("good") == 1.0
+        else f"{case}: a sweep from one start is not as good"
+        for case, found in _by_case(rows).items()
+    ]
+
+
+def _by_case(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
+    found: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        found.setdefault(row.case, {})[row.who] = row
+    return found
 
 
 COLUMNS: tuple[Column, ...] = (

@@ -10,8 +10,8 @@ import numpy as np
 
 from macs.io.console import Steps
 
-from ..apart import lines_apart
-from ..measured import Column, Row, short, table
+from ...execution.apart import lines_apart
+from ..measured import Column, Row, Target, short, table, verdicts
 from .series import SERIES, Series
 
 ASKED = 1.1
@@ -78,21 +78,21 @@ def exponent(sizes: np.ndarray, costs: np.ndarray) -> float:
     return float(np.polyfit(np.log(sizes), np.log(np.maximum(costs, 1e-6)), 1)[0])
 
 
-def superlinear(rows: Sequence[Row]) -> list[str]:
-    """What grows faster than asked by the median of its exponents, or did not come to its end, as texts."""
-    found = [
-        f"{row.case}: {kind} grows with the power {row.of(kind):.2f} of {row.who}"
-        for row in rows
-        for kind in KINDS
-        if row.values.get(kind) and row.of(kind) > ASKED
-    ]
-    return found + [f"{row.case}: it did not come to its end" for row in rows if row.values.get("unfinished")]
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """No cost grows faster than asked, by the median of its exponents, and all series come to their end."""
+    made = []
+    for kind in KINDS:
+        powers = {row.case: row.of(kind) for row in rows if row.values.get(kind)}
+        worst = max(powers, key=lambda case: powers[case], default="")
+        too_large = {case: power for case, power in powers.items() if not power <= ASKED} or ({worst: powers[worst]} if worst else {})
+        measured = ", ".join(f"{power:.2f} ({case})" for case, power in too_large.items()) or "-"
+        made.append(Target(f"exponents of {kind}", f"at most {ASKED:g} each", measured, all(power <= ASKED for power in powers.values())))
+    unfinished = [row.case for row in rows if row.values.get("unfinished")]
+    return [*made, Target("series without an end", "none", ", ".join(unfinished) or "none", not unfinished)]
 
 
 def report(rows: Sequence[Row]) -> str:
     """The measured values, and the limit."""
-    wrong = superlinear(rows)
-    times = [row.of("time") for row in rows if row.values.get("time")]
     lines = [
         "GROWTH: CPU time and peak memory of work at increasing sizes, each series in a process of its own. Exponents: the power of the",
         f"size with which they grow over the {FITTED} largest sizes, 1 for a cost that is proportional to it. Memory: above that of a",
@@ -100,9 +100,7 @@ def report(rows: Sequence[Row]) -> str:
         "",
         table(rows, COLUMNS),
         "",
-        f"exponents: asked at most {ASKED:g} each, by the median, measured {max(times, default=np.nan):.2f} of time at most, "
-        f"{'MISSED' if wrong else 'met'}",
-        *wrong,
+        *verdicts(targets(rows)),
     ]
     return "\n".join(lines)
 

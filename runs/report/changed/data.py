@@ -212,7 +212,7 @@ def changed_figure(change: Change) -> Figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex="all", sharey=shared).ravel()
         for place, (ax, (problem, (i, k))) in enumerate(zip(grid, places, strict=False)):
             _draw(ax, change, problem, [i, k])
-            ax.set_title(problem, loc="left")
+            ax.set_title(_shown(change, problem), loc="left")
             if place + columns >= len(places):
                 ax.set_xlabel(better(goals[i]))
                 ax.tick_params(labelbottom=True)
@@ -223,6 +223,12 @@ def changed_figure(change: Change) -> Figure:
         handles, names = grid[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper left", ncols=2 if columns == 1 else 4, frameon=False, handletextpad=0.3)
     return figure
+
+
+def _shown(change: Change, problem: str) -> str:
+    """The name of a problem whose label is an address of code; else the label."""
+    source = change.simulated[problem].source
+    return source.name if source is not None and ".py:" in problem else problem
 
 
 def _draw(ax: Any, change: Change, problem: str, pair: Sequence[int]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from macs.front import Front
-from macs.fronts.pictures.style import COLORS, label
+from macs.fronts.pictures.style import COLORS, axis_label
 
 from ...data.schema import errors_begin_with
 from ...measures.references import module_of
@@ -143,9 +143,9 @@ def dispersed_figure(found: DispersedFront) -> Figure:
             low, high = ax.dataLim.intervaly
             if low > 0.0 and high > WIDE * low:
                 ax.set_yscale("log")
-            ax.set_title(label(name, unit), loc="left")
+            ax.set_title(axis_label(name, unit), loc="left")
             if place + columns >= len(panels):
-                ax.set_xlabel(label(goal.name, goal.unit))
+                ax.set_xlabel(axis_label(goal.name, goal.unit))
                 ax.tick_params(labelbottom=True)
         for ax in grid[len(panels) :]:
             ax.remove()

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights, marked
 
 from macs.fronts.pictures.flight_plot import _dense
-from macs.fronts.pictures.style import blank_figure
-from problems.compiled import Objective
+from macs.fronts.pictures.limits import draw_limits
+from macs.fronts.pictures.style import axis_label, axis_number, blank_figure
+from problems.compiled import Objective, Variable
 
 
 def draw(figure: Figure) -> bytes:
@@ -161,3 +162,101 @@ def test_pictures_need_no_display(tmp_path):
     environment = {"PATH": "", "PYTHONPATH": ":".join(sys.path), "MPLBACKEND": "TkAgg", "MPLCONFIGDIR": str(tmp_path)}
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True, timeout=60)
     assert (tmp_path / "a.png").stat().st_size > 1000 and (tmp_path / "b.png").stat().st_size > 1000
+
+
+def test_legends_stand_above_the_axes_and_below_the_title():
+    """Also of long names, which are wrapped: no data can be behind them."""
+    long = [Objective(f"an objective with a long name, number {k}, as users have them", "kg m2/s2") for k in range(2)]
+    for front in (
+        flights(6),
+        marked(flights(3), [False] * 3),
+        black_box(9, 2, goals=long),
+        marked(black_box(4, 5), [True, False, True, False]),
+    ):
+        ax = front.plot()
+        ax.figure.draw_without_rendering()
+        legend, title = ax.get_legend().get_window_extent(), ax._left_title.get_window_extent()
+        assert legend.y0 >= ax.bbox.y1 - 1.0 and title.y0 >= legend.y1 - 1.0
+        assert legend.x1 <= ax.figure.bbox.x1 + 1.0 and title.y1 <= ax.figure.bbox.y1 + 1.0
+
+
+@pytest.mark.parametrize(
+    ("values", "limits", "expected"),
+    [
+        ([0.9999999992, 1.0], (0.0, 1.0), (0.0, 1.0)),  # a control on its bound
+        ([0.3, 0.3], (-1.5, 1.5), (-1.5, 1.5)),
+        ([0.0, 2e-7], (-10.0, 10.0), (-10.0, 10.0)),  # round-off of zero
+        ([0.01, 0.01], (-1.5, 1.5), (0.009, 0.011)),  # too small to be read within its bounds
+        ([6378.0, 6378.0], (1.0, 1e9), (5740.2, 7015.8)),
+        ([5.0, 5.0], (-np.inf, np.inf), (4.5, 5.5)),
+        ([0.0, 0.0], (-np.inf, 0.5), (-1.0, 1.0)),
+        ([0.0, 0.4], (-10.0, 10.0), (0.0, 0.4)),  # no constant
+        ([0.0, 0.4], (-0.1, 0.5), (-0.1, 0.5)),  # with its limits
+    ],
+)
+def test_constants_are_drawn_within_their_bounds_or_about_their_value(values, limits, expected):
+    ax = blank_figure().add_subplot()
+    draw_limits(ax, np.array(values), [(None, *limits)])
+    low, high = ax.get_ylim()
+    room = 0.06 * (expected[1] - expected[0])
+    assert (low + room, high - room) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    assert [line.get_ydata()[0] for line in ax.lines] == [bound for bound in limits if expected[0] <= bound <= expected[1]]
+
+
+def test_limits_of_paths_are_drawn_over_their_own_phase():
+    """The load reaches its limit of 2; it has none below."""
+    flight = flights()[0]
+    ax = flight.plot()[3]
+    dashed = [line for line in ax.lines if line.get_linestyle() == "--"]
+    assert len(dashed) == 1 and set(dashed[0].get_ydata()) == {2.0}
+    assert list(dashed[0].get_xdata()) == [flight.trajectory["climb"].t0, flight.trajectory["climb"].tf]
+
+
+def test_trajectories_that_are_not_verified_say_so_and_have_hollow_nodes():
+    front = marked(flights(3, status=["converged", "converged", "infeasible"]), [True, False, False])
+    titles, hollow = [], []
+    for point in front:
+        axes = point.plot()
+        titles.append(axes[0].figure.get_suptitle())
+        hollow.append([line.get_markerfacecolor() for line in axes[0].lines if line.get_marker() == "o"])
+    assert not hollow[0] and hollow[1] == hollow[2] == ["white", "white"]
+    assert [title.rpartition("; ")[2] for title in titles[1:]] == ["not verified", "not feasible"] and ";" not in titles[0]
+
+
+def test_designs_that_are_not_verified_are_hollow():
+    F = np.array([[1.0, 4.0], [2.0, 3.0], [3.0, 2.0], [4.0, 1.0]])
+    front = marked(black_box(4, 2, F=F, status=["converged"] * 3 + ["infeasible"]), [True, False, True, False])
+    ax = front.plot_variables()[0]
+    found = told(ax)
+    assert np.array_equal(found["not verified"][:, 1], front.decision[[1], 0])
+    assert np.array_equal(found["not feasible"][:, 1], front.decision[[3], 0])
+    assert [text.get_text() for text in ax.figure.legends[0].get_texts()] == ["not verified", "not feasible"]
+    assert ax.figure.get_suptitle() == "black box: 4 points" and front[1].plot()[0].figure.get_suptitle().endswith("; not verified")
+
+
+def test_long_labels_stay_beside_their_panels():
+    """A label never breaks within its unit, and is no longer than its panel is high."""
+    wide = black_box(4, 2, variables=[Variable(f"the angle of attack that is commanded, {k}", 0.0, 1.0, "kg m2/s2") for k in range(3)])
+    axes = wide.plot_variables()
+    axes[0].figure.draw_without_rendering()
+    for ax in axes:
+        assert ax.yaxis.label.get_window_extent().height <= 1.25 * ax.bbox.height
+        assert ax.get_ylabel().endswith("[kg\N{NO-BREAK SPACE}m²/s²]")
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"), [("m2/s3", "m²/s³"), ("1/m2", "1/m²"), ("N^2 s", "N^2 s"), ("t CO2", "t CO2"), ("m s^-2", "m s⁻²"), ("%", "%")]
+)
+def test_powers_of_units_are_raised(unit, shown):
+    assert axis_label("x", unit).replace("\N{NO-BREAK SPACE}", " ") == f"x [{shown}]"
+
+
+def test_numbers_beside_axes_have_no_powers_of_ten():
+    assert [axis_number(value) for value in (17344.2, -0.5, 1234.5, 999999.0, 2e6)] == ["17344", "−0.5", "1234", "999999", "2e+06"]
+
+
+def test_one_point_of_one_objective_has_whole_numbers_below():
+    ax = black_box(1, 1).plot()
+    ax.figure.draw_without_rendering()
+    low, high = ax.get_xlim()
+    assert [place for place in ax.get_xticks() if low <= place <= high] == [0.0]

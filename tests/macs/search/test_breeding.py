@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from macs.evaluation.box import Box
 from macs.search import breeding
-from macs.search import credit as credit_of
 from macs.search.macs import MACS
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -96,53 +95,52 @@ def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
 
 
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
-    credit, count = credit_of.no_credit(len(breeding.OPERATORS)), len(breeding.OPERATORS)
-    assert np.allclose(credit_of.operator_shares(credit, 2), 1 / count)
+    credit, count = breeding.no_credit(len(breeding.OPERATORS)), len(breeding.OPERATORS)
+    assert np.allclose(breeding.operator_shares(credit), 1 / count)
     operator = np.repeat(np.arange(count), 25)
     for _ in range(40):
-        credit = credit_of.updated_credit(credit, operator, operator == 1)
-    share = credit_of.operator_shares(credit, 2)
+        credit = breeding.updated_credit(credit, operator, operator == 1)
+    share = breeding.operator_shares(credit)
     assert share.sum() == pytest.approx(1.0)
     assert share.argmax() == 1
     assert share[1] > 0.8
-    assert np.allclose(share[[0, 2, 3]], credit_of.LEAST_SHARE, atol=0.01)
+    assert np.allclose(share[[0, 2, 3]], breeding.LEAST_SHARE, atol=0.01)
     for _ in range(40):  # what was is forgotten
-        credit = credit_of.updated_credit(credit, operator, operator == 2)
-    assert credit_of.operator_shares(credit, 2).argmax() == 2
+        credit = breeding.updated_credit(credit, operator, operator == 2)
+    assert breeding.operator_shares(credit).argmax() == 2
 
 
 def test_nothing_tried_changes_nothing_that_can_be_seen():
     credit = np.zeros((len(breeding.OPERATORS), 2))
-    assert np.array_equal(credit_of.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
-    assert np.allclose(credit_of.operator_shares(credit, 2), 1 / len(credit))
+    assert np.array_equal(breeding.updated_credit(credit, np.arange(0), np.zeros(0, dtype=bool)), credit)
+    assert np.allclose(breeding.operator_shares(credit), 1 / len(credit))
 
 
-def test_offspring_is_judged_by_what_has_stayed_at_once_with_few_objectives_and_later_with_many():
-    young = credit_of.Offspring(np.repeat([[0.0], [1.0], [0.5]], 4, axis=1), np.array([0, 2, 2]), np.array([3, 3, 4]))
-    archive = np.repeat([[1.0], [0.2], [0.5]], 4, axis=1)
-    credit, now = credit_of.no_credit(len(breeding.OPERATORS)), 3 + credit_of.LATER
-    same, unchanged = credit_of.judged(young, credit, archive, now - 1)
-    assert same is young
-    assert unchanged is credit
-    left, found = credit_of.judged(young, credit, archive, now)
-    assert left.F.tolist() == [[0.5] * 4]
-    assert (left.operator.tolist(), left.born.tolist()) == ([2], [4])
-    kept = (1 - credit_of.FORGET) * credit
-    assert np.allclose(found - kept, [[0, 1], [0, 0], [1, 1], [0, 0]])
-    none, _ = credit_of.judged(left, found, archive, now + 1)
-    assert none.F.shape == (0, 4)
-    few = credit_of.Offspring(young.F[:, :3], young.operator, np.full(3, 7))
-    none, found = credit_of.judged(few, credit, archive[:, :3], 7)
-    assert len(none.F) == 0
-    assert np.allclose(found - kept, [[0, 1], [0, 0], [2, 2], [0, 0]])
+def test_with_many_objectives_shares_are_fixed_and_crossover_has_most():
+    assert breeding.SHARES_MANY.sum() == pytest.approx(1.0)
+    assert breeding.SHARES_MANY[0] > 0.8
+    assert (breeding.SHARES_MANY >= breeding.LEAST_SHARE).all()
+    for (few, mutates), (many, also) in zip(breeding.OPERATORS, breeding.OPERATORS_MANY, strict=True):
+        assert mutates == also
+        assert (few is many) == (few is not breeding.crossover)
 
 
-def test_what_succeeds_more_often_has_clearly_more_of_the_offspring_with_many_objectives():
-    credit = np.array([[60.0, 100.0], [30.0, 100.0], [30.0, 100.0], [30.0, 100.0]])
-    few, many = credit_of.operator_shares(credit, 3), credit_of.operator_shares(credit, 4)
-    assert few[0] / few[1] < 2.0 < many[0] / many[1]
-    assert many.sum() == pytest.approx(1.0)
-    assert (many >= credit_of.LEAST_SHARE).all()
+def test_crossover_with_many_objectives_centres_between_the_parents_and_is_as_often_near_each():
+    X, mate = np.full((8000, 1), 0.3), np.full((8000, 1), 0.7)
+    many, few = (f(box(1), X, np.stack([mate] * 3), np.random.default_rng(0)) for f in (breeding.crossover_many, breeding.crossover))
+    changed = many[many != 0.3]
+    assert 0.45 < len(changed) / len(many) < 0.55
+    assert 0.46 < (changed > 0.5).mean() < 0.54
+    near_many, near_few = (np.abs(np.abs(children[children != 0.3] - 0.5) - 0.2).mean() for children in (many, few))
+    assert near_many < 0.7 * near_few
+
+
+def test_mates_are_from_the_whole_pool_where_that_is_asked_for():
+    pool = np.linspace(0.0, 1.0, 101)[:, None]
+    X = np.zeros((400, 1))
+    everywhere = breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=1.0)
+    assert np.histogram(everywhere, bins=4, range=(0, 1))[0].min() > 200
+    assert (breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=0.0) <= 0.21).all()
 
 
 def test_the_search_credits_what_the_archive_keeps():
@@ -152,14 +150,14 @@ def test_the_search_credits_what_the_archive_keeps():
     while state.evaluations < 2000:
         settings.advance(state, box, 2000)
         assert (state.credit[:, 0] <= state.credit[:, 1]).all()
-    assert not np.array_equal(state.credit, credit_of.no_credit(len(breeding.OPERATORS)))
+    assert not np.array_equal(state.credit, breeding.no_credit(len(breeding.OPERATORS)))
 
 
 def test_how_many_are_sampled_and_bred():
     assert MACS().points_to_sample(10_000) == MACS().offspring(10, 2) == 10
     assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100, 3) == 100
     assert MACS(archive=100).offspring(100, 3) == 15
-    assert MACS(archive=100).offspring(100, 4) == 50
+    assert MACS(archive=100).offspring(100, 4) == 100
     assert MACS(archive=100, breeding=0.15).offspring(100, 4) == 15
     assert MACS(archive=100).points_to_sample(500) == 25
     assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3, 2) == 10

@@ -13,7 +13,7 @@ from contextlib import suppress
 
 from macs.io.console import Steps
 
-from ..execution.child import THREADS
+from .child import THREADS
 
 LATE, CRASHED = "TOO LATE", "CRASHED"
 POLL = 0.1

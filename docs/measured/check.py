@@ -1,0 +1,56 @@
+"""Lists the pages of measured results in this folder with their commands, and says which are out of date: `python docs/measured/check.py`.
+
+A page is out of date once the files that state what it measures, a study file or the modules of a bench, are others than when it was made.
+The exit code is 1 if any is, or has no header or no command that exists.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from runs.bench import sources
+from runs.cli.parser import build_parser
+from runs.data.page_header import PageHeader, digest
+
+HERE = Path(__file__).parent
+STUDIES = HERE.parents[1] / "runs" / "studies"
+
+
+def files_of(command: str) -> list[Path]:
+    """The files that state what a command measures. Raises ValueError if there is no such command."""
+    program, *words = shlex.split(command)
+    try:
+        arguments = build_parser().parse_args(words)
+    except SystemExit:
+        raise ValueError(f"there is no command '{command}'") from None
+    if program == "macs" and arguments.command == "bench" and arguments.what and arguments.page:
+        return sources(arguments.what)
+    if program == "macs" and arguments.command == "study" and arguments.action == "report":
+        return [STUDIES / f"{Path(arguments.folder).name}.toml"]
+    raise ValueError(f"'{command}' makes no page")
+
+
+def verdict(page: Path) -> tuple[str, bool]:
+    """The command of a page or what is wrong with it, and whether the page is as its command would make it now."""
+    try:
+        header = PageHeader.read(page.read_text(encoding="utf-8"))
+        current = digest(*files_of(header.command)) == header.digest
+    except (ValueError, OSError) as error:
+        return str(error), False
+    return f"{header.command}  ({header.date}{'' if current else ', OUT OF DATE'})", current
+
+
+def main(folder: Path = HERE) -> int:
+    """Print a line for each page; returns the exit code."""
+    pages: Sequence[Path] = sorted(page for page in folder.glob("*.md") if page.name not in ("index.md", "README.md"))
+    found = {page.name: verdict(page) for page in pages}
+    for name, (words, _) in found.items():
+        print(f"{name}: {words}")
+    return int(not all(good for _, good in found.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,6 @@
+"""Benchmarks of searches on plain functions: many objectives, CEC 2009, ZDT and constraints, against the other algorithms."""
+
+from .cases import NAMES
+from .contest import Contest
+
+__all__ = ["NAMES", "Contest"]

@@ -1,0 +1,123 @@
+"""MACS against other algorithms on a set of plain functions, at equal evaluations, with as many points, seed by seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from macs import Front
+from macs.io.console import Steps
+from macs.io.interrupts import Stopped
+
+from ...measures.indicators import hypervolume, igd
+from ...measures.references import union
+from ...measures.statistics import holm, pairwise
+from ..measured import Row, Target, table, verdicts
+from .cases import OURS, Function, Set, solvers, the_set
+from .judged import TARGETS, columns_of
+
+SEEDS = tuple(range(1, 11))
+QUICK = 1000
+"""Evaluations of the quick benchmark, with one seed."""
+UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations."
+ENOUGH = 5
+"""Seeds from which on a test of ranks can say anything."""
+
+
+@dataclass(frozen=True)
+class Contest:
+    """The benchmark of one set, by its name."""
+
+    name: str
+
+    def bench(self, rows: list[Row], seeds: Sequence[int] = SEEDS, evaluations: int | None = None, names: Sequence[str] = ()) -> None:
+        """Measure; `rows` are filled as values become known, also if `Stopped` ends it. Fewer `evaluations` than the set's own, and only
+        the functions of these names, if any."""
+        chosen = the_set(self.name)
+        functions = [one for one in chosen.functions if not names or one.name in names]
+        with Steps(chosen.title.lower(), len(functions) * len(seeds) * (len(chosen.rivals) + 1)) as steps:
+            for function in functions:
+                fronts: dict[str, list[Front]] = {who: [] for who in (OURS, *chosen.rivals)}
+                try:
+                    _search(function, chosen, seeds, evaluations, fronts, steps)
+                finally:
+                    rows += compared(function, fronts)
+
+    def quick(self, rows: list[Row]) -> None:
+        """One seed and few evaluations of some functions."""
+        self.bench(rows, (1,), QUICK, the_set(self.name).quick)
+
+    def targets(self, rows: Sequence[Row]) -> list[Target]:
+        """What is asked of this set; nothing if there were fewer evaluations than it is asked of."""
+        return TARGETS[self.name](rows)
+
+    def report(self, rows: Sequence[Row]) -> str:
+        """The measured values, and the targets."""
+        chosen = the_set(self.name)
+        lines = [
+            f"{chosen.title}: MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations, with as many points.",
+            "IGD: mean distance of the true front from the points, in the objectives' units for UF (as in the competition), else in ranges",
+            "of the front. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians and",
+            "quartiles over seeds; rank: of the median among all; p: Mann-Whitney, corrected by Holm for all rivals, from five seeds on.",
+            *([] if chosen.functions[0].front else ["Ranges are those of what is non-dominated among all that all found."]),
+            "",
+            table(rows, columns_of(rows, p_values(rows))),
+            "",
+            *(verdicts(self.targets(rows)) or [UNJUDGED]),
+        ]
+        return "\n".join(lines)
+
+
+def _search(
+    function: Function, chosen: Set, seeds: Sequence[int], evaluations: int | None, fronts: dict[str, list[Front]], steps: Steps
+) -> None:
+    budget = min(evaluations or function.evaluations, function.evaluations)
+    for seed in seeds:
+        for who, solver in solvers(chosen.rivals, function.points).items():
+            steps.begin(f"{function.name}, {who}, seed {seed}")
+            front = solver.minimize(*function.problem(), evaluations=budget, seed=seed, progress=False)
+            if front.stats["stopped"] == "interrupted":
+                raise Stopped("interrupted")
+            fronts[who].append(front)
+
+
+def compared(function: Function, fronts: dict[str, list[Front]]) -> list[Row]:
+    """The rows of a function from its fronts, one for each seed that all solvers have finished; none if there is no such seed."""
+    count = min(len(found) for found in fronts.values())
+    if not count:
+        return []
+    known = [front.F for found in fronts.values() for front in found[:count] if len(front)]
+    truth = function.front() if function.front else np.asarray(union(known)) if known else None
+    rows = []
+    for who, found in fronts.items():
+        row = Row(function.name, who)
+        for front in found[:count]:
+            own: dict[str, float] = {"evaluations": front.stats["evaluations"], "points": len(front), "seconds": front.stats["wall_time"]}
+            own["volume"] = hypervolume(front.F, truth) if truth is not None and len(front) else 0.0
+            if function.front and truth is not None:
+                raw = function.name.startswith("UF")
+                own["igd"] = igd(front.F, truth, normalise=not raw, curve=not raw)
+            if function.distance and len(front):
+                own["distance"] = float(function.distance(front.F).mean())
+            # An infinite distance, of a front without points, counts: `Row.add` would leave it out.
+            for key, value in own.items():
+                row.values.setdefault(key, []).append(float(value))
+        rows.append(row)
+    return rows
+
+
+def p_values(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+    """p of each rival against ours on each function, by the indicator that is asked for, after Holm's correction."""
+    found: dict[tuple[str, str], float] = {}
+    for case in dict.fromkeys(row.case for row in rows):
+        own = {row.who: row for row in rows if row.case == case}
+        key = "igd" if case.startswith(("UF", "ZDT")) else "volume"
+        if len(own[OURS].values[key]) < ENOUGH:
+            continue
+        pairs = pairwise({who: row.values[key] for who, row in own.items()}, larger=key == "volume")
+        mine = [pair for pair in pairs if OURS in (pair.first, pair.second)]
+        for pair, p in zip(mine, holm([pair.p for pair in mine]), strict=True):
+            found[case, pair.second if pair.first == OURS else pair.first] = float(p)
+    return found

@@ -1,0 +1,51 @@
+"""The report of a benchmark as a page of measured results, and the files that state what it measures."""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+from os import PathLike
+from pathlib import Path
+
+from macs.io.atomic import write_whole
+
+from ..data.page_header import PageHeader
+
+PLACES = {
+    "front": "fronts",
+    "many": "functions",
+    "uf": "functions",
+    "zdt": "functions",
+    "constrained": "functions",
+    "generation": "scale.generation",
+}
+"""Modules that are not called as the benchmark."""
+SHARED = ("cases", "measured")
+"""Modules that several benchmarks have in common."""
+
+
+def sources(kind: str) -> list[Path]:
+    """The files of a benchmark's own module or folder, and those it shares, in a fixed order. The search itself is none of them: what is
+    measured is stated here, and a page's version and date say of which search.
+
+    Raises ValueError if there is no such benchmark.
+    """
+    try:
+        found = importlib.import_module(f"{__package__}.{PLACES.get(kind, kind)}")
+    except ModuleNotFoundError:
+        raise ValueError(f"there is no benchmark '{kind}'") from None
+    own = Path(found.__file__ or "")
+    files = sorted(own.parent.glob("*.py")) if own.name == "__init__.py" else [own]
+    return files + [Path(__file__).with_name(f"{name}.py") for name in SHARED]
+
+
+def header_of(kind: str, quick: bool, path: str | PathLike[str]) -> PageHeader:
+    """The header of the page of a benchmark at a path. Raises ValueError if it cannot be written into a comment."""
+    command = shlex.join(["macs", "bench", kind, *(["--quick"] if quick else []), "--page", str(path)])
+    return PageHeader.now(command, sources(kind))
+
+
+def write_page(path: str | PathLike[str], kind: str, header: PageHeader, report: str) -> None:
+    """Write a Markdown page: the header, the command, and the report as it is printed."""
+    text = f"{header}\n\n# `macs bench {kind}`\n\nMade by `{header.command}`.\n\n```text\n{report.rstrip()}\n```\n"
+    write_whole(path, text.encode())

@@ -1,0 +1,171 @@
+"""Trajectories as curves to be drawn: states, controls, path constraints, costates and the Hamiltonian over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from macs.fronts.pictures.flight_plot import FLAT, costates_worth
+from problems.compiled import Limit, Variable
+from transcription.trajectories.costates import Costates
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+
+DIGITS = 6
+"""Digits of the range of a curve to which its values are rounded."""
+MOST_DIGITS = 10
+"""Digits of its largest value that are kept at most: the rest is round-off."""
+FINEST, COARSEST = 41, 3
+"""Samples of a polynomial on one element, both ends included; of a constant or a straight line there are two."""
+
+
+def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list[dict[str, Any]]:
+    """The phases of a trajectory as plain data.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    costates : Costates, optional
+        Of the trajectory.
+    most : int
+        Largest number of samples of a curve. Polynomials are sampled on every element, so that jumps between elements stay. Of a curve with
+        more elements, the first, least, greatest and last sample of short pieces are kept, so that pulses stay.
+
+    Returns
+    -------
+    list of dict
+        Of each phase "name", "unit" (of time), "t0", "tf", "edges" (number of elements), "times" (lists of times) and "quantities". A
+        quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit", "lower" and "upper" (None where there
+        is no limit), "least" (the least range that means anything), "t" (which of the "times") and "v" (values, None in gaps).
+    """
+    found = []
+    worths = None if costates is None else max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    for phase in trajectory.phases:
+        writer = _Writer(most)
+        writer.polynomial("state", phase.state_variables, phase.state, phase.state.on_elements, jumps=False)
+        writer.polynomial("control", phase.control_variables, phase.control, phase.controls_on_elements, jumps=True)
+        for limit, values in zip(phase.path_limits, phase.paths.T, strict=True):
+            writer.add(limit.name, "path", "", limit, phase.time, values)
+        if costates is not None and worths is not None and phase.name in costates:
+            _write_costates(writer, phase, costates, worths)
+        found.append(
+            {
+                "name": phase.name,
+                "unit": phase.time_unit,
+                "t0": phase.t0,
+                "tf": phase.tf,
+                "elements": len(phase.state.edges) - 1,
+                "times": writer.times,
+                "quantities": writer.quantities,
+            }
+        )
+    return found
+
+
+def _write_costates(writer: _Writer, phase: PhaseTrajectory, costates: Costates, worths: float) -> None:
+    """Add the costates of a phase and its Hamiltonian. What is worth less than `FLAT` of all costates is round-off."""
+    own = costates[phase.name]
+    ranges = {name: float(np.ptp(phase[name])) for name in own}
+    writer.polynomial(
+        "costate",
+        [Variable(name, -np.inf, np.inf) for name in own.names],
+        own.polynomial,
+        own.polynomial.on_elements,
+        jumps=True,
+        least={name: FLAT * worths / span if span > 0 else 0.0 for name, span in ranges.items()},
+    )
+    length = float(np.ptp(phase.time))
+    none = Limit("", -np.inf, np.inf)
+    writer.add("Hamiltonian", "hamiltonian", "", none, phase.time, own.hamiltonian, FLAT * worths / length if length > 0 else 0.0)
+
+
+class _Writer:
+    """Collects the quantities of a phase; curves with the same times share them."""
+
+    def __init__(self, most: int) -> None:
+        self.times: list[list[float | None]] = []
+        self.quantities: list[dict[str, Any]] = []
+        self._most = most
+        self._known: dict[bytes, int] = {}
+
+    def polynomial(
+        self,
+        kind: str,
+        variables: Sequence[Variable],
+        polynomial: PiecewisePolynomial,
+        on_elements: Callable[[np.ndarray], np.ndarray],
+        jumps: bool,
+        least: Mapping[str, float] | None = None,
+    ) -> None:
+        """Add quantities that are polynomials on elements; without `jumps` they are continuous, and each end is sampled once."""
+        elements, coefficients, _ = polynomial.coefficients.shape
+        count = 2 if coefficients <= 2 else int(np.clip(self._most // elements, COARSEST, FINEST))
+        tau = np.linspace(-1.0, 1.0, count)
+        times, values = polynomial.times(tau), on_elements(tau)
+        if jumps:
+            times, values = times.ravel(), np.concatenate(list(values))
+        else:
+            times = np.append(times[:, :-1].ravel(), times[-1, -1])
+            values = np.concatenate([*values[:, :-1], values[-1, -1:]])
+        for variable, column in zip(variables, values.T, strict=True):
+            t, v = _without_wraps(times, column, variable.period)
+            self.add(variable.name, kind, variable.unit, variable, t, v, (least or {}).get(variable.name, 0.0))
+
+    def add(self, name: str, kind: str, unit: str, limits: Variable | Limit, t: np.ndarray, v: np.ndarray, least: float = 0.0) -> None:
+        """Add a quantity."""
+        if len(t) > self._most:
+            kept = thinned(v, self._most)
+            t, v = t[kept], v[kept]
+        key = t.tobytes()
+        if key not in self._known:
+            self._known[key] = len(self.times)
+            self.times.append(rounded(t))
+        lower, upper = (float(bound) if np.isfinite(bound) else None for bound in (limits.lower, limits.upper))
+        self.quantities.append(
+            {
+                "name": name,
+                "kind": kind,
+                "unit": unit,
+                "lower": lower,
+                "upper": upper,
+                "least": least,
+                "t": self._known[key],
+                "v": rounded(v),
+            }
+        )
+
+
+def thinned(values: np.ndarray, most: int) -> np.ndarray:
+    """Indices of the samples that stay if there are to be at most `most`: of each of equal pieces the first, least, greatest and last."""
+    edges = np.linspace(0, len(values), max(most // 4, 1) + 1).astype(int)
+    kept: set[int] = set()
+    for first, end in pairwise(edges.tolist()):
+        piece = values[first:end]
+        if not len(piece):
+            continue
+        gaps = np.isnan(piece)
+        kept |= {first, end - 1}
+        if not gaps.all():
+            kept |= {first + int(np.nanargmin(piece)), first + int(np.nanargmax(piece))}
+    return np.array(sorted(kept))
+
+
+def rounded(values: np.ndarray) -> list[float | None]:
+    """Values as plain numbers, with `DIGITS` digits of their range; None for what is not finite."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return [None] * len(values)
+    span, largest = float(np.ptp(finite)), float(np.abs(finite).max())
+    unit = max(span * 10.0**-DIGITS, largest * 10.0**-MOST_DIGITS)
+    decimals = int(np.clip(-np.floor(np.log10(unit)), -300, 300)) if unit > 0 else 0
+    return [value if np.isfinite(value) else None for value in np.round(values, decimals).tolist()]
+
+
+def _without_wraps(t: np.ndarray, v: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """A curve with a gap wherever a periodic value wraps around."""
+    if not period:
+        return t, v
+    after = np.flatnonzero(np.abs(np.diff(v)) > 0.5 * period) + 1
+    return np.insert(t, after, t[after]), np.insert(v, after, np.nan)

@@ -1,0 +1,153 @@
+"use strict";
+// Trajectories of the selected point and of those that are kept: a panel for each quantity.
+
+const KINDS = {
+  state: "States",
+  control: "Controls",
+  path: "Path constraints",
+  costate: "Costates and Hamiltonian",
+  hamiltonian: "Costates and Hamiltonian",
+};
+const WIDTHS = [2, 1.6, 1.6, 1.6, 1.6, 1.6, 1.6];
+
+let drawing = 0; // number of the latest drawing: an earlier one that is still loading gives up
+
+async function showFlights() {
+  const mine = (drawing += 1);
+  const keys = [...new Set([...state.kept, ...(state.selected ? [state.selected] : [])])];
+  const points = keys.map((key) => state.byKey.get(key)).filter(Boolean);
+  byId("flights").hidden = state.points.length > 0 && state.comparison.runs.every((run) => !run.about.dynamic);
+  if (!points.length) {
+    clearPanels();
+    fill(byId("flights-note"), "Select a point to see its states, controls, path constraints and costates.");
+    return;
+  }
+  let loadedFlights;
+  try {
+    loadedFlights = await Promise.all(points.map(async (point) => ({ point, detail: (await details(point.run))[point.index] })));
+  } catch (error) {
+    if (mine === drawing) fill(byId("flights-note"), `The trajectories cannot be read: ${error.message}.`);
+    return;
+  }
+  if (mine !== drawing) return;
+  const flights = loadedFlights.filter(({ detail }) => detail.phases.length);
+  if (!flights.length) {
+    clearPanels();
+    fill(byId("flights-note"), "The point has no trajectory.");
+    return;
+  }
+  fill(byId("flights-note"), ...flightsNote(flights));
+  drawPanels(flights);
+}
+
+function clearPanels() {
+  const place = byId("flights-plot");
+  place.querySelectorAll(".panel-plot").forEach(retire);
+  place.replaceChildren();
+}
+
+/** Which colour is which point, and what lines mean. */
+function flightsNote(flights) {
+  const names = flights.flatMap(({ point }, k) => [
+    element("span", { class: "swatch", style: `color: ${colorOf(k)}`, "aria-hidden": "true" }, k % 2 ? "\u254D" : "\u2501"),
+    ` ${pointName(point)}: ${inWords(point)}`,
+    element("br"),
+  ]);
+  const phases = flights[0].detail.phases.map((phase) => phase.name);
+  const several = phases.length > 1 ? ` Dotted lines are the ends of the phases ${phases.join(", ")}.` : "";
+  return [...names, `Dashed lines are limits, where they are near; the text above each panel always gives them.${several}`];
+}
+
+/** All quantities of some flights, each once, in groups: [[title, [name, kind], ...], ...]. */
+function groups(flights) {
+  const found = new Map();
+  for (const { detail } of flights) {
+    for (const quantity of detail.phases.flatMap((phase) => phase.quantities)) {
+      const title = KINDS[quantity.kind];
+      if (!found.has(title)) found.set(title, new Map());
+      found.get(title).set(`${quantity.kind} ${quantity.name}`, quantity);
+    }
+  }
+  return Object.values(KINDS)
+    .filter((title, k, all) => all.indexOf(title) === k && found.has(title))
+    .map((title) => [title, [...found.get(title).values()]]);
+}
+
+function drawPanels(flights) {
+  const place = byId("flights-plot");
+  clearPanels();
+  for (const [title, quantities] of groups(flights)) {
+    const grid = element("div", { class: "panels" });
+    place.append(element("h3", {}, title), grid);
+    for (const quantity of quantities) {
+      const figure = panelFigure(flights, quantity);
+      const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
+      grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
+      draw(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
+    }
+  }
+  byId("flights").dataset.drawn = flights.map(({ point }) => point.key).join(" "); // for tests and style sheets
+}
+
+/** Everything of a panel: its traces, layout, title, limits as text, and the same in words. */
+function panelFigure(flights, { name, kind, unit }) {
+  const traces = [], limits = [], shapes = [];
+  let least = 0;
+  flights.forEach(({ point, detail }, k) => {
+    detail.phases.forEach((phase, p) => {
+      const own = phase.quantities.find((one) => one.name === name && one.kind === kind);
+      if (p > 0 && k === 0) shapes.push(endOfPhase(phase.t0));
+      if (!own) return;
+      least = Math.max(least, own.least);
+      limits.push({ phase, lower: own.lower, upper: own.upper });
+      traces.push({
+        x: phase.times[own.t],
+        y: own.v,
+        mode: "lines",
+        line: { color: colorOf(k), width: WIDTHS[k], dash: k % 2 ? "dash" : "solid" },
+        name: plotText(pointName(point)),
+        hovertemplate: `%{y:.6~g} at %{x:.6~g}<extra>${plotText(pointName(point)).replace(/[{}%]/g, "")}</extra>`,
+      });
+    });
+  });
+  const values = traces.flatMap((trace) => trace.y).filter((value) => value !== null);
+  let [low, high] = extent(values);
+  const words = [...new Set(limits.map((one) => limitsText(one.lower, one.upper)).filter(Boolean))].join("; ");
+  const spans = limits.map((one) => one.upper - one.lower).filter(Number.isFinite);
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const described = `${name}, ${kind}, ${low === high ? number(low) : `from ${number(low)} to ${number(high)}`} ${unit}; ${words || "without limits"}`;
+  // A constant is a straight line in the middle, not a picture of round-off.
+  if (high - low < Math.max(least, 1e-6 * Math.max(size, ...spans))) {
+    const half = Math.max(least, 0.1 * size, 0.05 * Math.min(...spans, 1e300) * (spans.length > 0)) || 1;
+    const middle = 0.5 * (low + high);
+    [low, high] = [middle - half, middle + half];
+  }
+  const reach = high - low;
+  for (const { phase, lower, upper } of limits) {
+    for (const bound of new Set([lower, upper])) {
+      if (bound === null || bound < low - reach || bound > high + reach) continue;
+      shapes.push({ type: "line", x0: phase.t0, x1: phase.tf, y0: bound, y1: bound, line: { color: GREY, width: 1, dash: "dash" }, layer: "below" });
+    }
+  }
+  for (const { y0, layer } of shapes) if (layer === "below" && y0 !== undefined) [low, high] = [Math.min(low, y0), Math.max(high, y0)];
+  const margin = 0.07 * (high - low);
+  const units = [...new Set(limits.map((one) => one.phase.unit))].join(" | ");
+  return {
+    traces,
+    title: kind === "costate" ? `costate of ${name}` : withUnit(name, unit),
+    limits: words,
+    words: described,
+    layout: layout({
+      height: 190,
+      margin: { l: 52, r: 8, t: 6, b: 34 },
+      showlegend: false,
+      shapes,
+      xaxis: axis(withUnit("time", plotText(units)), { title: { text: plotText(withUnit("time", units)), standoff: 4 }, nticks: 6 }),
+      yaxis: axis("", { range: [low - margin, high + margin], nticks: 5 }),
+    }),
+  };
+}
+
+const endOfPhase = (time) => ({
+  type: "line", x0: time, x1: time, yref: "paper", y0: 0, y1: 1, line: { color: GREY, width: 1, dash: "dot" },
+});

@@ -1,0 +1,158 @@
+"use strict";
+// Begins: reads the data of the page, builds what does not change, and links the parts.
+
+const VIEWS = [
+  ["two", "Two objectives", 2],
+  ["three", "Three objectives", 3],
+  ["parallel", "Parallel coordinates", 2],
+];
+
+function begin() {
+  state.data = JSON.parse(byId("page").textContent);
+  on("comparison", () => {
+    resetView();
+    buildChoices();
+    buildPreferences();
+    refresh();
+    showStudy();
+  });
+  on("filter", () => {
+    showPreferences();
+    drawFront();
+    showTable();
+  });
+  on("selection", () => {
+    const point = selectedPoint();
+    if (point) announce(`${pointName(point)} selected: ${inWords(point)}; ${statusOf(point)}`);
+    markRow();
+    drawFront();
+    showPoint();
+    showFlights();
+  });
+  showComparison(state.data.comparisons[0]);
+  document.documentElement.dataset.ready = "yes";
+}
+
+function refresh() {
+  drawFront();
+  showTable();
+  showPoint();
+  showFlights();
+  const [run] = state.comparison.runs;
+  if (state.data.kind === "front") {
+    fill(byId("headline"), run.about.headline);
+    fill(byId("footer"), run.about.footer.map((line) => element("p", {}, line)), element("p", {}, reading(run.about)));
+  }
+}
+
+/** How the page is to be read. */
+function reading(about) {
+  const how = about.dynamic ? "simulated by an independent integrator" : "evaluated again";
+  if (about.tolerance === null) return "The points were not simulated.";
+  return `Points are verified where nothing differs by more than ${number(about.tolerance)} when they are ${how}. Curves have 6 digits of their range; all other numbers are as in the front's file.`;
+}
+
+/** The kind of figure, as tabs, and the objectives on its axes. */
+function resetView() {
+  const { goals, runs } = state.comparison;
+  const last = goals.length - 1;
+  Object.assign(view, { x: 0, y: Math.min(1, last), z: Math.min(2, last), color: "solver", kind: "two" });
+  // The colours of one solver alone would say nothing; they show what the axes do not.
+  if (state.comparison.solvers.length === 1 && goals.length > 2) view.color = "2";
+  Object.assign(table, { by: state.data.kind === "front" ? 0 : 2, descending: false, page: 0 });
+  buildViews();
+}
+
+function buildViews() {
+  const { goals, solvers } = state.comparison;
+  const options = goals.map((goal, i) => [i, goal.name]);
+  const possible = VIEWS.filter(([kind, , least]) => goals.length >= least && (kind === "two" || HAS_GL));
+  const tabs = element("div", { role: "tablist", "aria-label": "Kind of figure" }, possible.map(([kind, words]) => tab(kind, words)));
+  const axisOf = (letter, words) => choice(words, options, view[letter], (value) => {
+    view[letter] = Number(value);
+    drawFront();
+  });
+  const colors = [["solver", solvers.length > 1 ? "solver" : "one colour"], ...options];
+  const coloring = choice("Colour", colors, view.color, (value) => {
+    view.color = value;
+    drawFront();
+  });
+  const three = view.kind === "three";
+  const choices = view.kind === "parallel" || goals.length < 2 ? [] : [axisOf("x", "Across"), axisOf("y", three ? "Deep" : "Up"), ...(three ? [axisOf("z", "Up")] : [])];
+  fill(byId("views"), possible.length > 1 ? tabs : null, choices, coloring);
+}
+
+function tab(kind, words) {
+  const chosen = view.kind === kind;
+  const show = (next) => {
+    view.kind = next;
+    buildViews();
+    drawFront();
+    byId("views").querySelector('[aria-selected="true"]').focus();
+  };
+  const pressed = (event) => {
+    const all = [...event.target.parentNode.children];
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    show(all[(all.indexOf(event.target) + by + all.length) % all.length].dataset.kind);
+  };
+  const attributes = { type: "button", role: "tab", "data-kind": kind, "aria-selected": String(chosen), "aria-controls": "plot", tabindex: chosen ? "0" : "-1" };
+  return element("button", { ...attributes, onclick: () => show(kind), onkeydown: pressed }, words);
+}
+
+let drawn = null; // the kind of figure that is there
+
+/** Draw the figure of the front. One of another kind begins with an empty place. */
+function drawFront() {
+  let place = byId("plot");
+  const kinds = { two: drawTwo, three: drawThree, parallel: drawParallel };
+  const fresh = drawn !== view.kind;
+  if (fresh) {
+    retire(place);
+    const empty = place.cloneNode(false);
+    place.replaceWith(empty);
+    place = empty;
+    place.setAttribute("class", "plot");
+  }
+  kinds[view.kind](place);
+  if (fresh) (view.kind === "parallel" ? listenToParallel : listenToScatter)(place);
+  drawn = view.kind;
+  const { goals } = state.comparison;
+  const shown = shownPoints();
+  const names = view.kind === "parallel" ? goals.map((goal) => goal.name) : [view.x, view.y, ...(view.kind === "three" ? [view.z] : [])].map((i) => goals[i].name);
+  place.setAttribute("aria-label", `Figure of ${counted(shown.length, "point")} over ${names.join(", ")}; the table of points has the same data`);
+  fill(byId("plot-note"), NOTES[view.kind] + (shown.some((point) => !counts(point)) ? " Hollow points are not verified." : ""));
+}
+
+const NOTES = {
+  two: "Arrows at the axes point to better values. A click selects a point; a rectangle marks ranges that are wanted, a double click ends that.",
+  three: "A click selects a point; drag to turn.",
+  parallel: "Each line is a point; the upper end of every axis is better. Drag along an axis to mark a range that is wanted; a click on the axis ends that.",
+};
+
+/** In a study, which comparison, solvers and run are shown. */
+function buildChoices() {
+  const { comparisons, kind } = state.data;
+  if (kind === "front") return;
+  const { solvers, runs } = state.comparison;
+  const which = choice("Problem and transcription", comparisons.map((one, k) => [k, one.name]), comparisons.indexOf(state.comparison), (k) => showComparison(comparisons[k]));
+  const boxes = solvers.map((solver, k) => {
+    const toggle = (event) => {
+      if (event.target.checked) state.hidden.delete(solver);
+      else state.hidden.add(solver);
+      emit("filter");
+      redrawStudy();
+    };
+    const sign = element("span", { class: "swatch", style: `color: ${colorOf(k)}`, "aria-hidden": "true" }, SIGNS[k % SIGNS.length]);
+    return element("label", {}, element("input", { type: "checkbox", checked: !state.hidden.has(solver), onchange: toggle }), " ", sign, ` ${solver}`);
+  });
+  const numbers = [...new Set(runs.map((run) => run.number))].sort((a, b) => a - b);
+  const run = choice("Run", [["", "all"], ...numbers.map((one) => [one, one])], state.run, (value) => {
+    state.run = value;
+    emit("filter");
+  });
+  fill(byId("choices"), comparisons.length > 1 ? which : null, element("div", { class: "bar", role: "group", "aria-label": "Solvers" }, boxes), run);
+}
+
+begin();

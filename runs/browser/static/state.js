@@ -1,0 +1,108 @@
+"use strict";
+// What is shown: one comparison, its points, what is selected, and which ranges of the objectives are wanted.
+
+const MOST_KEPT = 6;
+
+const state = {
+  data: null,
+  comparison: null,
+  points: [], // of the comparison, all runs
+  byKey: new Map(),
+  selected: null, // key of a point
+  kept: [], // keys of points whose trajectories stay
+  ranges: [], // of each objective [least, greatest], or null
+  hidden: new Set(), // solvers
+  run: "", // number of the run that is shown; "": all
+};
+
+const listeners = { comparison: [], filter: [], selection: [] };
+const on = (event, listener) => listeners[event].push(listener);
+const emit = (event) => listeners[event].forEach((listener) => listener());
+
+/** Show a comparison from its beginning: nothing selected, nothing hidden. */
+function showComparison(comparison) {
+  state.comparison = comparison;
+  state.points = comparison.runs.flatMap((run) => pointsOf(run));
+  state.byKey = new Map(state.points.map((point) => [point.key, point]));
+  Object.assign(state, { selected: null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
+  emit("comparison");
+}
+
+/** The points of a run, each with its values in the order of the objectives. */
+function pointsOf(run) {
+  const columns = run.points;
+  return Array.from({ length: columns.count }, (_, index) => ({
+    key: `${run.block}:${index}`,
+    run,
+    index,
+    solver: run.solver,
+    values: columns.objectives.map((values) => values[index]),
+    simulated: columns.simulated.map((values) => values[index]),
+    verified: columns.verified[index],
+    violation: columns.violation[index],
+    defect: columns.defect[index],
+    simulatedViolation: columns.simulated_violation[index],
+    optimality: columns.optimality[index],
+    status: columns.status[index],
+  }));
+}
+
+/** Whether a point is good: not one that a simulation does not confirm, and feasible. */
+const counts = (point) => point.verified !== false && point.status === "converged";
+
+const statusOf = (point) => {
+  if (point.status !== "converged" || point.verified === null) return point.status;
+  return point.verified ? "verified" : "not verified";
+};
+
+/** Whether a point's solver and run are shown. */
+const isShown = (point) => !state.hidden.has(point.solver) && (state.run === "" || String(point.run.number) === state.run);
+
+/** Whether a point is within all ranges that are wanted. */
+const isWanted = (point) => state.ranges.every((range, i) => !range || (point.values[i] >= range[0] && point.values[i] <= range[1]));
+
+const shownPoints = () => state.points.filter(isShown);
+const wantedPoints = () => state.points.filter((point) => isShown(point) && isWanted(point));
+
+function select(key) {
+  if (!state.byKey.has(key) || key === state.selected) return;
+  state.selected = key;
+  emit("selection");
+}
+
+const selectedPoint = () => state.byKey.get(state.selected) ?? null;
+
+/** Keep a point's trajectory beside others, or no longer. */
+function keep(key, wanted) {
+  state.kept = state.kept.filter((one) => one !== key);
+  if (wanted) state.kept = [...state.kept, key].slice(-MOST_KEPT);
+  emit("selection");
+}
+
+/** Want values of objective i from `range[0]` to `range[1]`; null: any. */
+function setRange(i, range) {
+  const wanted = range && [Math.min(...range), Math.max(...range)];
+  if (JSON.stringify(wanted) === JSON.stringify(state.ranges[i])) return;
+  state.ranges[i] = wanted;
+  emit("filter");
+}
+
+function clearRanges() {
+  state.ranges = state.ranges.map(() => null);
+  emit("filter");
+}
+
+/** Say something to those who do not see the page. */
+function announce(text) {
+  byId("announcements").textContent = text;
+}
+
+/** The objectives of a point in words. */
+const inWords = (point) =>
+  state.comparison.goals.map((goal, i) => `${goal.name} ${number(point.values[i])}${goal.unit ? ` ${goal.unit}` : ""}`).join(", ");
+
+/** The name of a point: of one run its number, of several solver and run before it. */
+function pointName(point) {
+  if (state.data.kind === "front") return `Point ${point.index}`;
+  return `${point.solver}, run ${point.run.number}, point ${point.index}`;
+}

@@ -1,0 +1,102 @@
+"use strict";
+// What a study has beside its points: the state of its runs, comparisons of solvers as figures, and tables.
+
+function showStudy() {
+  if (state.data.kind === "front") return;
+  showProgress();
+  const { attainment, convergence, tables } = state.comparison;
+  const parts = [];
+  byId("study").hidden = !(attainment || convergence?.length || tables?.length);
+  const place = byId("study-body");
+  place.querySelectorAll(".js-plotly-plot").forEach(retire);
+  if (attainment) parts.push(figureBox("Attainment surfaces", "attainment", "What at least one run (best), half of the runs (median) and all runs (worst) of a solver attain."));
+  if (convergence?.length) parts.push(convergenceBox(convergence));
+  fill(place, parts, (tables ?? []).map(tableElement));
+  if (attainment) drawAttainment(attainment);
+  if (convergence?.length) drawConvergence(convergence, 0);
+}
+
+/** Draw the figures anew once other solvers are shown. */
+function redrawStudy() {
+  const { attainment, convergence } = state.comparison;
+  if (attainment) drawAttainment(attainment);
+  if (convergence?.length) drawConvergence(convergence, Number(byId("study-body").querySelector("select").value));
+}
+
+/** A heading, a note and an empty place for a figure. */
+function figureBox(title, id, note, ...more) {
+  return element("div", { class: "panel" }, element("h3", {}, title), element("p", { class: "note" }, note), ...more, element("div", { id, class: "plot", role: "img", "aria-label": title }));
+}
+
+/** How many runs of each cell there are, and the failures with their tracebacks. */
+function showProgress() {
+  const { progress } = state.data;
+  byId("progress").hidden = false;
+  const heads = ["problem", "transcription", "solver", "finished", "failed", "missing", "median time [s]"];
+  const rows = progress.cells.map((cell) => [...cell.labels, ...[cell.finished, cell.failed, cell.missing].map(String), number(cell.time, 3)]);
+  const words = heads.map((_, k) => k < 3);
+  const line = `${progress.finished} of ${counted(progress.total, "run")} finished`;
+  fill(byId("headline"), progress.failed ? `${line}, ${progress.failed} failed` : line);
+  const bar = element("meter", { min: 0, max: progress.total, value: progress.finished, "aria-label": line });
+  const failures = progress.failures.map((one) =>
+    element("details", {}, element("summary", {}, `${one.name}: ${one.reason}`), one.traceback ? element("pre", {}, one.traceback) : "There is no traceback."),
+  );
+  fill(byId("progress-body"), element("p", {}, bar, ` ${line}`), tableElement({ caption: "", heads, rows, words, notes: [] }), failures.length ? element("h3", {}, "Failures") : null, failures);
+}
+
+function tableElement({ caption, heads, rows, words, notes }) {
+  const head = heads.map((text, k) => element("th", { scope: "col", class: words[k] ? "words" : null }, text));
+  const body = rows.map((cells) => element("tr", {}, cells.map((text, k) => element("td", { class: words[k] ? "words" : null }, text))));
+  const made = element("table", {}, caption ? element("caption", {}, caption) : null, element("thead", {}, element("tr", {}, head)), element("tbody", {}, body));
+  return element("div", {}, element("div", { class: "scroll" }, made), notes.map((text) => element("p", { class: "note" }, text)));
+}
+
+const SURFACES = [["best", { width: 1, dash: "dash" }], ["median", { width: 2.5, dash: "solid" }], ["worst", { width: 1.2, dash: "dot" }]];
+
+function drawAttainment(surfaces) {
+  const { goals } = state.comparison;
+  const traces = referenceTraces(0, 1);
+  for (const [solver, surface] of Object.entries(surfaces)) {
+    if (state.hidden.has(solver)) continue;
+    for (const [name, line] of SURFACES) {
+      if (!surface[name]) continue;
+      const [x, y] = surface[name];
+      const label = `${plotText(solver)}, ${name}`;
+      traces.push({ x, y, mode: "lines", name: label, line: { ...line, color: colorOf(solverIndex(solver)) }, hovertemplate: `${label.replace(/[{}%]/g, "")}<extra></extra>` });
+    }
+  }
+  const figure = layout({ height: 440, xaxis: axis(goalLabel(goals[0])), yaxis: axis(goalLabel(goals[1])), showlegend: true, legend: { x: 1.02, y: 1 } });
+  draw(byId("attainment"), traces, figure);
+}
+
+function convergenceBox(all) {
+  const options = all.map((one, k) => [k, `${one.indicator} over ${one.axis}`]);
+  const chosen = choice("Figure", options, 0, (value) => drawConvergence(all, Number(value)));
+  return figureBox("Convergence", "convergence", "Lines are medians of the runs, bands their quartiles; of the points as claimed.", element("div", { class: "bar" }, chosen));
+}
+
+function drawConvergence(all, k) {
+  const { indicator, axis: cost, larger, solvers } = all[k];
+  const traces = [];
+  const positive = Object.values(solvers).flatMap((one) => one.median).filter((value) => value > 0);
+  const log = !larger && positive.length > 0;
+  const ends = Math.max(...Object.values(solvers).map((one) => one.x.at(-1)));
+  for (const [solver, { runs, x, lower, median, upper }] of Object.entries(solvers)) {
+    if (state.hidden.has(solver)) continue;
+    const index = solverIndex(solver), color = colorOf(index);
+    // A run that has ended keeps its front.
+    const times = [...x, ends], last = (values) => [...values, values.at(-1)];
+    const known = times.map((_, i) => i).filter((i) => last(lower)[i] !== null && last(upper)[i] !== null);
+    const of = (values) => known.map((i) => last(values)[i]);
+    const edge = { mode: "lines", line: { width: 0, shape: "hv", color }, hoverinfo: "skip", showlegend: false, x: of(times.slice(0, -1)) };
+    traces.push({ ...edge, y: of(lower) }, { ...edge, y: of(upper), fill: "tonexty", fillcolor: `${color}33` });
+    const line = { shape: "hv", width: 2, color, dash: DASHES[index % DASHES.length] };
+    traces.push({ x: times, y: last(median), mode: "lines", line, name: `${plotText(solver)}, ${counted(runs, "run")}`, hovertemplate: "%{y:.3g} at %{x:.4g}<extra></extra>" });
+  }
+  const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(Math.max(...positive) / Math.min(...positive)) } : {});
+  draw(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, legend: { x: 1.02, y: 1 }, showlegend: true }));
+  byId("convergence").setAttribute("aria-label", `${indicator} over ${cost}, ${Object.keys(solvers).join(", ")}`);
+}
+
+/** Of less than two decades plain numbers at 1, 2 and 5 of each, else powers of ten. */
+const logTicks = (ratio) => (ratio > 100 ? { dtick: 1 } : { dtick: "D2", tickmode: "linear", exponentformat: "none", tickformat: ".2~r" });

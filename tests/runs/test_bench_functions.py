@@ -1,0 +1,185 @@
+"""Searches on plain functions: the functions against closed forms, what is measured, and what is asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plain import dtlz, uf
+
+from macs.pareto.dominance import nondominated
+from runs.bench import command
+from runs.bench.functions import NAMES, Contest, cases, contest, judged
+from runs.bench.functions.uf import UF
+from runs.bench.measured import Row
+from runs.cli import main
+
+
+def on_the_set(function: UF, count: int = 400) -> np.ndarray:
+    """Vectors on the Pareto set, at random places."""
+    X = np.random.default_rng(0).random((count, 30))
+    places = function.objectives - 1
+    best = function.best(X)
+    best[:, :places] = X[:, :places]
+    return best
+
+
+def f2_of(kind: int, f1: np.ndarray) -> np.ndarray:
+    """The fronts of two objectives as the report states them."""
+    return {4: 1 - f1**2, 5: 1 - f1, 6: 1 - f1, 7: 1 - f1}.get(kind, 1 - np.sqrt(f1))
+
+
+@pytest.mark.parametrize("kind", range(1, 11))
+def test_the_pareto_set_maps_onto_the_front(kind):
+    function = UF(kind)
+    X = on_the_set(function)
+    lower, upper = np.array(function.bounds).T
+    assert len(function.bounds) == 30 and (np.clip(X, lower, upper) == X).all()
+    F = function(X)
+    if kind in (8, 10):
+        np.testing.assert_allclose(np.linalg.norm(F, axis=1), 1.0, atol=1e-12)
+    elif kind == 9:
+        apart = np.abs(2 * X[:, 0] - 1) >= 0.5
+        np.testing.assert_allclose(F[apart].sum(axis=1), 1.0, atol=1e-12)
+        assert (F[~apart].sum(axis=1) > 1.0).all()
+    elif kind in (5, 6):
+        assert (F.sum(axis=1) >= 1 - 1e-12).all(), "between the pieces of the front there is a hump"
+        k = np.arange(21) / 20 if kind == 5 else np.linspace(0.25, 0.5, 50)
+        places = np.zeros((len(k), 30))
+        places[:, 0] = k
+        best = function.best(places)
+        best[:, 0] = places[:, 0]
+        np.testing.assert_allclose(function(best).sum(axis=1), 1.0, atol=1e-12)
+    else:
+        np.testing.assert_allclose(F[:, 1], f2_of(kind, F[:, 0]), atol=1e-12)
+    away = X.copy()
+    away[:, 5] = np.clip(away[:, 5] + 0.1, lower[5], upper[5])
+    moved = np.abs(away - X).max(axis=1) > 0.05
+    assert (function(away)[moved] >= F[moved] - 1e-12).all() and (function(away)[moved] > F[moved] + 1e-6).any(axis=1).all()
+
+
+@pytest.mark.parametrize("kind", range(1, 11))
+def test_fronts_are_of_points_that_do_not_dominate_each_other(kind):
+    front = UF(kind).front()
+    counts = {5: 21, 6: 667, 8: 10_000, 9: 10_000, 10: 10_000}
+    assert front.shape == (counts.get(kind, 1000), UF(kind).objectives)
+    some = np.unique(front[:: 1 if len(front) < 2000 else 11].round(12), axis=0)
+    assert nondominated(some).all()
+    np.testing.assert_allclose(front.min(axis=0), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [1, 2, 3])
+def test_another_statement_has_the_same_values(kind):
+    function, bounds, _ = uf(kind)
+    lower, upper = np.array(bounds).T
+    X = lower + np.random.default_rng(1).random((50, 30)) * (upper - lower)
+    assert [tuple(map(float, pair)) for pair in bounds] == UF(kind).bounds
+    np.testing.assert_allclose(UF(kind)(X), function(X), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "m"), [(1, 5), (2, 5), (3, 5), (4, 5), (7, 3), (2, 8)])
+def test_functions_of_pymoo_are_those_of_the_paper(kind, m):
+    function, bounds, _ = dtlz(kind, m)
+    case = cases.dtlz(kind, m)
+    (problem,) = case.problem()
+    X = np.random.default_rng(2).random((20, len(bounds)))
+    np.testing.assert_allclose(problem.evaluate(X, return_values_of=["F"]), function(X), rtol=1e-9)
+    front = case.front()
+    assert nondominated(front).all() and (case.distance is None or case.distance(front).max() < 1e-12)
+    X[:, m - 1 :] = 0.0 if kind == 7 else 0.5
+    if case.distance is not None:
+        assert case.distance(function(X)).max() < 1e-9
+    elif kind == 7:
+        others = front[:, : m - 1]
+        np.testing.assert_allclose(function(np.hstack([others, np.zeros((len(others), 20))])), front, rtol=1e-9)
+
+
+def test_fronts_of_zdt_are_dense():
+    for kind in (1, 2, 3, 4, 6):
+        front = cases.zdt(kind).front()
+        assert len(front) == 1000
+
+
+def rows_of(case: str, key: str, evaluations: float, **found: list[float]) -> list[Row]:
+    """The rows of a case; names of rivals with - as _."""
+    return [
+        Row(case, who.replace("_", "-"), {key: values, "evaluations": [evaluations], "seconds": [1.0] * len(values)})
+        for who, values in found.items()
+    ]
+
+
+def many_rows(distance: float, volume: float, good: int) -> list[Row]:
+    """Of all functions; ours is behind by more than 2 % on all of five objectives but so many."""
+    rows: list[Row] = []
+    for i, one in enumerate(cases.the_set("many").functions):
+        own = volume if one.name.startswith("DTLZ2") else 0.99 if i < good else 0.9
+        found = rows_of(one.name, "volume", 15_000, MACS=[0.0, own, 9.0], NSGA_III=[1.0], RVEA=[0.5])
+        for row, values in zip(found, ([distance * 0.1, distance, 9.0], [1.0], [2.0]), strict=True):
+            row.values["distance"] = values
+        rows += found
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("distance", "volume", "good", "missed"), [(0.9, 1.1, 4, 0), (1.1, 1.1, 4, 2), (0.9, 0.99, 5, 2), (0.9, 0.97, 4, 3), (0.9, 1.1, 2, 1)]
+)
+def test_what_is_asked_of_many_objectives(distance, volume, good, missed):
+    assert sum(not one.met for one in judged.TARGETS["many"](many_rows(distance, volume, good))) == missed
+
+
+@pytest.mark.parametrize(("name", "key", "least"), [("uf", "igd", 7), ("zdt", "igd", 3), ("constrained", "volume", 12)])
+def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, capsys):
+    functions = cases.the_set(name).functions
+    for good in (least, least - 1):
+        better = 2.0 if key == "volume" else 0.5
+        rows = [
+            row
+            for i, one in enumerate(functions)
+            for row in rows_of(one.name, key, one.evaluations, MACS=[0.0, better if i < good else 1 / better, 9.0], NSGA_II=[1.0])
+        ]
+        assert [one.met for one in judged.TARGETS[name](rows)] == [good == least]
+        monkeypatch.setattr(command, "_run", lambda one, found, quick, rows=rows: found.extend(rows) or False)
+        assert main(["bench", name]) == (0 if good == least else 1)
+        assert f"{good} of {len(functions)}" in capsys.readouterr().out
+    assert judged.TARGETS[name](rows[2:]) == [], "not all were measured"
+    rows[0].values["evaluations"] = [1000.0]
+    assert judged.TARGETS[name](rows) == [], "not with all evaluations"
+
+
+def test_where_all_found_nothing_none_is_the_best():
+    assert judged._nowhere_behind(rows_of("MW1", "volume", 1.0, MACS=[0.0], NSGA_II=[0.0]), ["MW1"], "volume", 1.0) == []
+    assert judged._nowhere_behind(rows_of("UF1", "igd", 1.0, MACS=[np.inf], NSGA_II=[np.inf]), ["UF1"], "igd", 1.0) == []
+
+
+def test_runs_without_a_point_are_the_worst():
+    rows = rows_of("MW1", "igd", 1.0, MACS=[np.inf, np.inf, 0.1], NSGA_II=[0.2, 0.2, np.inf])
+    assert judged.medians(rows, "MW1", "igd") == {"MACS": np.inf, "NSGA-II": 0.2}
+    assert judged.rank(rows, rows[0], "igd") == "2" and judged.rank(rows, rows[1], "igd") == "1"
+
+
+def test_a_small_contest(capsys):
+    rows: list[Row] = []
+    Contest("constrained").bench(rows, (1, 2), 300, ("MW1",))
+    assert [row.who for row in rows] == ["MACS", *cases.the_set("constrained").rivals]
+    for row in rows:
+        assert row.values["evaluations"] == [300.0, 300.0] and len(row.values["volume"]) == 2
+    text = Contest("constrained").report(rows)
+    assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
+
+
+def test_ctrl_c_keeps_the_seeds_that_all_have_finished(monkeypatch):
+    function = cases.zdt(1)
+    done = [solver.minimize(*function.problem(), evaluations=200, seed=1) for solver in cases.solvers(("NSGA-II",), 20).values()]
+    rows = contest.compared(function, {"MACS": [done[0]] * 2, "NSGA-II": [done[1]]})
+    assert [len(row.values["igd"]) for row in rows] == [1, 1] and rows[0].of("igd") != rows[1].of("igd")
+    assert contest.compared(function, {"MACS": [done[0]], "NSGA-II": []}) == []
+
+
+def test_p_values_are_corrected_for_all_rivals():
+    rows = rows_of("UF1", "igd", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[6, 7, 8, 9, 10], RVEA=[1, 2, 3, 4, 5])
+    p = contest.p_values(rows)
+    assert p["UF1", "NSGA-II"] == pytest.approx(2 * 2 / 252) and p["UF1", "RVEA"] == 1.0
+    assert contest.p_values(rows_of("UF1", "igd", 1.0, MACS=[1, 2], NSGA_II=[6, 7])) == {}
+
+
+def test_all_sets_are_kinds():
+    assert set(NAMES) <= set(command.KINDS)

@@ -1,0 +1,187 @@
+"""Pages in headless Chromium: clicks, keys, ranges, no error on the console, and how quickly a large study opens.
+
+Skipped where there is no Chromium with its driver (Debian: chromium, chromium-driver).
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from synthetic_fronts import black_box, flights, marked
+
+from runs.browser import page as pages
+from runs.browser.front_page import front_page
+from runs.browser.points import about, columns, details, goals_data, samples_of
+
+pytest.importorskip("plotly")
+webdriver = pytest.importorskip("selenium.webdriver")
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+pytestmark = [
+    pytest.mark.skipif(
+        not (BROWSER and DRIVER), reason="there is no Chromium with its driver on this machine: apt-get install chromium-driver"
+    ),
+    pytest.mark.xdist_group("chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1300,1000", "--use-angle=swiftshader"):
+        options.add_argument(word)
+    options.add_argument("--enable-unsafe-swiftshader")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    driver.set_script_timeout(30)
+    yield driver
+    driver.quit()
+
+
+def opened(browser, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "page.html"
+    path.write_bytes(content)
+    browser.get(path.as_uri())
+    wait(browser, "document.documentElement.dataset.ready === 'yes'")
+
+
+def wait(browser, condition: str) -> None:
+    """Until a condition in the page holds."""
+    for _ in range(300):
+        if browser.execute_script(f"return Boolean({condition})"):
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"not within 15 s: {condition}")
+
+
+def errors(browser) -> list[str]:
+    """What the console has, but for remarks of the driver on software rendering."""
+    return [one["message"] for one in browser.get_log("browser") if one["level"] == "SEVERE" or "Violation" in one["message"]]
+
+
+def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):
+    front = marked(flights(5), [True, False, True, True, True])
+    opened(browser, tmp_path, front_page(front))
+    wait(browser, "document.querySelector('#plot .points path')")
+    place = browser.execute_script(
+        "const r = document.querySelector('#plot .points path').getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]"
+    )
+    actions = webdriver.ActionChains(browser)
+    actions.w3c_actions.pointer_action.move_to_location(*map(int, place))
+    actions.click().perform()
+    wait(browser, "state.selected && document.getElementById('flights').dataset.drawn === state.selected")
+    index = browser.execute_script("return selectedPoint().index")
+    assert f"Point {index} selected" in browser.execute_script("return byId('announcements').textContent")
+    names = {name for phase in front[index].trajectory.values() for name in phase.names}
+    drawn = browser.execute_script("return [...document.querySelectorAll('.panel-plot')].map((one) => one.getAttribute('aria-label'))")
+    assert {label.split(",")[0] for label in drawn} == names
+    last = browser.execute_script("return document.querySelector('.panel-plot').data[0].y.at(-1)")
+    assert last == pytest.approx(front[index].trajectory["climb"].edge_states[-1, 0], rel=1e-5)
+    assert browser.execute_script("return document.querySelectorAll('#table tr[aria-selected=true]').length") == 1
+    assert errors(browser) == []
+
+
+@pytest.mark.slow
+def test_points_that_are_not_verified_are_hollow_and_named(browser, tmp_path):
+    opened(browser, tmp_path, front_page(marked(flights(5), [True, False, True, True, False])))
+    symbols = browser.execute_script("return byId('plot').data.map((one) => [one.marker.symbol, one.x.length])")
+    assert symbols == [["circle", 3], ["circle-open", 2]]
+    assert browser.execute_script("return document.querySelectorAll('tr.unverified .badge').length") == 2
+
+
+@pytest.mark.slow
+def test_rows_are_reached_and_selected_by_keys_and_sorted_by_titles(browser, tmp_path):
+    from selenium.webdriver.common.keys import Keys
+
+    front = flights(5)
+    opened(browser, tmp_path, front_page(front))
+    browser.execute_script("document.querySelector('#table tbody tr').focus()")
+    webdriver.ActionChains(browser).send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN, Keys.ENTER).perform()
+    assert browser.execute_script("return selectedPoint().index") == 2
+    assert browser.execute_script("return document.querySelectorAll('#table tr[tabindex=\"0\"]').length") == 1
+    button = browser.find_elements("css selector", "#table th button")[2]
+    button.click()
+    shown = browser.execute_script(
+        "return [...document.querySelectorAll('#table tbody tr')].map((row) => Number(row.dataset.key.split(':')[1]))"
+    )
+    assert shown == front.objectives[:, 1].argsort(kind="stable").tolist()
+    assert browser.execute_script("return document.querySelectorAll('#table th')[2].getAttribute('aria-sort')") == "ascending"
+    assert errors(browser) == []
+
+
+@pytest.mark.slow
+def test_ranges_filter_figure_and_table_whether_typed_or_brushed(browser, tmp_path):
+    front = black_box(6, 3)
+    opened(browser, tmp_path, front_page(front))
+    values = sorted(front.objectives[:, 0])
+    least = browser.find_element("css selector", "#preferences input[type=number]")
+    least.send_keys(repr(0.5 * (values[1] + values[2])))
+    browser.execute_script("document.activeElement.blur()")
+    assert browser.execute_script("return document.querySelectorAll('#table tbody tr').length") == 4
+    assert browser.execute_script("return byId('plot').data[0].x.length") == 2  # outside, grey
+    for kind in ("three", "parallel"):
+        browser.execute_script(f"document.querySelector('[data-kind={kind}]').click()")
+        wait(browser, f"byId('plot').data?.[0]?.type === '{'scatter3d' if kind == 'three' else 'parcoords'}'")
+    assert browser.execute_script("return byId('plot').data[0].dimensions[0].constraintrange !== undefined")
+    # A brush along the second axis: as the figure tells of it.
+    high = float(sorted(front.objectives[:, 1])[2])
+    brush = "Plotly.restyle('plot', {'dimensions[0].constraintrange': [null], 'dimensions[1].constraintrange': [[[-1e9, arguments[0]]]]})"
+    browser.execute_script(brush, high)
+    wait(browser, "document.querySelectorAll('#table tbody tr').length === 3")
+    browser.find_element("xpath", "//button[text()='Any values']").click()
+    assert browser.execute_script("return document.querySelectorAll('#table tbody tr').length") == 6
+    assert errors(browser) == []
+
+
+@pytest.mark.slow
+def test_a_rectangle_in_the_figure_marks_ranges(browser, tmp_path):
+    opened(browser, tmp_path, front_page(flights(8)))
+    x, y, width, height = browser.execute_script(
+        "const r = document.querySelector('#plot .nsewdrag').getBoundingClientRect(); return [r.x, r.y, r.width, r.height]"
+    )
+    actions = webdriver.ActionChains(browser)
+    pointer = actions.w3c_actions.pointer_action
+    pointer.move_to_location(int(x + 2), int(y + 2)).pointer_down()
+    pointer.move_to_location(int(x + width / 4), int(y + height / 2)).move_to_location(int(x + width / 2), int(y + height - 2)).pointer_up()
+    actions.perform()
+    wait(browser, "state.ranges.every(Boolean)")
+    wanted = browser.execute_script("return [wantedPoints().length, state.points.length]")
+    assert 0 < wanted[0] < wanted[1]
+    assert errors(browser) == []
+
+
+def study_like(runs: int, points: int) -> bytes:
+    """The page of a comparison of so many runs."""
+    front = flights(points)
+    samples = samples_of([front] * runs)
+    packed = pages.packed(details(front, samples))
+    told = [
+        {"solver": f"solver {k % 4}", "number": k // 4 + 1, "block": str(k), "points": columns(front), "about": about(front)}
+        for k in range(runs)
+    ]
+    comparison = {"name": "many", "goals": goals_data(front.goals), "solvers": [f"solver {k}" for k in range(4)], "runs": told}
+    progress = {"total": runs, "finished": runs, "failed": 0, "cells": [], "failures": []}
+    data = {"title": "many", "kind": "study", "comparisons": [comparison], "progress": progress}
+    return pages.page(data, {str(k): packed for k in range(runs)})
+
+
+@pytest.mark.slow
+def test_a_hundred_runs_of_a_hundred_points_open_in_two_seconds(browser, tmp_path):
+    seconds: dict[str, list[float]] = {"few": [], "many": []}
+    pages_of = {"few": front_page(flights(10)), "many": study_like(100, 100)}
+    for _ in range(3):
+        for name, content in pages_of.items():
+            opened(browser, tmp_path, content)
+            seconds[name].append(browser.execute_script("return performance.now()") / 1000)
+    assert browser.execute_script("return state.points.length") == 10_000
+    few, many = (min(seconds[name]) for name in pages_of)
+    # Two seconds, or on a machine that others work on at most three times what a page of ten points takes there.
+    assert many < 2.0 or many < 3.0 * few, seconds
+    print(f"10 points open in {few:.2f} s, 10 000 in {many:.2f} s")
+    assert errors(browser) == []

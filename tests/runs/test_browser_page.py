@@ -1,0 +1,201 @@
+"""Pages for the browser, without one: their data are the front's, their texts stay texts, and wrong calls are one line."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from misbehaving import Crashing, Plain, glide
+from synthetic_fronts import black_box, empty, flights, marked
+
+from problems.compiled import Objective
+from runs import Study
+from runs.batch.store import Store
+from runs.browser import page as pages
+from runs.browser.curves import curves, rounded, thinned
+from runs.browser.front_page import front_page
+from runs.browser.points import samples_of
+from runs.browser.study_page import study_page
+from runs.cli import main
+
+pytest.importorskip("plotly")
+
+
+class Reader(HTMLParser):
+    """The elements of a page, and the texts of its scripts and its title."""
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict]] = []
+        self.scripts: dict[str, str] = {}
+        self.title = ""
+        self._inside: tuple[str, str] | None = None
+        self.feed(content.decode())
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self._inside = (tag, dict(attrs).get("id") or "")
+
+    def handle_endtag(self, tag):
+        self._inside = None
+
+    def handle_data(self, data):
+        if self._inside and self._inside[0] == "script" and self._inside[1]:
+            self.scripts[self._inside[1]] = self.scripts.get(self._inside[1], "") + data
+        if self._inside and self._inside[0] == "title":
+            self.title += data
+
+    @property
+    def data(self):
+        return json.loads(self.scripts["page"])
+
+    def block(self, name):
+        return json.loads(gzip.decompress(base64.b64decode(self.scripts[f"block-{name}"])))
+
+
+def test_all_numbers_of_a_front_are_those_of_the_page_to_the_last_bit():
+    front = marked(flights(5), [True, False, True, True, True])
+    found = Reader(front_page(front)).data
+    (comparison,) = found["comparisons"]
+    points = comparison["runs"][0]["points"]
+    assert np.array_equal(np.array(points["objectives"]).T, front.objectives)
+    assert np.array_equal(np.array(points["simulated"]).T, front.simulated_F * front.signs)
+    assert points["violation"] == front.violation.tolist() and points["defect"] == front.defect.tolist()
+    assert points["verified"] == front.verified.tolist()
+    assert [goal["name"] for goal in comparison["goals"]] == list(front.names)
+
+
+def test_curves_are_the_trajectory():
+    front = flights(3)
+    for point, told in zip(front, Reader(front_page(front)).block("0"), strict=True):
+        assert [phase["name"] for phase in told["phases"]] == list(point.trajectory)
+        for phase in told["phases"]:
+            flight = point.trajectory[phase["name"]]
+            for one in phase["quantities"]:
+                times, values = np.array(phase["times"][one["t"]], dtype=float), np.array(one["v"], dtype=float)
+                inside = np.clip(times, flight.t0, flight.tf)
+                if one["kind"] == "path":
+                    assert np.allclose(values, flight[one["name"]], rtol=1e-6)
+                    continue
+                exact = flight.at(inside)[one["name"]]
+                near = np.abs(values - exact) <= 1e-5 * np.ptp(exact)  # times are rounded, too
+                # Where a control jumps, the page has both values, `at` the later one.
+                edges = np.isin(np.round(times, 4), np.round(flight.control.edges, 4))
+                assert (near | edges).all() if one["kind"] == "control" else near.all()
+
+
+def test_a_page_loads_nothing_and_stays_small():
+    content = front_page(flights(10))
+    assert len(content) < 6_000_000
+    reader = Reader(content)
+    assert not [tag for tag, attrs in reader.tags if "src" in attrs or (attrs.get("href") or "").startswith("http")]
+    policy = next(attrs["content"] for _, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy")
+    assert "default-src 'none'" in policy and "connect-src 'none'" in policy
+    assert front_page(flights(10)) == content  # the same bytes for the same front
+
+
+EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.text(max_size=40) | st.just(EVIL))
+def test_texts_of_users_stay_texts(name):
+    front = black_box(3)
+    goals = (Objective(name, EVIL), *front.goals[1:])
+    content = pages.safe_json({"goals": [goal.name for goal in goals]})
+    assert b"<" not in content and json.loads(content)["goals"][0] == name
+
+
+def test_an_evil_name_ends_no_script_and_no_title():
+    front = black_box(3).replace(message=EVIL)
+    front.goals = (Objective(EVIL, EVIL), *front.goals[1:])
+    before, after = Reader(front_page(black_box(3))), Reader(front_page(front))
+    assert [tag for tag, _ in before.tags] == [tag for tag, _ in after.tags]
+    assert after.data["comparisons"][0]["goals"][0]["name"] == EVIL
+    named = Reader(pages.page({"title": EVIL, "comparisons": []}, {}))
+    assert named.title == EVIL
+
+
+def test_fronts_without_points_or_trajectories_have_pages():
+    assert Reader(front_page(empty())).data["comparisons"][0]["runs"][0]["points"]["count"] == 0
+    told = Reader(front_page(black_box(4))).block("0")
+    assert [one["phases"] for one in told] == [[]] * 4 and len(told[0]["parameters"]) > 0
+
+
+def test_thinned_curves_keep_their_pulses():
+    values = np.zeros(10_000)
+    values[[1234, 7000]] = 5.0, -3.0
+    kept = thinned(values, 100)
+    assert len(kept) <= 100 and {0, 1234, 7000, 9999} <= set(kept.tolist())
+
+
+@given(st.lists(st.floats(-1e12, 1e12).map(lambda x: x if abs(x) > 1e-100 else 0.0), min_size=1, max_size=20))
+def test_rounded_values_differ_by_a_millionth_of_their_range(values):
+    array = np.array(values)
+    found = np.array(rounded(array), dtype=float)
+    assert np.abs(found - array).max() <= max(1e-6 * np.ptp(array), 1e-10 * np.abs(array).max()) * 1.001
+    assert rounded(np.array([1.0, np.nan])) == [1.0, None]
+
+
+def test_many_points_have_fewer_samples():
+    few, many = samples_of([flights(5)]), samples_of([flights(20)] * 2500)
+    assert few > many >= 48
+    assert len(curves(flights(1)[0].trajectory, None, 48)) == 2
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("browser") / "out"
+    solvers = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
+    Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out)
+    return out
+
+
+def test_the_page_of_a_study_has_its_runs_measures_tables_and_failures(folder):
+    store = Store.open(folder, trust=True)
+    reader = Reader(study_page(store))
+    (comparison,) = reader.data["comparisons"]
+    finished = [run for run in store.runs() if run.finished]
+    assert [(run["solver"], run["number"]) for run in comparison["runs"]] == [(run.cell.solver, run.number) for run in finished]
+    for told, run in zip(comparison["runs"], finished, strict=True):
+        assert np.array_equal(np.array(told["points"]["objectives"]).T.reshape(-1, 2), run.front.objectives)
+        assert len(reader.block(told["block"])) == len(run.front)
+    progress = reader.data["progress"]
+    assert (progress["finished"], progress["failed"], progress["total"]) == (4, 2, 6)
+    assert "the root of all evil" in progress["failures"][0]["reason"] and "Traceback" in progress["failures"][0]["traceback"]
+    assert set(comparison["attainment"]) <= {"one", "other", "broken"} and comparison["convergence"]
+    assert any("points claimed" in one["caption"] for one in comparison["tables"])
+
+
+def test_the_command_writes_pages_and_refuses_what_is_wrong(folder, tmp_path, capsys):
+    flights(3).save(tmp_path / "front.nc")
+    assert main(["report", str(tmp_path / "front.nc")]) == 0
+    assert (tmp_path / "front.html").stat().st_size < 6_000_000
+    assert main(["report", str(folder), "--html", str(tmp_path / "study.html"), "--trust"]) == 0
+    (tmp_path / "text.nc").write_text("no front")
+    capsys.readouterr()
+    for words in (
+        [str(tmp_path / "missing.nc")],
+        [str(tmp_path / "text.nc")],
+        [str(tmp_path)],
+        [str(tmp_path / "front.nc"), "--html", str(tmp_path / "none" / "page.html")],
+        [str(tmp_path / "front.nc"), "--html", str(tmp_path / "front.nc")],
+    ):
+        assert main(["report", *words]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["front.html", "front.nc", "study.html", "text.nc"]
+
+
+def test_without_plotly_the_error_says_what_to_install(tmp_path, monkeypatch, capsys):
+    flights(3).save(tmp_path / "front.nc")
+    pages.plotly.cache_clear()
+    monkeypatch.setitem(__import__("sys").modules, "plotly.offline", None)
+    assert main(["report", str(tmp_path / "front.nc")]) == 2
+    assert "pip install 'macs-trajectories[browser]'" in capsys.readouterr().err
+    assert not (tmp_path / "front.html").exists()

@@ -1,0 +1,103 @@
+"""Pages of measured results: each has a header, a command that exists, and files that it is of."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from runs.bench import KINDS, command, sources
+from runs.bench.measured import Row
+from runs.cli import main
+from runs.data.page_header import PageHeader, digest
+
+ROOT = Path(__file__).parents[1]
+SCRIPT = ROOT / "docs" / "measured" / "check.py"
+spec = importlib.util.spec_from_file_location("check_measured", SCRIPT)
+assert spec is not None and spec.loader is not None
+check = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(check)
+PAGES = [page for page in SCRIPT.parent.glob("*.md") if page.name not in ("index.md", "README.md")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_page_has_a_header_and_a_command_that_exists(page):
+    header = PageHeader.read(page.read_text(encoding="utf-8"))
+    assert all(file.is_file() for file in check.files_of(header.command))
+
+
+def test_every_benchmark_is_of_files():
+    for kind in KINDS:
+        files = sources(kind)
+        assert len(files) > 2 and all(file.is_file() for file in files) and len(set(files)) == len(files)
+    assert any(file.name == "uf.py" for file in sources("uf")) and sources("study")[0].name == "study.py"
+    with pytest.raises(ValueError, match="no benchmark 'none'"):
+        sources("none")
+
+
+def made(tmp_path, monkeypatch) -> Path:
+    """The page of a benchmark whose values are given."""
+    rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
+    monkeypatch.setattr(command, "_run", lambda one, found, quick: found.extend(rows) or False)
+    page = tmp_path / "bench-population.md"
+    assert main(["bench", "population", "--quick", "--page", str(page)]) == 0
+    return page
+
+
+def test_a_page_of_a_benchmark(tmp_path, monkeypatch, capsys):
+    page = made(tmp_path, monkeypatch)
+    text = page.read_text()
+    header = PageHeader.read(text)
+    assert header.command == f"macs bench population --quick --page {page}" and header.digest == digest(*sources("population"))
+    assert "POPULATIONS" in text and "at least 4 times as fast" in text and text.count("```") == 2
+    assert "POPULATIONS" in capsys.readouterr().out
+    assert check.main(tmp_path) == 0 and f"bench-population.md: {header.command}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("digest: ", "digest: 0", "OUT OF DATE"),
+        ("macs bench population", "macs bench populations", "there is no"),
+        ("macs bench population", "macs list", "there is no command"),
+        ("--page", "--csv", "makes no page"),
+        ("<!-- made by", "made by", "does not begin"),
+    ],
+)
+def test_pages_that_are_wrong_are_named(old, new, words, tmp_path, monkeypatch, capsys):
+    page = made(tmp_path, monkeypatch)
+    page.write_text(page.read_text().replace(old, new, 1))
+    capsys.readouterr()
+    assert check.main(tmp_path) == 1 and words in capsys.readouterr().out
+
+
+def test_a_page_of_a_study_is_of_its_file():
+    assert check.files_of("macs study report out/goddard-table3") == [ROOT / "runs" / "studies" / "goddard-table3.toml"]
+
+
+def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
+    rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
+    monkeypatch.setattr(command, "_run", lambda one, found, quick: found.extend(rows) or True)
+    main(["bench", "population", "--page", str(tmp_path / "a.md")])
+    assert "POPULATIONS" in capsys.readouterr().out and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--page", "a.md"], "of which one?"),
+        (["inner", "--page", "nowhere/a.md"], "there is no folder"),
+        (["inner", "--page", "a>b.md"], "'>'"),
+    ],
+)
+def test_wrong_pages_are_refused_before_any_work(words, said, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(["bench", *words]) == 2 and said in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_the_script_runs_by_itself():
+    done = subprocess.run([sys.executable, str(SCRIPT)], capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert done.returncode in (0, 1) and done.stderr == "" and len(done.stdout.splitlines()) == len(PAGES)

@@ -1,0 +1,34 @@
+"""What is installed: all data files of the packages. `make package` builds the wheel and tries it."""
+
+from __future__ import annotations
+
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
+
+from package import FLOORS, LEFT_OUT, missing
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_every_data_file_of_the_packages_is_in_the_wheel():
+    """Of a package, a folder with __init__.py, `[tool.setuptools.package-data]` takes what its patterns fit."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        patterns = tomllib.load(file)["tool"]["setuptools"]["package-data"]["*"]
+    files = [
+        path for floor in FLOORS for path in (ROOT / floor).rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc", *LEFT_OUT)
+    ]
+    assert any(path.suffix == ".csv" for path in files) and any(path.suffix == ".toml" for path in files)
+
+    def taken(path: Path) -> bool:
+        package = next(folder for folder in path.parents if (folder / "__init__.py").is_file())
+        # Folders of data without code, as runs/studies, are packages of their own to setuptools.
+        return any(fnmatch(path.name, pattern) or fnmatch(path.relative_to(package).as_posix(), pattern) for pattern in patterns)
+
+    assert [str(path.relative_to(ROOT)) for path in files if not taken(path)] == []
+
+
+def test_what_a_wheel_lacks_is_named():
+    source = ["tests/test_front.py", "macs/front.py", "problems/cases/front.csv", "runs/pictures/goddard.png", "README.md"]
+    assert missing(source, ["macs/front.py"]) == ["problems/cases/front.csv"]
+    assert missing(source, ["macs/front.py", "problems/cases/front.csv"]) == []
