@@ -66,8 +66,9 @@ class Study:
     solvers : names, Solvers, or mapping
         One or several names, such as "macs", or solvers; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
-        {label of a solver: terms of its own}: any of transcription (one, or {label of a problem: one}), evaluations, inner and start.
-        Reports compare it with the others on each of their transcriptions.
+        {label of a solver: terms of its own}: any of transcription (one, its label among `transcriptions`, or {label of a problem: one}),
+        evaluations, inner and start. Reports compare it with the others on each of their transcriptions; if all solvers have their own,
+        with each other.
     evaluations : int, "auto", or mapping, optional
         Budget of each run, or {label of a problem: budget}; "auto": searches of MACS end when they are done. Default: the problem's own.
     runs : int

@@ -55,13 +55,14 @@ def combine(
     schemes = {label: {WITHOUT: None} for label in vectors} | (_schemes(transcriptions, flying) if flying else {})
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
+    labels = transcriptions if isinstance(transcriptions, Mapping) and not set(transcriptions) & set(stated) else {}
     own_budgets, own_schemes = {}, {}
     for label, given in terms.items():
         if "transcription" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 _refuse_transcriptions("transcription", given["transcription"], vectors)
                 own = _by_problem("transcription", given["transcription"], flying, lambda problem: problem.default_transcription)
-                own_schemes[label] = {name: _named_schemes(scheme) for name, scheme in own.items()}
+                own_schemes[label] = {name: _named_schemes(_by_label(scheme, labels)) for name, scheme in own.items()}
         if "evaluations" in given:
             with errors_begin_with(f"terms of '{label}'"):
                 own_budgets[label] = _budgets(given["evaluations"], stated)
@@ -177,6 +178,11 @@ def _own_scheme(problem: Problem) -> Any:
 
 def _named_schemes(given: Any) -> dict[str, Transcription | None]:
     return {label: _scheme(label, one) for label, one in _labelled("transcriptions", given).items()}
+
+
+def _by_label(given: Any, labels: Mapping[str, Any]) -> Any:
+    """A transcription with its label if it is given as one of those of the study, else as it is."""
+    return {given: labels[given]} if isinstance(given, str) and given in labels else given
 
 
 def _scheme(label: str, given: Any) -> Transcription:

@@ -78,7 +78,7 @@ macs study run STUDY     makes the runs that are missing. Stopped, killed, or wi
                          are neither made again nor changed. A run that crashes, hangs beyond the study's time_limit or is killed is
                          recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
 macs study status DIR    the number of finished, failed and missing runs, and the reasons of failures.
-macs study report DIR    tables, statistics and figures.
+macs study report DIR    tables, statistics and figures; with --page FILE.md also a page of them, once all runs are finished.
 
 A study file or a study's folder may name code by address (my_problem.py:build). Outside the catalogue it is loaded only with --trust.
 

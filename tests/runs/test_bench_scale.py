@@ -104,10 +104,13 @@ def test_generations_grow_as_their_work_does():
 
         return run
 
-    quadratic = generation.Growing("quadratic", "things", "Np^2", prepare, (), (20, 40, 80))
+    quadratic = generation.Growing("quadratic", "things", "Np^2", 2, prepare, (), (20, 40, 80))
     rows: list[Row] = []
     generation.bench_generation(rows, generation.Effort(rounds=1, quick=True), [quadratic])
     assert rows[0].of("exponent") == pytest.approx(2.0, abs=0.2) and rows[0].of("seconds") == pytest.approx(5e-6 * 6400, rel=0.2)
+    wrong = Row("re-entry, 120 individuals", "nodes", {"exponent": [0.9, 1.3, 1.4]})
+    right = Row("re-entry, 200 nodes", "individuals", {"exponent": [0.9, 1.3, 1.4]})
+    assert [one.met for one in generation.targets([wrong, right])] == [False, True]
     assert "quadratic" in generation.report(rows) and "section IV-D" in generation.report(rows)
 
 

@@ -11,7 +11,7 @@ from problems import Problem
 from runs import Study
 from runs.batch.store import Store
 from runs.report.comparison import EACH, comparisons
-from transcription import Smooth, parse
+from transcription import DFET, Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
 SOLVERS = {"macs": Plain(agents=4), "nsga2": NSGA2(population=10)}
@@ -223,3 +223,16 @@ def test_a_reference_is_held_against_the_problems_before_any_run(tmp_path):
     ):
         with pytest.raises(ValueError, match=message):
             study(reference=given)
+
+
+def test_a_transcription_of_its_own_may_be_a_label_of_the_study(tmp_path):
+    words = {"coarse": "dfet:2x2", "fine": DFET(3, 2, control_order=0), "unused": "dfet:9x9"}
+    given = {"macs": {"transcription": "coarse"}, "nsga2": {"transcription": "fine"}}
+    ours = study(transcriptions=words, terms=given)
+    assert [cell.labels[1:] for cell in ours.cells] == [("coarse", "macs"), ("fine", "nsga2")]
+    assert ours.cells[1].details["transcription"] == words["fine"].to_dict() and all(cell.apart for cell in ours.cells)
+    ours.run(tmp_path / "out")
+    [comparison] = comparisons(Store.open(tmp_path / "out"), {})
+    assert list(comparison.fronts) == ["macs", "nsga2"] and comparison.place("nsga2") == "fine"
+    with pytest.raises(ValueError, match="transcription 'finer'"):
+        study(transcriptions=words, terms={"macs": {"transcription": "finer"}})
