@@ -259,8 +259,9 @@ def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
 
 def test_a_picture_shows_them_below(ascents):
     axes = ascents[3].plot()
-    labels = [ax.get_ylabel() for ax in axes]
-    assert labels[5:] == ["costate of x", "costate of vx", "costate of y", "costate of vy", "Hamiltonian"]
+    names, units = zip(*(" ".join(ax.get_ylabel().split()).split(" [") for ax in axes[5:]), strict=True)
+    assert names == ("costate of x", "costate of vx", "costate of y", "costate of vy", "Hamiltonian")
+    assert units[0] == units[2] == "per km]" and units[4] == "per s]"
     axes[0].figure.draw_without_rendering()
     assert axes[5].get_position().y1 < min(ax.get_position().y0 for ax in axes[:5])
     # A costate that is zero is drawn as such, not its round-off.
