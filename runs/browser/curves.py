@@ -36,9 +36,10 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
     Returns
     -------
     list of dict
-        Of each phase "name", "unit" (of time), "t0", "tf", "edges" (number of elements), "times" (lists of times) and "quantities". A
-        quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit", "lower" and "upper" (None where there
-        is no limit), "least" (the least range that means anything), "t" (which of the "times") and "v" (values, None in gaps).
+        Of each phase "name", "unit" (of time), "t0", "tf", "elements" (their number), "times" (lists of times) and "quantities". A
+        quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit" (of costates and the
+        Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there is no limit), "least" (the least range that
+        means anything), "t" (which of the "times") and "v" (values, None in gaps).
     """
     found = []
     worths = None if costates is None else max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
@@ -68,9 +69,10 @@ def _write_costates(writer: _Writer, phase: PhaseTrajectory, costates: Costates,
     """Add the costates of a phase and its Hamiltonian. What is worth less than `FLAT` of all costates is round-off."""
     own = costates[phase.name]
     ranges = {name: float(np.ptp(phase[name])) for name in own}
+    units = {variable.name: variable.unit for variable in phase.state_variables}
     writer.polynomial(
         "costate",
-        [Variable(name, -np.inf, np.inf) for name in own.names],
+        [Variable(name, -np.inf, np.inf, _per(units[name])) for name in own.names],
         own.polynomial,
         own.polynomial.on_elements,
         jumps=True,
@@ -78,7 +80,19 @@ def _write_costates(writer: _Writer, phase: PhaseTrajectory, costates: Costates,
     )
     length = float(np.ptp(phase.time))
     none = Limit("", -np.inf, np.inf)
-    writer.add("Hamiltonian", "hamiltonian", "", none, phase.time, own.hamiltonian, FLAT * worths / length if length > 0 else 0.0)
+    writer.add(
+        "Hamiltonian",
+        "hamiltonian",
+        _per(phase.time_unit),
+        none,
+        phase.time,
+        own.hamiltonian,
+        FLAT * worths / length if length > 0 else 0.0,
+    )
+
+
+def _per(unit: str) -> str:
+    return f"per {unit}" if unit else ""
 
 
 class _Writer:

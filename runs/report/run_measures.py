@@ -88,7 +88,7 @@ class Charge:
         if prices is None:
             return None
         taken = {
-            solver: float(np.mean([_evaluated(run.front.stats, *prices[run.cell]) / run.front.stats["evaluations"] for run in ones]))
+            solver: float(np.mean([_evaluated(run.front.stats, prices[run.cell][0]) / run.front.stats["evaluations"] for run in ones]))
             for solver, ones in comparison.runs.items()
             if ones and all(run.front.stats["evaluations"] and not run.front.stats["gradient_solves"] for run in ones)
         }
@@ -101,10 +101,10 @@ class Charge:
     def __call__(self, cell: Cell, counts: Mapping[str, Any]) -> Any:
         """Charged evaluations of a run of a cell: of its `work` and `gradient_work`, numbers or arrays."""
         price, of_gradients = self.prices[cell]
-        return (_evaluated(counts, price, of_gradients) + np.asarray(counts["gradient_work"], dtype=float) * of_gradients) / self.unit
+        return (_evaluated(counts, price) + np.asarray(counts["gradient_work"], dtype=float) * of_gradients) / self.unit
 
 
-def _evaluated(counts: Mapping[str, Any], price: float, _: float) -> Any:
+def _evaluated(counts: Mapping[str, Any], price: float) -> Any:
     """What the evaluations took, without gradient solves."""
     return (np.asarray(counts["work"], dtype=float) - np.asarray(counts["gradient_work"], dtype=float)) * price
 

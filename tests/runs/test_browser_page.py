@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from misbehaving import Crashing, Plain, glide
 from synthetic_fronts import black_box, empty, flights, marked
 
+from macs import optimize
+from problems import load
 from problems.compiled import Objective
 from runs import Study
 from runs.batch.store import Store
@@ -23,6 +25,7 @@ from runs.browser.front_page import front_page
 from runs.browser.points import samples_of
 from runs.browser.study_page import study_page
 from runs.cli import main
+from transcription import parse
 
 pytest.importorskip("plotly")
 
@@ -88,6 +91,17 @@ def test_curves_are_the_trajectory():
                 # Where a control jumps, the page has both values, `at` the later one.
                 edges = np.isin(np.round(times, 4), np.round(flight.control.edges, 4))
                 assert (near | edges).all() if one["kind"] == "control" else near.all()
+
+
+def test_costates_are_those_of_the_point_and_have_units():
+    point = optimize(load("goddard"), parse("dfet:4x6"), objective="horizontal speed", starts=1)
+    (phase,) = curves(point.trajectory, point.costates, 400)
+    adjoint = {one["name"]: one for one in phase["quantities"] if one["kind"] in ("costate", "hamiltonian")}
+    units = {"x": "per km", "vx": "per km/s", "y": "per km", "vy": "per km/s", "Hamiltonian": "per s"}
+    assert {name: one["unit"] for name, one in adjoint.items()} == units
+    exact = {**point.costates["ascent"], "Hamiltonian": point.hamiltonian["ascent"]}
+    for name, one in adjoint.items():
+        assert [one["v"][0], one["v"][-1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
 
 
 def test_a_page_loads_nothing_and_stays_small():

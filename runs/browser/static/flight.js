@@ -134,7 +134,7 @@ function panelFigure(flights, { name, kind, unit }) {
   const units = [...new Set(limits.map((one) => one.phase.unit))].join(" | ");
   return {
     traces,
-    title: kind === "costate" ? `costate of ${name}` : withUnit(name, unit),
+    title: withUnit(kind === "costate" ? `costate of ${name}` : name, unit),
     limits: words,
     words: described,
     layout: layout({
