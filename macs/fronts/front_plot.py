@@ -11,7 +11,8 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from .pictures.kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
+from ..io.text import counted
+from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
 from .pictures.style import (
     COLORS,
     GREY,
@@ -88,7 +89,8 @@ def _title(front: Points) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
-    return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
+    said = f", {NOT_SIMULATED}" if front.dynamic and not front.was_simulated.any() else ""
+    return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
 def _scatter(front: Points, ax: Any) -> None:
