@@ -14,7 +14,7 @@ from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, in_time, vector_function
 from .peaks import with_sizes
 from .phase import Phase
-from .sanity import check_numbers
+from .sanity import check_links, check_numbers
 
 DEFAULT_EVALUATIONS = 2_000
 """Default number of evaluations of a case of the catalogue that does not set its own."""
@@ -199,7 +199,9 @@ class Problem:
             address=self.address,
             data=dict(self.data),
         )
-        check_numbers(compiled, [phase._labels() for phase in phases])
+        labels = [phase._labels() for phase in phases]
+        check_numbers(compiled, labels)
+        check_links(compiled, labels)
         return with_sizes(compiled)
 
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
