@@ -194,7 +194,8 @@ def footer(front: Points) -> list[str]:
     missing = [point.index for point in front if MISSES in point.note or AGAIN in point.note]
     lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[FEW:]]
     if len(missing) > FEW:
-        lines.append(f"The notes of {len(missing) - FEW} more points say what they miss.")
+        rest = len(missing) - FEW
+        lines.append(f"The note{'s' if rest > 1 else ''} of {counted(rest, 'more point')} say{'' if rest > 1 else 's'} what is missed.")
     if front.message:
         lines.append(front.message)
     return lines
@@ -217,9 +218,10 @@ def _simulated(front: Points) -> list[str]:
     if count == len(front):
         how = "evaluated again" if _is_vector(front) else "simulated by an independent integrator"
         return [f"{points} verified: {how}, nothing differs by more than {verify:g}."]
+    remedy = "" if _is_vector(front) else " front.mended() solves again where points miss something."
     if not count:
-        return ["The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified."]
-    return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified."]
+        return [("The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified.") + remedy]
+    return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified.{remedy}"]
 
 
 def _not_simulated(front: Points) -> list[str]:

@@ -155,7 +155,7 @@ def _evaluated(points: Kind, tolerance: float) -> Kind:
             found.append(f"its '{points.names[k]}' differs by {off[i, k] * scales[k]:.2g} {points.goals[k].unit}".rstrip())
         if allowed < violation[i] < np.inf:
             worst = max(violations[i], key=lambda name: violations[i][name])
-            found.append(f"it violates '{worst}' by {violation[i]:.1e}")
+            found.append(f"it violates {worst} by {violation[i]:.1e}")
         notes[i] = "; ".join(filter(None, [notes[i], AGAIN + ", ".join(found) if found else ""]))
     return points.replace(
         violations=violations,
@@ -260,7 +260,7 @@ def _misses(
     if not defect <= tolerance:
         found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance) if remark else ''}")
     if not violation <= tolerance:
-        found.append(f"it violates '{label}' by {violation:.1e}")
+        found.append(f"it violates {label} by {violation:.1e}")
     if other:
         found.append(other)
     return [MISSES + ", ".join(found)] if found else []
