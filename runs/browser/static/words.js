@@ -72,6 +72,18 @@ function fill(place, ...children) {
   place.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined));
 }
 
+/** Build a part of the page anew; what has the focus in it keeps it. */
+function rebuilt(place, build) {
+  const active = document.activeElement;
+  if (!place.contains(active)) return build();
+  const all = () => [...place.querySelectorAll("button, input, select, summary, [tabindex]")];
+  const row = active.closest("tr[data-key]")?.dataset.key, position = all().indexOf(active);
+  build();
+  if (place.contains(document.activeElement)) return;
+  if (row) focusRow([...place.querySelectorAll("tr[data-key]")].find((one) => one.dataset.key === row) ?? null);
+  else all()[position]?.focus({ preventScroll: true });
+}
+
 /** A label with a select element; `options` are pairs of value and text. */
 function choice(text, options, value, chosen) {
   const select = element("select", { onchange: () => chosen(select.value) });
