@@ -151,8 +151,9 @@ def test_head_has_the_headers_of_get_without_content(out):
 
 @pytest.mark.parametrize(
     "path",
-    ["/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd", "//etc/passwd",
-     "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress", "/?/../study.json/x", "/details/.json"],
+    ["/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd",
+     "//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress",
+     "/?/../study.json", "/details/.json"],
 )  # fmt: skip
 def test_no_file_is_served_by_its_path(out, path):
     with served(out) as client:
