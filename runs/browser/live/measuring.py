@@ -11,7 +11,7 @@ from .cached_store import CachedStore
 from .source import Repeater, Resource
 
 REST = 1.0
-SHARE = 20.0
+SHARE = 10.0
 """While the study runs, the time between two comparisons is at least so many times what the last one took."""
 
 

@@ -87,6 +87,7 @@ class StudySource(Source):
         if not self._store.is_current:
             self._store = CachedStore.open(self._store.path, self._store.trust)
         store = self._store
+        self.say("reading the state of the runs")
         summary, progress = store.summary(), read_progress(store.path)
         unreadable = self._read_fronts(summary)
         self._sampled = self._read_samples(summary, progress)

@@ -65,7 +65,7 @@ function renewed(id, data, build) {
 function goingTable(going) {
   if (!going.length) return [];
   const rows = going.map(({ name, evaluations, budget, elapsed }) => {
-    const text = budget === null ? counted(evaluations, "evaluation") : `${evaluations} of ${counted(budget, "evaluation")}`;
+    const text = budget === null ? counted(evaluations, "evaluation") : `${grouped(evaluations)} of ${counted(budget, "evaluation")}`;
     const bar = budget === null ? null : element("progress", { max: budget, value: evaluations, "aria-label": `${name}: ${text}` });
     return element("tr", {}, element("th", { scope: "row", class: "words" }, name), element("td", {}, bar), element("td", {}, text), element("td", {}, clock(elapsed)));
   });

@@ -93,7 +93,8 @@ function drawConvergence(all, k) {
   const { indicator, axis: cost, larger, solvers } = all[k];
   const traces = [];
   const positive = Object.values(solvers).flatMap((one) => one.median).filter((value) => value > 0);
-  const log = !larger && positive.length > 0;
+  const decades = Math.max(...positive) / Math.min(...positive);
+  const log = !larger && decades > LEAST_LOG;
   const ends = Math.max(...Object.values(solvers).map((one) => one.x.at(-1)));
   for (const [solver, { runs, x, lower, median, upper }] of Object.entries(solvers)) {
     if (state.hidden.has(solver)) continue;
@@ -107,10 +108,12 @@ function drawConvergence(all, k) {
     const line = { shape: "hv", width: 2, color, dash: DASHES[index % DASHES.length] };
     traces.push({ x: times, y: last(median), mode: "lines", line, name: `${plotText(solver)}, ${counted(runs, "run")}`, hovertemplate: "%{y:.3g} at %{x:.4g}<extra></extra>" });
   }
-  const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(Math.max(...positive) / Math.min(...positive)) } : {});
+  const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(decades) } : {});
   draw(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, uirevision: k, modebar: { orientation: "h" }, legend: { x: 1.02, y: 1 }, showlegend: true }));
   byId("convergence").setAttribute("aria-label", `${indicator} over ${cost}, ${Object.keys(solvers).join(", ")}`);
 }
+
+const LEAST_LOG = 4; // ratio of the values below which a logarithmic axis would have hardly a number on it
 
 /** Of less than two decades plain numbers at 1, 2 and 5 of each, else powers of ten. */
 const logTicks = (ratio) => (ratio > 100 ? { dtick: 1 } : { dtick: "D2", tickmode: "linear", exponentformat: "none", tickformat: ".2~r" });

@@ -34,7 +34,8 @@ function column(values) {
 }
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);
-const counted = (count, what) => `${count.toLocaleString("en").replace(/,/g, "\u202f")} ${what}${count === 1 ? "" : "s"}`;
+const grouped = (count) => count.toLocaleString("en").replace(/,/g, "\u202f");
+const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 
 /** The limits of a quantity in words. */
 function limitsText(lower, upper) {
