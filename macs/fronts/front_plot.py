@@ -104,7 +104,8 @@ def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
     """Draw other points: dots so small that many make a line, which may have gaps, or crosses if there are few."""
     for (name, values), color in zip(beside.items(), cycle(("black", GREY))):
         many = len(values) > FEW
-        ax.plot(*np.asarray(values, dtype=float).T, "." if many else "x", color=color, ms=1.2 if many else 5.0, zorder=1)
+        look: dict[str, Any] = {"marker": "o", "ms": 0.9, "mew": 0.0} if many else {"marker": "x", "ms": 5.0}
+        ax.plot(*np.asarray(values, dtype=float).T, ls="none", color=color, zorder=1, **look)
         ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
 
 

@@ -76,7 +76,7 @@ def test_other_points_are_drawn_beside_those_of_two_objectives():
     ax = front.plot(beside={"known": many, "another": few})
     assert [text.get_text() for text in ax.get_legend().get_texts()[:2]] == ["known", "another"]
     drawn = {line.get_marker(): np.column_stack(line.get_data()) for line in ax.lines if len(line.get_xdata())}
-    assert np.array_equal(drawn["."], many) and np.array_equal(drawn["x"], few)
+    assert np.array_equal(drawn["o"], many) and np.array_equal(drawn["x"], few)
     with pytest.raises(ValueError, match="two objectives, not of 3"):
         black_box(6, 3).plot(beside={"known": many})
 
