@@ -23,6 +23,7 @@ from .pictures.style import (
     better,
     blank_figure,
     new_figure,
+    raised,
     rendered,
     title_and_legend,
     wrapped,
@@ -149,7 +150,7 @@ def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
 
 def _values(front: Points, number: int) -> str:
     """The number of a point and its objectives, for a legend."""
-    values = (f"{value:.5g} {goal.unit}".rstrip() for goal, value in zip(front.goals, front.objectives[number], strict=True))
+    values = (f"{value:.5g} {raised(goal.unit)}".rstrip() for goal, value in zip(front.goals, front.objectives[number], strict=True))
     return f"#{range(len(front))[number]}: {', '.join(values)}"
 
 
@@ -159,7 +160,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {goal.unit}' if goal.unit else ''} (#{best})"
+        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {raised(goal.unit)}' if goal.unit else ''} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 

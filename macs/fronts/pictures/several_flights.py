@@ -9,7 +9,7 @@ import numpy as np
 
 from .flight_plot import PANEL, Drawn, draw_panel, quantities
 from .kinds import remark
-from .style import COLORS, STYLE, axis_label, new_figure, plain, wrapped
+from .style import COLORS, STYLE, axis_label, new_figure, plain, raised, wrapped
 
 
 def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
@@ -70,5 +70,7 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
 
 def _words(point: Any) -> str:
     """The point's number, its objectives, and whether it is not verified or not feasible."""
+    named = zip(point.goals, point.objectives.values(), strict=True)
+    values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
     said = remark(point)
-    return f"#{point.index}: {point.title}{f'; {said}' if said else ''}"
+    return f"#{point.index}: {values}{f'; {said}' if said else ''}"
