@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,8 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from .pictures.kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
+from ..io.text import counted
+from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
 from .pictures.style import (
     COLORS,
     GREY,
@@ -21,6 +24,7 @@ from .pictures.style import (
     better,
     blank_figure,
     new_figure,
+    raised,
     rendered,
     title_and_legend,
     wrapped,
@@ -31,6 +35,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .points import Points
+
+
+FEW = 100
+"""Other points up to this number are drawn as crosses."""
 
 
 def save_picture(what: Any, path: str | PathLike[str]) -> None:
@@ -58,7 +66,7 @@ def _size(front: Points) -> tuple[float, float]:
     return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
 
 
-def draw_front(front: Points, ax: Axes | None = None) -> Axes:
+def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
     """Axes with the objectives of a front.
 
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
@@ -70,28 +78,48 @@ def draw_front(front: Points, ax: Axes | None = None) -> Axes:
     front : Points
     ax : Axes, optional
         Axes to draw into. Default: those of a new figure.
+    marked : numbers of points
+        Points to mark, a colour each, the same as in a picture of their trajectories. Default: of two objectives, the best of each.
+    beside : mapping, optional
+        Name -> two objectives (k, 2) of other points, in the user's units and senses.
     """
     import matplotlib
+
+    if len(marked) > len(COLORS):
+        raise ValueError(f"at most {len(COLORS)} points can be marked in a picture, not {len(marked)}")
+    if beside and len(front.goals) != 2:
+        raise ValueError(f"other points are drawn beside those of two objectives, not of {len(front.goals)}")
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if ax is None:
             ax = new_figure(*_size(front)).add_subplot()
         if len(front.goals) > 3:
-            _parallel(front, ax)
+            _parallel(front, ax, marked)
         else:
-            _scatter(front, ax)
+            _draw_beside(ax, beside or {})
+            _scatter(front, ax, marked)
         title_and_legend(ax, _title(front))
     return ax
+
+
+def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
+    """Draw other points: dots so small that many make a line, which may have gaps, or crosses if there are few."""
+    for (name, values), color in zip(beside.items(), cycle(("black", GREY))):
+        many = len(values) > FEW
+        look: dict[str, Any] = {"marker": "o", "ms": 0.9, "mew": 0.0} if many else {"marker": "x", "ms": 5.0}
+        ax.plot(*np.asarray(values, dtype=float).T, ls="none", color=color, zorder=1, **look)
+        ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
 
 
 def _title(front: Points) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
-    return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
+    said = f", {NOT_SIMULATED}" if front.dynamic and not front.was_simulated.any() else ""
+    return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
-def _scatter(front: Points, ax: Any) -> None:
+def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     if not len(front):
@@ -108,16 +136,34 @@ def _scatter(front: Points, ax: Any) -> None:
     third = values.shape[1] == 3 and ax.name != "3d"
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
-    drawn = ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color)
-    for rows, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
+    shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
+    ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
+    rims = shades.to_rgba(values[apart, 2]) if shades else COLORS[0]
+    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
         if rows.any():
             ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
-    if third and good.any():
-        ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
+    if shades:
+        ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
-    if len(front.goals) == 2 and good.sum() > 1:
+    for i, edge in zip(marked, COLORS, strict=False):
+        ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
+    if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
         _mark_extremes(front, ax)
+
+
+def _shades(values: np.ndarray) -> Any:
+    """Colours of the values of a third objective, of points that are not verified, too."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(values.min(), values.max()), "viridis")
+
+
+def _values(front: Points, number: int) -> str:
+    """The number of a point and its objectives, for a legend."""
+    values = (f"{value:.5g} {raised(goal.unit)}".rstrip() for goal, value in zip(front.goals, front.objectives[number], strict=True))
+    return f"#{range(len(front))[number]}: {', '.join(values)}"
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:
@@ -126,12 +172,12 @@ def _mark_extremes(front: Points, ax: Any) -> None:
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {goal.unit}' if goal.unit else ''} (#{best})"
+        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {raised(goal.unit)}' if goal.unit else ''} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
 
-def _parallel(front: Points, ax: Any) -> None:
+def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
     """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
     feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
     import matplotlib
@@ -149,6 +195,9 @@ def _parallel(front: Points, ax: Any) -> None:
     for rows, name, look in ((apart, NOT_VERIFIED, "--"), (infeasible, NOT_FEASIBLE, ":")):
         for k, row in enumerate(height[rows]):
             ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
+    for i, color in zip(marked, COLORS, strict=False):
+        dashes = "--" if apart[i] else ":" if infeasible[i] else "-"
+        ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_values(front, i))
     signs = np.array([goal.sign for goal in front.goals])
     for k in range(values.shape[1]):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)

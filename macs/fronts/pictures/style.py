@@ -78,8 +78,13 @@ def label(name: str, unit: str) -> str:
 
 
 def axis_label(name: str, unit: str) -> str:
-    """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
-    return plain(label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}")))
+    """Label of an axis: `name [unit]`, with powers as print has them. Lines do not end within the unit."""
+    return plain(label(name, raised(unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def raised(unit: str) -> str:
+    """A unit with powers as print has them: m², not m2."""
+    return POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit)
 
 
 def plain(text: str) -> str:
