@@ -133,13 +133,13 @@ def test_one_evaluation_is_one() -> None:
 
 
 def test_a_start_is_used_and_never_made_worse() -> None:
-    first = MACS().solve(load("orbit_rise"), MESH, evaluations=300, seed=1)
-    again = MACS().solve(load("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
+    first = MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=300, seed=1)
+    again = MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
     for row in first.F:
         assert not (row < again.F).all(axis=1).all()
     best = first.F.min(axis=0)
     assert (again.F.min(axis=0) <= best + 1e-6 * np.ptp(first.F, axis=0)).all()  # equal to the digits that a solve has
-    assert len(MACS().solve(load("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
+    assert len(MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
 
 
 def test_a_guess_is_among_the_first() -> None:
@@ -189,9 +189,9 @@ def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
 
 
 def test_a_start_of_another_mesh_is_interpolated() -> None:
-    coarse = MACS().solve(load("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
-    fine = MACS().solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
-    bare = MACS().solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, inner="projection")
+    coarse = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
+    fine = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
+    bare = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, inner="projection")
     span = np.ptp(coarse.F, axis=0)
     assert ((fine.F.min(axis=0) - coarse.F.min(axis=0)) / span < 0.05).all()
     assert (fine.F[:, 1].min() - coarse.F[:, 1].min()) < (bare.F[:, 1].min() - coarse.F[:, 1].min())
