@@ -43,6 +43,8 @@ def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):
     names = {name for phase in front[index].trajectory.values() for name in phase.names}
     drawn = browser.execute_script("return [...document.querySelectorAll('.panel-plot')].map((one) => one.getAttribute('aria-label'))")
     assert {label.split(",")[0] for label in drawn} == names
+    browser.execute_script("document.querySelector('.panel-plot').scrollIntoView()")
+    wait(browser, "document.querySelector('.panel-plot').data")
     last = browser.execute_script("return document.querySelector('.panel-plot').data[0].y.at(-1)")
     assert last == pytest.approx(front[index].trajectory["climb"].edge_states[-1, 0], rel=1e-5)
     assert browser.execute_script("return document.querySelectorAll('#table tr[aria-selected=true]').length") == 1
