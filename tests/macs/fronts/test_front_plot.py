@@ -10,9 +10,9 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from synthetic_fronts import black_box, empty, flights, marked
+from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
 
-from macs.fronts.pictures.flight_plot import _dense
+from macs.fronts.pictures.flight_plot import _dense, draw_flight
 from macs.fronts.pictures.limits import draw_limits
 from macs.fronts.pictures.style import axis_label, axis_number, blank_figure
 from problems.compiled import Objective, Variable
@@ -141,6 +141,26 @@ def test_a_point_is_drawn_with_all_it_has():
     draw(axes[0].figure)
     figure = blank_figure()
     assert point.plot(figure)[0].figure is figure
+
+
+@pytest.mark.parametrize("length", [-3.7e-6, 2e-6])
+def test_a_phase_without_length_has_no_costates_and_the_picture_says_so(length):
+    *_, costate, hamiltonian = axes = draw_flight(*costated(length))
+    assert max(np.nanmax(np.abs(ax.lines[0].get_ydata())) for ax in (costate, hamiltonian)) <= 1.0
+    assert [len([line for line in ax.lines if len(line.get_xdata()) > 2]) for ax in (costate, hamiltonian)] == [2, 2], "lines and dots"
+    assert np.abs([*costate.get_ylim(), *hamiltonian.get_ylim()]).max() < 10.0
+    figure = hamiltonian.figure
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["climb", "coast (no length)"]
+    assert axes[4].get_title("right") == "no costates of coast: without length"
+    axes = draw_flight(*costated(1.0))
+    assert [text.get_text() for text in axes[0].figure.legends[0].get_texts()] == ["climb", "coast"]
+    assert axes[4].get_title("right") == ""
+
+
+def costated(length: float):
+    """Arguments of `draw_flight`."""
+    trajectory, costates = with_optional_phase(length)
+    return trajectory, "", blank_figure(), costates
 
 
 def test_controls_jump_where_their_polynomials_do():
