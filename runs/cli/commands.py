@@ -77,6 +77,7 @@ def solve(arguments: Namespace) -> int:
                 inner=inner,
                 start=start,
                 verify=verify,
+                time_limit=arguments.time_limit,
                 checkpoint=arguments.checkpoint,
                 progress=True,
             )

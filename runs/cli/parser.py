@@ -1,8 +1,8 @@
 """The parser of the command line, and the end of a call.
 
 Exit codes: 0 done; 1 failed (nothing feasible, a point that does not verify, runs missing); 2 the call was wrong: one line on stderr with
-the reason, and no file is left; 130 ended by Ctrl-C, with what there was by then. The commands themselves are in `commands`, which is only
-imported to run one: help is instant.
+the reason, and no file is left; 130 ended by Ctrl-C or SIGTERM, with what there was by then. The commands themselves are in `commands`,
+which is only imported to run one: help is instant.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from functools import partial
 from typing import Any, NoReturn
 
 from ..data.memory import is_memory_error, memory_message
-from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once
 
 EPILOG = """\
 examples:
@@ -34,7 +34,7 @@ examples:
   macs bench inner --quick
 
 exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
-was wrong, 130 ended by Ctrl-C"""
+was wrong, 130 ended by Ctrl-C or SIGTERM"""
 
 
 BENCH = """\
@@ -117,7 +117,8 @@ class Version(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, by default that of this process, which then ends; returns its exit code."""
     try:
-        return _answer(argv)
+        with ended_as_by_ctrl_c():
+            return _answer(argv)
     except KeyboardInterrupt:
         complain("interrupted", "macs")
         return INTERRUPTED
@@ -192,6 +193,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
+    solve.add_argument("--time-limit", metavar="S", type=_seconds, help="seconds after which the search ends with what it has found")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, propagate, ipopt, ... (default: the problem's own)")
     solve.add_argument(
@@ -325,6 +327,7 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
 _natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
+_seconds = partial(_number, float, "a number of seconds above 0", lambda value: 0 < value < float("inf"))
 _tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))
 
 

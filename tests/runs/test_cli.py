@@ -333,15 +333,38 @@ def test_ctrl_c_keeps_what_gradient_tools_found(capsys, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_ctrl_c_keeps_what_was_found(here):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_ctrl_c_and_kill_keep_what_was_found(here, number):
     call = [*MACS, "solve", "goddard", "--evaluations", "10000000", "--out", "front.nc"]
     with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stderr.readline()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, number))
         out, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "ended early (interrupted)" in out and "front saved in front.nc" in out
     assert Front.load("front.nc").stats["stopped"] == "interrupted"
+
+
+def test_a_time_limit_ends_a_search_with_its_front(capsys):
+    assert main(["solve", "goddard", "--evaluations", "10000000", "--time-limit", "3", "--out", "front.nc"]) == 0
+    assert "ended early (time limit)" in capsys.readouterr().out
+    front = Front.load("front.nc")
+    assert len(front) and front.stats["stopped"] == "time limit" and front.stats["evaluations"] < 10_000_000
+    assert "seconds above 0" in wrong(capsys, "solve", "goddard", "--time-limit", "0")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_kill_ends_what_ignores_ctrl_c():
+    """As of a shell in the background; outside of work that ends by itself."""
+    code = (
+        "import signal, time\nfrom runs.cli.answers import ended_as_by_ctrl_c\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "with ended_as_by_ctrl_c():\n    signal.raise_signal(signal.SIGTERM)\n    time.sleep(30)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=20).returncode == -signal.SIGTERM
+
+
+def test_kill_leaves_no_handler(capsys):
+    assert main(["list"]) == 0 and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, monkeypatch):
