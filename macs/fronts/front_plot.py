@@ -11,7 +11,8 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from .pictures.kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
+from ..io.text import counted
+from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
 from .pictures.style import (
     COLORS,
     GREY,
@@ -88,7 +89,8 @@ def _title(front: Points) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
-    return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
+    said = f", {NOT_SIMULATED}" if front.dynamic and not front.was_simulated.any() else ""
+    return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
 def _scatter(front: Points, ax: Any) -> None:
@@ -108,16 +110,26 @@ def _scatter(front: Points, ax: Any) -> None:
     third = values.shape[1] == 3 and ax.name != "3d"
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
-    drawn = ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color)
-    for rows, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
+    shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
+    ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
+    rims = shades.to_rgba(values[apart, 2]) if shades else COLORS[0]
+    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
         if rows.any():
             ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
-    if third and good.any():
-        ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
+    if shades:
+        ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
     if len(front.goals) == 2 and good.sum() > 1:
         _mark_extremes(front, ax)
+
+
+def _shades(values: np.ndarray) -> Any:
+    """Colours of the values of a third objective, of points that are not verified, too."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(values.min(), values.max()), "viridis")
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:

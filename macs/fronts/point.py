@@ -226,11 +226,11 @@ class Point:
         """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
         there are any. Without dynamics, axes with each variable along its front, and this point in it.
 
-        The title says whether a point is not verified or not feasible; then the nodes of its trajectory are hollow.
+        The title says whether a point is not feasible, not verified or not simulated. Nodes of the first two are hollow.
         """
         from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
-        from .pictures.kinds import remark
+        from .pictures.kinds import hollow, remark
 
         said = remark(self)
         title = f"{self.title}; {said}" if said else self.title
@@ -238,7 +238,7 @@ class Point:
             return draw_designs(self._points, title, figure, [self.index])
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
-        return draw_flight(self.trajectory, title, figure, self.costates, hollow=bool(said))
+        return draw_flight(self.trajectory, title, figure, self.costates, hollow=hollow(self))
 
     @property
     def title(self) -> str:

@@ -141,8 +141,8 @@ def test_points_that_are_not_what_they_say_are_not_verified(front):
     moved[4, 0] = 1.8
     beyond = _with(front, moved)
     (reason,) = [check.reasons for check in verify(beyond, tolerance=1e-6) if not check.ok]
-    assert "violates 'wall' by 2.0e-01" in "; ".join(reason)
-    assert "it violates 'wall' by 2.0e-01" in beyond.verify()[4].note
+    assert "violates wall by 2.0e-01" in "; ".join(reason)
+    assert "it violates wall by 2.0e-01" in beyond.verify()[4].note
     honest = beyond.replace(F=parabolas().compile().evaluate(moved)[0]).verify()
     assert honest.verified.tolist() == [True] * 4 + [False] + [True] * 5  # its objectives are right, but it is behind the wall
     moved[4, 0] = 5.0

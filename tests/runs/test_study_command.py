@@ -141,7 +141,7 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     said = capsys.readouterr().out
     for name in ("goddard-table3", "orbit-table3", "orbit-full-table3"):
         study = Study.load(name)
-        assert name in said and study.name == name and study.runs == 10 and len(study.cells) == 5
+        assert name in said and study.name == name and study.runs == 10 and len(study.cells) == 6
         (paper,) = study.paper[0]["rows"]
         assert paper["problem"] == study.cells[0].problem
         # Table III.

@@ -88,6 +88,10 @@ def test_points_that_were_not_simulated_are_drawn_in_full():
     ax = front.plot()
     assert np.array_equal(ax.collections[0].get_offsets(), front.objectives[:2])
     assert "not verified" not in told(flights(3).plot())
+    titles = [one.plot().get_title(loc="left") or one.plot().get_title() for one in (front, flights(3), black_box(3))]
+    assert [title.endswith(", 3 points, not simulated") for title in titles] == [False, True, False]
+    said = [point.plot()[0].figure.get_suptitle().endswith("; not simulated") for point in (front[0], front[1])]
+    assert said == [True, False]
 
 
 def test_infeasible_and_unverified_points_have_words_of_their_own():
