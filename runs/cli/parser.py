@@ -190,6 +190,9 @@ def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> 
 def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve = _add(commands, "solve", "search a problem for its front, simulate every point, save the front")
     solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
+    solve.add_argument(
+        "--data", metavar="NAME=VALUE", action="append", help="an argument of the problem's function, such as limit=3; again for others"
+    )
     solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
@@ -197,7 +200,9 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, propagate, ipopt, ... (default: the problem's own)")
     solve.add_argument(
-        "--start", metavar="KIND", help="first candidates: smooth about the guess, or uniform, without it (default: the problem's own)"
+        "--start",
+        metavar="KIND|FRONT.nc",
+        help="first candidates: smooth about the guess, uniform, without it, or a front's points (default: the problem's own)",
     )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(

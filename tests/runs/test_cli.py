@@ -345,6 +345,43 @@ def test_ctrl_c_and_kill_keep_what_was_found(here, number):
     assert Front.load("front.nc").stats["stopped"] == "interrupted"
 
 
+def test_data_go_to_the_function_and_stay_with_the_front(capsys):
+    assert main(["solve", "glide.py:build", "--data", "speed=2.5", "--seed", "1", "--out", "slow.nc"]) == 0
+    front = Front.load("slow.nc")
+    assert front.source.data == {"speed": 2.5} and {v.upper for v in front.variables if ".u" in v.name} == {2.5}
+    capsys.readouterr()
+    assert main(["verify", "slow.nc", "--problem", "glide.py:build"]) == 0, "with the same data"
+    assert main(["decide", "slow.nc", "--problem", "glide.py:build", "--reference", "time=2", "--json", "choice.json"]) == 0
+    assert main(["decide", "choice.json", "--problem", "glide.py:build", "--out", "choice.nc"]) == 0
+    assert Front.load("choice.nc").source.data == {"speed": 2.5}
+
+
+def test_a_front_is_the_start_of_a_search_with_other_data(capsys, monkeypatch):
+    assert main(["solve", "glide.py:build", "--seed", "1", "--out", "front.nc"]) == 0
+    begun = []
+    begin = macs.MACS.begin
+    monkeypatch.setattr(macs.MACS, "begin", lambda self, *rest, **more: begun.append((rest, more)) or begin(self, *rest, **more))
+    assert main(["solve", "glide.py:build", "--data", "speed=2", "--start", "front.nc", "--seed", "1", "--out", "other.nc"]) == 0
+    ((rest, more),) = begun
+    start = more.get("start", rest[-1])
+    assert start.shape[0] >= len(Front.load("front.nc")), "its points are the first candidates"
+    assert Front.load("other.nc").objectives[:, 1].max() == pytest.approx(10.0)
+
+
+def test_data_and_starts_that_are_none_are_refused_in_a_line(capsys):
+    said = wrong(capsys, "solve", "glide.py:build", "--data", "sped=2")
+    assert "does not take sped" in said and "did you mean speed?" in said
+    assert "nor any other data" in wrong(capsys, "solve", "glide.py:rough", "--data", "speed=2")
+    for word in ("speed", "speed=", "=2", "speed=3,5", "speed=1979-05-27", "speed=2\nmore=3"):
+        assert "--data" in wrong(capsys, "solve", "glide.py:build", "--data", word)
+    assert "given twice" in wrong(capsys, "solve", "glide.py:build", "--data", "speed=2", "--data", "speed=3")
+    assert "must be a number, not 'fast'" in wrong(capsys, "solve", "glide.py:build", "--data", "speed=fast"), "a text"
+    assert "did you mean smooth? there are uniform, smooth, or the file of a front" in wrong(
+        capsys, "solve", "glide.py:build", "--start", "smoth"
+    )
+    assert "does not hold a front" in wrong(capsys, "solve", "glide.py:build", "--start", "glide.py")
+
+
 def test_a_time_limit_ends_a_search_with_its_front(capsys):
     assert main(["solve", "goddard", "--evaluations", "10000000", "--time-limit", "3", "--out", "front.nc"]) == 0
     assert "ended early (time limit)" in capsys.readouterr().out
