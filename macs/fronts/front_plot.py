@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .points import Points
 
 
-def save_picture(what: Any, path: str | PathLike[str]) -> None:
+def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
     """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
@@ -43,7 +43,7 @@ def save_picture(what: Any, path: str | PathLike[str]) -> None:
             figure = front_figure(what)
         else:
             figure = blank_figure()
-            what.plot(figure=figure)
+            what.plot(figure=figure, **how)
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from macs.fronts.pictures.flight_plot import costate_ranges, has_length
+from macs.fronts.pictures.style import per
 from problems.compiled import Limit, Variable
 from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -71,18 +72,14 @@ def _write_costates(writer: _Writer, phase: PhaseTrajectory, own: PhaseCostates,
     units = {variable.name: variable.unit for variable in phase.state_variables}
     writer.polynomial(
         "costate",
-        [Variable(name, -np.inf, np.inf, _per(units[name])) for name in own.names],
+        [Variable(name, -np.inf, np.inf, per(units[name])) for name in own.names],
         own.polynomial,
         own.polynomial.on_elements,
         jumps=True,
         least=least,
     )
     none = Limit("", -np.inf, np.inf)
-    writer.add("Hamiltonian", "hamiltonian", _per(phase.time_unit), none, phase.time, own.hamiltonian, least[None])
-
-
-def _per(unit: str) -> str:
-    return f"per {unit}" if unit else ""
+    writer.add("Hamiltonian", "hamiltonian", per(phase.time_unit), none, phase.time, own.hamiltonian, least[None])
 
 
 class _Writer:

@@ -110,6 +110,8 @@ def solve(arguments: Namespace) -> int:
 def show(arguments: Namespace) -> int:
     """A saved front, or one of its points."""
     check_picture(arguments.plot)
+    if arguments.costates and (arguments.point is None or not arguments.plot):
+        raise WrongCall("--costates is for the picture of a trajectory: --point I --plot FILE")
     if arguments.csv:
         check_target(arguments.csv)
         if same_file(arguments.csv, arguments.front):
@@ -121,9 +123,9 @@ def show(arguments: Namespace) -> int:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")
     print(front.table() if point is None else describe(front, point))
     if arguments.plot:
-        draw(front if point is None else point, arguments.plot)
+        draw(front if point is None else point, arguments.plot, costates=arguments.costates)
     if arguments.csv:
-        (front if point is None else front[[point.index]]).to_csv(arguments.csv)
+        (front if point is None else point).to_csv(arguments.csv)
         print(f"values in {arguments.csv}")
     return DONE
 
@@ -227,9 +229,9 @@ def free_name(problem: str) -> Path:
 # Output
 
 
-def draw(drawn: Front | Point, path: str) -> None:
-    """Draw a front, or a point's flight."""
-    save_picture(drawn, path)
+def draw(drawn: Front | Point, path: str, costates: bool = False) -> None:
+    """Draw a front, or a point's trajectory, with or without costates."""
+    save_picture(drawn, path, **({"costates": True} if costates else {}))
     print(f"picture in {path}")
 
 

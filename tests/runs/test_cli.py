@@ -237,7 +237,7 @@ def test_show_says_what_the_simulation_of_a_point_found(capsys):
     assert float(found["defect"]) == pytest.approx(front[1].defect, rel=0.05)
     assert float(found["violation"]) == pytest.approx(front[1].simulated_violation, rel=0.05, abs=1e-12)
     assert found["note"] == front[1].note
-    assert "verified" in Path("one.csv").read_text().splitlines()[0].split(",")
+    assert Path("one.csv").read_text().startswith("phase,time [s],x,u,costate of x,Hamiltonian [per s]\n")
     assert main(["solve", "glide.py:rough", "--mesh", "fixed", "--verify", "none", "--seed", "1", "--out", "plain.nc"]) == 0
     capsys.readouterr()
     assert main(["show", "plain.nc", "--point", "1"]) == 0 and "verified" not in capsys.readouterr().out
@@ -435,17 +435,20 @@ def test_show_prints_draws_and_exports(saved, capsys):
     assert main(["show", path, "--plot", "a.pdf", "--csv", "a.csv"]) == 0
     out = capsys.readouterr().out
     assert "flight time" in out and "picture in a.pdf" in out and "values in a.csv" in out
-    assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("flight time [s],")
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,flight time [s],")
 
 
 def test_show_one_point(saved, capsys):
     path = str(saved[0] / "front.nc")
-    assert main(["show", path, "--point", "-1", "--plot", "b.png", "--csv", "b.csv"]) == 0
+    assert main(["show", path, "--point", "-1", "--plot", "b.png", "--costates", "--csv", "b.csv"]) == 0
     out = capsys.readouterr().out
     assert "phase ascent" in out and "final value of ascent.y" in out
     state, control = out.index("  y [km]"), out.index("  u [rad]")
     assert state < control and len(out[control:].splitlines()[0].split()) == 6
-    assert Path("b.png").read_bytes().startswith(b"\x89PNG") and len(Path("b.csv").read_text().splitlines()) == 2
+    assert Path("b.png").read_bytes().startswith(b"\x89PNG") and len(Path("b.csv").read_text().splitlines()) == 1 + len(
+        Front.load(path)[-1].trajectory["ascent"].time
+    )
+    assert "--costates is for the picture of a trajectory" in wrong(capsys, "show", path, "--costates", "--plot", "c.png")
     assert "there is no point 99: the front has points 0 to" in wrong(capsys, "show", path, "--point", "99")
 
 

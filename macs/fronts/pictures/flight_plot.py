@@ -11,7 +11,7 @@ import numpy as np
 from problems.compiled import Limit, Variable
 
 from .limits import draw_limits
-from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, plain, wrapped
+from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, per, plain, wrapped
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -119,8 +119,8 @@ def _draw_costates(
         drawn = np.concatenate(everything)
         middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least[name], 1e-12)
         ax.set_ylim(middle - 1.12 * half, middle + 1.12 * half)
-        per = f"per {units[0]}" if len(set(units)) == 1 and units[0] else ""
-        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", per))
+        unit = per(units[0]) if len(set(units)) == 1 else ""
+        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", unit))
     weights = ", ".join(f"{weight:.3g}" for weight in costates.weights)
     axes[-1].set_title(f"weights of the objectives: {weights}", loc="right", fontsize=7, color=GREY, pad=2)
     left_out = [phase.name for phase in trajectory.phases if not has_length(trajectory, phase)]

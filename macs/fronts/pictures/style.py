@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import textwrap
+from os import PathLike
 from typing import Any
 
 from problems.compiled import Objective
@@ -75,6 +76,17 @@ def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
 def label(name: str, unit: str) -> str:
     """Name of a column or a line: `name [unit]`."""
     return f"{name} [{unit}]" if unit else name
+
+
+def per(unit: str) -> str:
+    """Unit of what is per unit of something, such as a costate; empty if it has none."""
+    return f"per {unit}" if unit else ""
+
+
+def check_no_path(given: Any, call: str) -> None:
+    """Raise ValueError if the name of a file is given where a figure or axes belong; `call` is what is drawn into a file."""
+    if isinstance(given, str | PathLike):
+        raise ValueError(f"a picture is drawn into a figure, not into a file: to write one, {call}.figure.savefig({str(given)!r})")
 
 
 def axis_label(name: str, unit: str) -> str:

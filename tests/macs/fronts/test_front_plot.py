@@ -5,6 +5,8 @@ import subprocess
 import sys
 import warnings
 from itertools import pairwise
+from pathlib import Path
+from unittest.mock import ANY
 
 import matplotlib
 import numpy as np
@@ -165,6 +167,26 @@ def costated(length: float):
     """Arguments of `draw_flight`."""
     trajectory, costates = with_optional_phase(length)
     return trajectory, "", blank_figure(), costates
+
+
+def test_costates_are_drawn_only_if_asked_for():
+    trajectory, costates = with_optional_phase(2.0)
+    point = flights(1).replace(trajectories=[trajectory], costates=[costates])[0]
+    assert len(point.plot()) == 4
+    assert [ax.get_ylabel() for ax in point.plot(costates=True)][4:] == ["costate of h\n[per\N{NO-BREAK SPACE}km]", ANY, ANY]
+
+
+def test_a_path_instead_of_a_figure_is_refused_with_the_remedy(tmp_path):
+    front, box = flights(3), black_box()
+    for call, remedy in (
+        (lambda: front.plot("x.png"), "front.plot().figure.savefig('x.png')"),
+        (lambda: front[1].plot("x.png"), "front[1].plot()[0].figure.savefig('x.png')"),
+        (lambda: box.plot_variables(Path("x.png")), "front.plot_variables()[0].figure.savefig('x.png')"),
+        (lambda: box[2].plot("x.png"), "front[2].plot()[0].figure.savefig('x.png')"),
+    ):
+        with pytest.raises(ValueError, match="drawn into a figure, not into a file") as refused:
+            call()
+        assert str(refused.value).endswith(remedy)
 
 
 def test_controls_jump_where_their_polynomials_do():
