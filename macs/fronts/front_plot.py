@@ -11,7 +11,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from ..io.text import counted
+from ..io.text import counted, numbers
 from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
 from .pictures.style import (
     COLORS,
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .points import Points
+
+
+SAME = 1e-9
+"""Objectives that differ by less, of their size, are the same but for round-off."""
 
 
 def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
@@ -120,6 +124,10 @@ def _scatter(front: Points, ax: Any) -> None:
         ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
+    for axis, column in zip("xyz", axes, strict=False):
+        about = _about(column) if len(column) > 1 else None
+        if about:
+            getattr(ax, f"set_{axis}lim")(*about)
     if len(front.goals) == 2 and good.sum() > 1:
         _mark_extremes(front, ax)
 
@@ -129,7 +137,23 @@ def _shades(values: np.ndarray) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    return ScalarMappable(Normalize(values.min(), values.max()), "viridis")
+    return ScalarMappable(Normalize(*(_about(values) or (values.min(), values.max()))), "viridis")
+
+
+def _about(values: np.ndarray) -> tuple[float, float] | None:
+    """Ends of a range about values that are all the same but for round-off; None for others."""
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max(initial=0.0))
+    if not len(finite) or np.ptp(finite) > SAME * size:
+        return None
+    half = 0.1 * size or 1.0
+    return float(finite.min()) - half, float(finite.max()) + half
+
+
+def _value(front: Points, number: int, k: int) -> str:
+    """An objective of a point with its unit, as tables have it."""
+    text = numbers(front.objectives[:, k])[number].strip()
+    return f"{text} {front.goals[k].unit}".rstrip()
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:
@@ -138,7 +162,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {goal.unit}' if goal.unit else ''} (#{best})"
+        text = f"best {goal.name}: {_value(front, best, k)} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
@@ -154,7 +178,8 @@ def _parallel(front: Points, ax: Any) -> None:
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:
         best = worst = np.zeros(F.shape[1])
-    height = 1.0 - (F - best) / np.where(worst > best, worst - best, 1.0)
+    same = worst - best <= SAME * np.maximum(np.abs(worst), np.abs(best))
+    height = np.where(same & np.isfinite(F), 1.0, 1.0 - (F - best) / np.where(same, 1.0, worst - best))
     shade = matplotlib.colormaps["viridis"]
     for row in height[good]:
         ax.plot(row, color=shade(0.85 * row[0]), lw=1.0, alpha=0.85)

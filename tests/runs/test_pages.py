@@ -137,11 +137,11 @@ def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(t
     assert charge(polished.cell, stats) == pytest.approx(60 + more, rel=1e-2)
 
 
-def test_unions_hold_verified_points_only(place, tmp_path):
+def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
     shutil.copytree(place / "out", tmp_path / "out")
     store = Store.open(tmp_path / "out")
     [before] = comparisons(store, {})
-    # A point that is better than all, and that a simulation did not confirm, joins a run.
+    # A point that claims to be better than all, which a simulation does not find, joins a run.
     run = before.runs["plain"][0]
     best = np.min([front.F.min(axis=0) for front in before.every if len(front)], axis=0) - 1.0
     false = run.front[[0]].replace(F=best[None], verified=np.array([False]))
@@ -152,7 +152,8 @@ def test_unions_hold_verified_points_only(place, tmp_path):
     assert after.verified["plain"][0].claimed == before.verified["plain"][0].claimed + 1
     np.testing.assert_array_equal(after.union().front.F, before.union().front.F)
     # Confirmed, it would be the whole union.
-    joined.replace(verified=np.ones(len(joined), dtype=bool), simulated_F=joined.F).save(run.path)
+    nothing = np.zeros(len(joined))
+    joined.replace(verified=nothing == 0, defect=nothing, simulated_violation=nothing, simulated_F=joined.F).save(run.path)
     [confirmed] = comparisons(Store.open(tmp_path / "out"), {})
     np.testing.assert_array_equal(confirmed.union().front.F, best[None])
     # The same by a program of which nothing can be simulated.

@@ -21,8 +21,8 @@ LETTER = 0.6
 """Width of a letter, of its size: more than that of most words, so that lines end before the picture does."""
 
 
-POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU)\^?(-?\d)\b")
-"""A unit of length, time, angle or temperature with its power, as it is typed: m2, s^2."""
+POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU|(?<!g )(?<!t )(?<!l )k?N|kg|J|W|Pa|kPa|V|A)\^?(-?\d)\b")
+"""A unit with its power, as it is typed: m2, s^2, N2; but not what a mass or an amount is of, such as t N2."""
 
 
 RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -42,7 +42,8 @@ STYLE = {
     "grid.linewidth": 0.5,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 6),
+    "axes.formatter.limits": (-4, 7),
+    "axes.formatter.use_mathtext": True,
 }
 
 
@@ -100,9 +101,11 @@ def plain(text: str) -> str:
 
 
 def axis_number(value: float) -> str:
-    """A number beside an axis: four digits, five of large ones, without powers of ten from a ten-thousandth to a million."""
-    text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e6 else f"{value:.0f}"
-    return text.replace("-", "\N{MINUS SIGN}")
+    """A number beside an axis: four digits, all of large ones, without powers of ten from a ten-thousandth to ten millions."""
+    text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e7 else f"{value:.0f}"
+    digits, _, power = text.partition("e")
+    raised = f"\N{MULTIPLICATION SIGN}10{str(int(power)).translate(RAISED)}" if power else ""
+    return digits.replace("-", "\N{MINUS SIGN}") + raised
 
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:

@@ -291,14 +291,45 @@ def test_long_labels_stay_beside_their_panels():
 
 
 @pytest.mark.parametrize(
-    ("unit", "shown"), [("m2/s3", "m²/s³"), ("1/m2", "1/m²"), ("N^2 s", "N^2 s"), ("t CO2", "t CO2"), ("m s^-2", "m s⁻²"), ("%", "%")]
+    ("unit", "shown"),
+    [
+        ("m2/s3", "m²/s³"),
+        ("1/m2", "1/m²"),
+        ("N^2 s", "N² s"),
+        ("N2 m2 s", "N² m² s"),
+        ("t N2", "t N2"),
+        ("t CO2", "t CO2"),
+        ("m s^-2", "m s⁻²"),
+        ("%", "%"),
+    ],
 )
 def test_powers_of_units_are_raised(unit, shown):
     assert axis_label("x", unit).replace("\N{NO-BREAK SPACE}", " ") == f"x [{shown}]"
 
 
-def test_numbers_beside_axes_have_no_powers_of_ten():
-    assert [axis_number(value) for value in (17344.2, -0.5, 1234.5, 999999.0, 2e6)] == ["17344", "−0.5", "1234", "999999", "2e+06"]
+def test_numbers_beside_axes_have_no_powers_of_ten_below_ten_millions():
+    values = (17344.2, -0.5, 1234.5, 999999.0, 1.5e6, 2e7, -3e-5)
+    assert [axis_number(value) for value in values] == ["17344", "−0.5", "1234", "999999", "1500000", "2×10⁷", "−3×10⁻⁵"]
+
+
+def test_legend_and_table_have_the_same_numbers():
+    front = black_box(3, 2, F=np.array([[5.35104, 700.0], [67069.2, 300.0], [835267.4, 12.0142]]))
+    ax, table = front.plot(), front.table()
+    for value in ("5.3510", "835267"):
+        assert value in table.split()
+    assert [text.get_text().split(" (")[0] for text in ax.get_legend().get_texts()] == ["best f0: 5.3510 kg", "best f1: 12.014"]
+
+
+def test_round_off_of_a_constant_objective_is_no_picture():
+    """As colour, along an axis, and among parallel coordinates."""
+    noise = 2.9 + 1e-12 * np.arange(4)
+    three = black_box(4, 3, F=np.column_stack([np.arange(4.0), 4.0 - np.arange(4), noise]))
+    ax = three.plot()
+    assert ax.figure.axes[1].get_ylim() == pytest.approx((2.61, 3.19)) and len({tuple(c) for c in ax.collections[0].get_facecolors()}) == 1
+    ax = black_box(4, 2, F=np.column_stack([np.arange(4.0), noise])).plot()
+    assert ax.get_ylim() == pytest.approx((2.61, 3.19))
+    lines = black_box(4, 4, F=np.column_stack([np.arange(4.0), noise, np.arange(4.0), -np.arange(4.0)])).plot().lines
+    assert {line.get_ydata()[1] for line in lines if len(line.get_ydata()) == 4} == {1.0}
 
 
 def test_one_point_of_one_objective_has_whole_numbers_below():
