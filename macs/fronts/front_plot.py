@@ -22,6 +22,7 @@ from .pictures.style import (
     better,
     blank_figure,
     new_figure,
+    raised,
     rendered,
     title_and_legend,
     wrapped,
@@ -153,7 +154,7 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
 def _value(front: Points, number: int, k: int) -> str:
     """An objective of a point with its unit, as tables have it."""
     text = numbers(front.objectives[:, k])[number].strip()
-    return f"{text} {front.goals[k].unit}".rstrip()
+    return f"{text} {raised(front.goals[k].unit)}".rstrip()
 
 
 def _mark_extremes(front: Points, ax: Any) -> None:

@@ -92,7 +92,12 @@ def check_no_path(given: Any, call: str) -> None:
 
 def axis_label(name: str, unit: str) -> str:
     """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
-    return plain(label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}")))
+    return plain(label(name, raised(unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def raised(unit: str) -> str:
+    """A unit as print has it, with raised powers."""
+    return POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit)
 
 
 def plain(text: str) -> str:
