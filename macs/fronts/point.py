@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from os import PathLike
 from typing import Any
 
@@ -240,11 +241,12 @@ class Point:
         from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
         from .pictures.kinds import hollow, remark
-        from .pictures.style import check_no_path
+        from .pictures.style import check_no_path, raised
 
         check_no_path(figure, f"front[{self.index}].plot()[0]")
         said = remark(self)
-        title = f"{self.title}; {said}" if said else self.title
+        named = self._named(raised)
+        title = f"{named}; {said}" if said else named
         if not self._points.dynamic:
             return draw_designs(self._points, title, figure, [self.index])
         if self.trajectory is None:
@@ -264,8 +266,12 @@ class Point:
     @property
     def title(self) -> str:
         """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
+        return self._named(str)
+
+    def _named(self, unit: Callable[[str], str]) -> str:
+        """The objectives in one line, with units as this writes them."""
         named = zip(self.goals, self.objectives.values(), strict=True)
-        return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+        return ", ".join(f"{goal.name} {value:.6g} {unit(goal.unit)}".rstrip() for goal, value in named)
 
     def _repr_html_(self) -> str:
         """For notebooks: a table of the objectives and a small picture."""
