@@ -39,7 +39,7 @@ class Front(Points):
     `trajectories` and more, see `Points`. `stats` has the costs and the seed. If no feasible point was found, the front is empty: `message`
     says why, and `closest` is the least infeasible point.
 
-    - See: `table()`, `plot()`, `front[i].plot()`, `plot_variables()`
+    - See: `table()`, `plot()`, `plot_trajectories()`, `plot_variables()`, `front[i].plot()`
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
@@ -287,16 +287,46 @@ class Front(Points):
         """
         return front_table(self, columns)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, *, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
         """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates.
 
         `front.plot().figure.savefig("front.png")` writes the picture to a file.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Default: those of a new figure.
+        marked : numbers of points
+            Points to mark, in the colours of `plot_trajectories`. Default: of two objectives, the best of each.
+        beside : mapping, optional
+            Name -> two objectives (k, 2) of other points, such as a known front; drawn in black and grey.
         """
         from .fronts.front_plot import draw_front
         from .fronts.pictures.style import check_no_path
 
         check_no_path(ax, "front.plot()")
-        return draw_front(self, ax)
+        return draw_front(self, ax, marked, beside)
+
+    def plot_trajectories(self, points: Sequence[int], figure: Figure | None = None) -> np.ndarray:
+        """Axes with the states, controls and path constraints of a few points over time, a colour for each point.
+
+        Parameters
+        ----------
+        points : numbers of points
+            From one to seven.
+        figure : matplotlib Figure, optional
+            Empty figure to draw into. Default: a new one.
+
+        Raises
+        ------
+        ValueError
+            If there are none or too many, or one has no trajectory.
+        """
+        from .fronts.pictures.several_flights import draw_flights
+        from .fronts.pictures.style import check_no_path
+
+        check_no_path(figure, f"front.plot_trajectories({list(points)})[0]")
+        return draw_flights([self[i] for i in points], figure)
 
     def plot_variables(self, figure: Figure | None = None) -> np.ndarray:
         """Axes with each variable of a black box or vector problem along the front, over the first objective, within its bounds.

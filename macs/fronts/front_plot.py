@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,6 +37,10 @@ if TYPE_CHECKING:
     from .points import Points
 
 
+FEW = 100
+"""Other points up to this number are drawn as crosses."""
+
+
 SAME = 1e-9
 """Objectives that differ by less, of their size, are the same but for round-off."""
 
@@ -64,7 +70,7 @@ def _size(front: Points) -> tuple[float, float]:
     return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
 
 
-def draw_front(front: Points, ax: Axes | None = None) -> Axes:
+def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
     """Axes with the objectives of a front.
 
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
@@ -76,18 +82,37 @@ def draw_front(front: Points, ax: Axes | None = None) -> Axes:
     front : Points
     ax : Axes, optional
         Axes to draw into. Default: those of a new figure.
+    marked : numbers of points
+        Points to mark, a colour each, the same as in a picture of their trajectories. Default: of two objectives, the best of each.
+    beside : mapping, optional
+        Name -> two objectives (k, 2) of other points, in the user's units and senses.
     """
     import matplotlib
+
+    if len(marked) > len(COLORS):
+        raise ValueError(f"at most {len(COLORS)} points can be marked in a picture, not {len(marked)}")
+    if beside and len(front.goals) != 2:
+        raise ValueError(f"other points are drawn beside those of two objectives, not of {len(front.goals)}")
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         if ax is None:
             ax = new_figure(*_size(front)).add_subplot()
         if len(front.goals) > 3:
-            _parallel(front, ax)
+            _parallel(front, ax, marked)
         else:
-            _scatter(front, ax)
+            _draw_beside(ax, beside or {})
+            _scatter(front, ax, marked)
         title_and_legend(ax, _title(front))
     return ax
+
+
+def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
+    """Draw other points: dots so small that many make a line, which may have gaps, or crosses if there are few."""
+    for (name, values), color in zip(beside.items(), cycle(("black", GREY))):
+        many = len(values) > FEW
+        look: dict[str, Any] = {"marker": "o", "ms": 0.9, "mew": 0.0} if many else {"marker": "x", "ms": 5.0}
+        ax.plot(*np.asarray(values, dtype=float).T, ls="none", color=color, zorder=1, **look)
+        ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
 
 
 def _title(front: Points) -> str:
@@ -98,7 +123,7 @@ def _title(front: Points) -> str:
     return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
-def _scatter(front: Points, ax: Any) -> None:
+def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     if not len(front):
@@ -129,7 +154,9 @@ def _scatter(front: Points, ax: Any) -> None:
         about = _about(column) if len(column) > 1 else None
         if about:
             getattr(ax, f"set_{axis}lim")(*about)
-    if len(front.goals) == 2 and good.sum() > 1:
+    for i, edge in zip(marked, COLORS, strict=False):
+        ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
+    if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
         _mark_extremes(front, ax)
 
 
@@ -157,6 +184,12 @@ def _value(front: Points, number: int, k: int) -> str:
     return f"{text} {raised(front.goals[k].unit)}".rstrip()
 
 
+def _values(front: Points, number: int) -> str:
+    """The number of a point and its objectives, for a legend."""
+    values = [_value(front, number, k) for k in range(len(front.goals))]
+    return f"#{range(len(front))[number]}: {', '.join(values)}"
+
+
 def _mark_extremes(front: Points, ax: Any) -> None:
     """Mark the best point of each of two objectives; the legend has its value."""
     F = np.where(kinds(front)[0][:, None], front.F, np.inf)
@@ -168,7 +201,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
 
-def _parallel(front: Points, ax: Any) -> None:
+def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
     """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
     feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
     import matplotlib
@@ -187,6 +220,9 @@ def _parallel(front: Points, ax: Any) -> None:
     for rows, name, look in ((apart, NOT_VERIFIED, "--"), (infeasible, NOT_FEASIBLE, ":")):
         for k, row in enumerate(height[rows]):
             ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
+    for i, color in zip(marked, COLORS, strict=False):
+        dashes = "--" if apart[i] else ":" if infeasible[i] else "-"
+        ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_values(front, i))
     signs = np.array([goal.sign for goal in front.goals])
     for k in range(values.shape[1]):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)

@@ -324,5 +324,6 @@ COMMANDS = {
     "decide": decide_command.decide,
     "study": study_commands.study,
     "report": browser_commands.report,
+    "serve": browser_commands.serve,
     "bench": bench,
 }

@@ -31,6 +31,7 @@ examples:
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
   macs report front.nc --html front.html
+  macs serve out/goddard-table3
   macs bench inner --quick
 
 exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
@@ -177,6 +178,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_decide(commands)
     _add_study(commands)
     _add_report(commands)
+    _add_serve(commands)
     _add_bench(commands)
     return parser
 
@@ -296,6 +298,14 @@ def _add_report(commands: argparse._SubParsersAction[Parser]) -> None:
     report.add_argument("--trust", action="store_true", help=TRUST)
 
 
+def _add_serve(commands: argparse._SubParsersAction[Parser]) -> None:
+    serve = _add(commands, "serve", "the same page, live while a study runs, from a server on this machine that only reads")
+    serve.add_argument("source", metavar="DIR", help="a study's folder or name, a front, or a folder of fronts")
+    serve.add_argument("--host", metavar="ADDRESS", default="127.0.0.1", help="0.0.0.0: all can read it (default: only this machine)")
+    serve.add_argument("--port", metavar="N", type=_port, default=8642, help="0: any that is free (default: 8642)")
+    serve.add_argument("--trust", action="store_true", help=TRUST)
+
+
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -334,6 +344,7 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
 _natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
 _seconds = partial(_number, float, "a number of seconds above 0", lambda value: 0 < value < float("inf"))
+_port = partial(_number, int, "a port, from 0 to 65535", lambda value: 0 <= value <= 65535)
 _tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))
 
 

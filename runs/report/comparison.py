@@ -158,6 +158,21 @@ class Comparison:
         return look_up(given, self.problem, address, data, self.known.goals) or self.union()
 
 
+def compared(store: Store) -> dict[tuple[str, str], dict[str, list[StoredRun]]]:
+    """All runs of a study by what they are compared on, the labels of a problem and a transcription, and by solver."""
+    cells: dict[tuple[str, str], dict[str, list[StoredRun]]] = {}
+    apart: dict[str, dict[str, list[StoredRun]]] = {}
+    for run in store.runs():
+        problem, transcription, solver = run.cell.labels
+        here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
+        here.setdefault(solver, []).append(run)
+    for problem, solvers in apart.items():
+        # Solvers on terms of their own are compared with the others wherever these are; if there are none, among themselves.
+        for place in [place for place in cells if place[0] == problem] or [(problem, EACH)]:
+            cells[place] = cells.get(place, {}) | solvers
+    return cells
+
+
 def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Comparison]:
     """The comparisons of a study that have a front.
 
@@ -172,18 +187,8 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
     ValueError
         A run's points cannot be verified, see `Verified.of`.
     """
-    cells: dict[tuple[str, str], dict[str, list[StoredRun]]] = {}
-    apart: dict[str, dict[str, list[StoredRun]]] = {}
-    for run in store.runs():
-        problem, transcription, solver = run.cell.labels
-        here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
-        here.setdefault(solver, []).append(run)
-    for problem, solvers in apart.items():
-        # Solvers on terms of their own are compared with the others wherever these are; if there are none, among themselves.
-        for place in [place for place in cells if place[0] == problem] or [(problem, EACH)]:
-            cells[place] = cells.get(place, {}) | solvers
     found = []
-    for (problem, transcription), solvers in cells.items():
+    for (problem, transcription), solvers in compared(store).items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}
         verified = {solver: [Verified.of(run, store.definition.get("verify")) for run in runs] for solver, runs in finished.items()}
         fronts: dict[str, Sequence[Front]] = {solver: [one.front for one in ones] for solver, ones in verified.items()}

@@ -5,11 +5,10 @@ Skipped where there is no Chromium with its driver (Debian: chromium, chromium-d
 
 from __future__ import annotations
 
-import shutil
-import time
 from pathlib import Path
 
 import pytest
+from chromium import NEEDS_CHROMIUM, errors, wait
 from synthetic_fronts import black_box, flights, marked
 
 from runs.browser import page as pages
@@ -18,30 +17,7 @@ from runs.browser.points import about, columns, details, goals_data, samples_of
 
 pytest.importorskip("plotly")
 webdriver = pytest.importorskip("selenium.webdriver")
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
-pytestmark = [
-    pytest.mark.skipif(
-        not (BROWSER and DRIVER), reason="there is no Chromium with its driver on this machine: apt-get install chromium-driver"
-    ),
-    pytest.mark.xdist_group("chromium"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = BROWSER
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1300,1000", "--use-angle=swiftshader"):
-        options.add_argument(word)
-    options.add_argument("--enable-unsafe-swiftshader")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.set_script_timeout(30)
-    yield driver
-    driver.quit()
+pytestmark = NEEDS_CHROMIUM
 
 
 def opened(browser, tmp_path: Path, content: bytes) -> None:
@@ -49,20 +25,6 @@ def opened(browser, tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     browser.get(path.as_uri())
     wait(browser, "document.documentElement.dataset.ready === 'yes'")
-
-
-def wait(browser, condition: str) -> None:
-    """Until a condition in the page holds."""
-    for _ in range(300):
-        if browser.execute_script(f"return Boolean({condition})"):
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"not within 15 s: {condition}")
-
-
-def errors(browser) -> list[str]:
-    """What the console has, but for remarks of the driver on software rendering."""
-    return [one["message"] for one in browser.get_log("browser") if one["level"] == "SEVERE" or "Violation" in one["message"]]
 
 
 def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):

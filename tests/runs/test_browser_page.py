@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from misbehaving import Crashing, Plain, glide
 from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
+from test_study import Inline
 
 from macs import optimize
 from problems import load
@@ -192,7 +193,7 @@ def test_many_points_have_fewer_samples():
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("browser") / "out"
     solvers = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
-    Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out)
+    Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out, executor=Inline())
     return out
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import Plain
+from test_study import Inline
 
 from macs import MACS, NSGA2
 from macs.front import Front
@@ -43,7 +44,7 @@ def place(tmp_path_factory) -> Path:
     """A study file, and its finished runs in `out`."""
     base = tmp_path_factory.mktemp("pages")
     (base / "small.toml").write_text(TOML)
-    assert Study.load(base / "small.toml").run(base / "out").finished == 6
+    assert Study.load(base / "small.toml").run(base / "out", executor=Inline()).finished == 6
     return base
 
 
@@ -123,7 +124,7 @@ def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(t
         runs=1,
         seed=1,
     )
-    study.run(tmp_path / "out")
+    study.run(tmp_path / "out", executor=Inline())
     [comparison] = comparisons(Store.open(tmp_path / "out"), {})
     charge = Charge.of(comparison)
     assert charge is not None

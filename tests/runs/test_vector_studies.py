@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_study import Inline
 from vector_problems import parabolas
 
 from macs import MACS, Front
@@ -58,7 +59,7 @@ def test_a_study_runs_resumes_and_reports_vector_problems_beside_others(tmp_path
     study = Study.load(tmp_path / "many.toml", trust=True)
     assert [cell.transcription for cell in study.cells] == ["no transcription"] * 4 + ["dfet:2x2"] * 2
     assert study.cells[0].details["transcription"] is None and study.cells[0].details["problem"]["data"] == {"far": 3.0}
-    summary = study.run(tmp_path / "out", jobs=1)
+    summary = study.run(tmp_path / "out", executor=Inline())
     assert all(run.finished for run in summary.runs), summary
     files = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.nc")}
     again = study.run(tmp_path / "out")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,24 @@ NODES = 60
 
 PANEL = (3.6, 1.75)
 """Inches: width and height of a panel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A trajectory in a panel.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    color : str
+        Of all its phases, the ends of which are dots then. Default: a colour for each phase, and dots at nodes.
+    hollow : bool
+        Whether the dots at nodes are hollow, and drawn in any case: of a trajectory that is not verified.
+    """
+
+    trajectory: Trajectory
+    color: str = ""
+    hollow: bool = False
 
 
 def draw_flight(
@@ -79,7 +98,7 @@ def draw_flight(
             figure.set_size_inches(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for ax, (name, kind) in zip(grid, panels, strict=False):
-            _draw_panel(ax, trajectory, name, kind, hollow)
+            draw_panel(ax, [Drawn(trajectory, hollow=hollow)], name, kind)
         used = list(range(len(panels)))
         if costates is not None:
             used += range(above * columns, above * columns + len(states) + 1)
@@ -194,29 +213,46 @@ def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
     return phase.time, phase[name]
 
 
-def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str, hollow: bool) -> None:
-    drawn: list[np.ndarray] = []
-    limits: list[tuple[PhaseTrajectory, Variable | Limit]] = []
-    for k, phase in enumerate(trajectory.phases):
-        owners: dict[str, Sequence[Variable | Limit]] = {
-            "state": phase.state_variables,
-            "control": phase.control_variables,
-            "path": phase.path_limits,
-        }
-        index = next((i for i, owner in enumerate(owners[kind]) if owner.name == name), None)
-        if index is None:
-            continue
-        color = COLORS[k % len(COLORS)]
-        values, (times, line) = phase[name], along(phase, name)
-        ax.plot(times, line, color=color, lw=0.9 if kind == "path" else 1.3)
-        drawn.append(line[np.isfinite(line)])
-        _dots(ax, phase.time, values, color, hollow)
-        drawn.append(values)
-        limits.append((phase, owners[kind][index]))
-    draw_limits(ax, np.concatenate(drawn), [((phase.t0, phase.tf), limit.lower, limit.upper) for phase, limit in limits])
-    ax.set_ylabel(_beside(name, getattr(limits[0][1], "unit", "")))
-    ranges = dict.fromkeys(_range(limit) for _, limit in limits)
-    ax.set_title("; ".join(ranges), loc="right", fontsize=7, color=GREY, pad=2)
+def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
+    """Draw a quantity of `quantities` of one trajectory or several over time, with its limits, label, and bounds as text.
+
+    Parameters
+    ----------
+    ax : Axes
+    drawn : sequence of Drawn
+    name, kind : str
+    """
+    values: list[np.ndarray] = []
+    held: dict[tuple[float, float], list[PhaseTrajectory]] = {}
+    owners: list[Variable | Limit] = []
+    for one in drawn:
+        for k, phase in enumerate(one.trajectory.phases):
+            lists: dict[str, Sequence[Variable | Limit]] = {
+                "state": phase.state_variables,
+                "control": phase.control_variables,
+                "path": phase.path_limits,
+            }
+            owner = next((owner for owner in lists[kind] if owner.name == name), None)
+            if owner is None:
+                continue
+            color = one.color or COLORS[k % len(COLORS)]
+            nodes, (times, line) = phase[name], along(phase, name)
+            ax.plot(times, line, color=color, lw=0.9 if kind == "path" and not one.color else 1.3)
+            values += [line[np.isfinite(line)], nodes]
+            if not one.color:
+                _dots(ax, phase.time, nodes, color, one.hollow)
+            elif one.hollow:
+                _dots(ax, phase.time, nodes, color, hollow=True)
+            if one.color and phase is not one.trajectory.phases[-1]:
+                ax.plot(phase.time[-1:], nodes[-1:], "o", color=color, ms=4.0)
+            held.setdefault((owner.lower, owner.upper), []).append(phase)
+            owners.append(owner)
+    limits = [
+        ((min(phase.t0 for phase in phases), max(phase.tf for phase in phases)), lower, upper) for (lower, upper), phases in held.items()
+    ]
+    draw_limits(ax, np.concatenate(values), limits)
+    ax.set_ylabel(_beside(name, getattr(owners[0], "unit", "")))
+    ax.set_title("; ".join(dict.fromkeys(_range(owner) for owner in owners)), loc="right", fontsize=7, color=GREY, pad=2)
 
 
 def _dense(

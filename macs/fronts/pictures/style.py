@@ -91,12 +91,12 @@ def check_no_path(given: Any, call: str) -> None:
 
 
 def axis_label(name: str, unit: str) -> str:
-    """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
+    """Label of an axis: `name [unit]`, with powers as print has them. Lines do not end within the unit."""
     return plain(label(name, raised(unit).replace(" ", "\N{NO-BREAK SPACE}")))
 
 
 def raised(unit: str) -> str:
-    """A unit as print has it, with raised powers."""
+    """A unit with powers as print has them: m², not m2."""
     return POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit)
 
 
@@ -109,8 +109,8 @@ def axis_number(value: float) -> str:
     """A number beside an axis: four digits, all of large ones, without powers of ten from a ten-thousandth to ten millions."""
     text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e7 else f"{value:.0f}"
     digits, _, power = text.partition("e")
-    raised = f"\N{MULTIPLICATION SIGN}10{str(int(power)).translate(RAISED)}" if power else ""
-    return digits.replace("-", "\N{MINUS SIGN}") + raised
+    rest = f"\N{MULTIPLICATION SIGN}10{str(int(power)).translate(RAISED)}" if power else ""
+    return digits.replace("-", "\N{MINUS SIGN}") + rest
 
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:

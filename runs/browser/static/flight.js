@@ -16,7 +16,7 @@ async function showFlights() {
   const mine = (drawing += 1);
   const keys = [...new Set([...state.kept, ...(state.selected ? [state.selected] : [])])];
   const points = keys.map((key) => state.byKey.get(key)).filter(Boolean);
-  byId("flights").hidden = state.points.length > 0 && state.comparison.runs.every((run) => !run.about.dynamic);
+  hideFlights();
   if (!points.length) {
     clearPanels();
     fill(byId("flights-note"), "Select a point to see its states, controls, path constraints and costates.");
@@ -38,6 +38,11 @@ async function showFlights() {
   }
   fill(byId("flights-note"), ...flightsNote(flights));
   drawPanels(flights);
+}
+
+/** Where no point has a trajectory, there is no place for them either. */
+function hideFlights() {
+  byId("flights").hidden = state.points.length > 0 && state.comparison.runs.every((run) => !run.about.dynamic);
 }
 
 function clearPanels() {

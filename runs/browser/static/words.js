@@ -40,7 +40,8 @@ function column(values) {
 }
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);
-const counted = (count, what) => `${count.toLocaleString("en").replace(/,/g, "\u202f")} ${what}${count === 1 ? "" : "s"}`;
+const grouped = (count) => count.toLocaleString("en").replace(/,/g, "\u202f");
+const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 
 /** The limits of a quantity in words. */
 function limitsText(lower, upper) {
@@ -76,6 +77,18 @@ const byId = (id) => document.getElementById(id);
 /** Replace what is in an element. */
 function fill(place, ...children) {
   place.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined));
+}
+
+/** Build a part of the page anew; what has the focus in it keeps it. */
+function rebuilt(place, build) {
+  const active = document.activeElement;
+  if (!place.contains(active)) return build();
+  const all = () => [...place.querySelectorAll("button, input, select, summary, [tabindex]")];
+  const row = active.closest("tr[data-key]")?.dataset.key, position = all().indexOf(active);
+  build();
+  if (place.contains(document.activeElement)) return;
+  if (row) focusRow([...place.querySelectorAll("tr[data-key]")].find((one) => one.dataset.key === row) ?? null);
+  else all()[position]?.focus({ preventScroll: true });
 }
 
 /** A label with a select element; `options` are pairs of value and text. */
