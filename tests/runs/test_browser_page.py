@@ -211,6 +211,16 @@ def test_the_page_of_a_study_has_its_runs_measures_tables_and_failures(folder):
     assert "the root of all evil" in progress["failures"][0]["reason"] and "Traceback" in progress["failures"][0]["traceback"]
     assert set(comparison["attainment"]) <= {"one", "other", "broken"} and comparison["convergence"]
     assert any("points claimed" in one["caption"] for one in comparison["tables"])
+    assert reader.data["tables"] == []
+
+
+def test_the_page_of_a_study_has_published_tables_and_its_note(folder):
+    store = Store.open(folder, trust=True)
+    (problem,) = {run.cell.problem for run in store.runs()}
+    paper = {"of": "indicators", "source": "A. Author, Table I", "rows": [{"problem": problem, "by": "the paper", "gd_mean": 0.5}]}
+    stated = Store(store.path, {**store.definition, "paper": [paper], "note": "Two of each."}, trust=True)
+    data = Reader(study_page(stated)).data
+    assert data["note"] == "Two of each." and any("A. Author" in one["caption"] for one in data["tables"])
 
 
 def test_the_command_writes_pages_and_refuses_what_is_wrong(folder, tmp_path, capsys):
