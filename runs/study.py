@@ -87,8 +87,8 @@ class Study:
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float or None, default 1e-3
         How much a point may miss when it is simulated, in scales, and still be verified, as for `solve`; see `Front.verify`. Reports count
-        only verified points, with their objectives as simulated. None, in a file `false`: points are not simulated, and count as the
-        solver returns them.
+        only points whose states and constraints pass, with their objectives as simulated. None, in a file `false`: points are not
+        simulated, and count as the solver returns them.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str

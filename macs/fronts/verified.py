@@ -168,6 +168,14 @@ def _evaluated(points: Kind, tolerance: float) -> Kind:
     )
 
 
+def feasible_when_simulated(points: Points, tolerance: float) -> np.ndarray:
+    """Mask (n,) of the points that are verified but for what they say of their objectives, whose simulated values take their place."""
+    if not points.dynamic:
+        tolerance = max(tolerance, points.stats["tolerance"])
+    numbers = np.isfinite(points.simulated_F).all(axis=1)
+    return (points.status == CONVERGED) & numbers & (points.defect <= tolerance) & (points.simulated_violation <= tolerance)
+
+
 def with_nearest(points: Kind) -> Kind:
     """Points of a vector problem; if there are none, with the constraint in the message that the least infeasible one violates most."""
     nearest = points.closest

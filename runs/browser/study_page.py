@@ -18,7 +18,7 @@ from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
 from ..report.choices import only_choices
 from ..report.comparison import Comparison, comparisons
-from ..report.report import tables_of
+from ..report.report import tables_across, tables_of
 from ..report.run_measures import AXES, histories
 from ..report.tables import Table
 from .page import packed, page
@@ -47,8 +47,8 @@ def study_page(store: Store, progress: bool = False) -> bytes:
                 blocks[name] = packed(details(run.front, samples))
         runs = [run_data(run, run.front, names[id_of(run)]) for run in finished_runs(comparison)]
         shown.append(comparison_data(comparison, runs) | measures_data(comparison) | tables_data(comparison, store.definition))
-    data = {"title": summary.name, "kind": "study", "progress": progress_data(summary), "comparisons": shown}
-    return page(data, blocks)
+    head = {"title": summary.name, "kind": "study", "note": store.definition.get("note", "")}
+    return page(head | {"progress": progress_data(summary), "comparisons": shown, **across_data(found, store.definition)}, blocks)
 
 
 def _steps(found: Sequence[Comparison]) -> Iterator[Comparison]:
@@ -152,6 +152,11 @@ def _finite(values: Any) -> list[float | None]:
 def tables_data(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Any]:
     """The tables of a comparison, as the report in the terminal has them."""
     return {"tables": [table_data(one) for one in tables_of(comparison, study).values()]}
+
+
+def across_data(found: Sequence[Comparison], study: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of several comparisons together, published ones among them."""
+    return {"tables": [table_data(one) for one in tables_across(found, study).values()]}
 
 
 def table_data(one: Table) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from ...report.comparison import comparisons
-from ..study_page import measures_data, tables_data
+from ..study_page import across_data, measures_data, tables_data
 from .cached_store import CachedStore
 from .source import Repeater, Resource
 
@@ -21,11 +21,12 @@ class Measuring:
     Attributes
     ----------
     resource : Resource
-        Plain data: {"comparisons": {name: as `study_page` has it}, "finished": of how many runs it is, "trouble": why there is none}.
+        Plain data: {"comparisons": {name: as `study_page` has it}, "tables": of several comparisons together, "finished": of how many
+        runs it is, "trouble": why there is none}.
     """
 
     def __init__(self) -> None:
-        self.resource = Resource.of({"comparisons": {}, "finished": 0, "trouble": ""})
+        self.resource = Resource.of({"comparisons": {}, "tables": [], "finished": 0, "trouble": ""})
         self._store: CachedStore | None = None
         self._key: Any = None
         self._measured: Any = None
@@ -45,10 +46,11 @@ class Measuring:
         began = time.monotonic()
         summary = store.summary()
         try:
-            found = {} if not summary.finished else {f"{one.problem}, {one.transcription}": one for one in comparisons(store, {})}
-            data = {name: measures_data(one) | tables_data(one, store.definition) for name, one in found.items()}
-            self.resource = Resource.of({"comparisons": data, "finished": summary.finished, "trouble": ""})
+            found = comparisons(store, {}) if summary.finished else []
+            data = {f"{one.problem}, {one.transcription}": measures_data(one) | tables_data(one, store.definition) for one in found}
+            across = across_data(found, store.definition)
+            self.resource = Resource.of({"comparisons": data, **across, "finished": summary.finished, "trouble": ""})
         except (ValueError, OSError) as error:
-            self.resource = Resource.of({"comparisons": {}, "finished": 0, "trouble": " ".join(str(error).split())})
+            self.resource = Resource.of({"comparisons": {}, "tables": [], "finished": 0, "trouble": " ".join(str(error).split())})
         self._measured, self._ended = key, time.monotonic()
         self._took = self._ended - began

@@ -24,11 +24,13 @@ const axis = (title, more = {}) => ({
   ticks: "outside",
   ticklen: 4,
   exponentformat: "power",
+  minexponent: 7,
   ...more,
 });
 
 const layout = (more = {}) => ({
   font: FONT,
+  separators: ".", // of decimals; none of thousands
   paper_bgcolor: "#fff",
   plot_bgcolor: "#fff",
   margin: { l: 60, r: 34, t: 30, b: 50 },

@@ -77,6 +77,7 @@ const colorbar = (i) => ({
   thickness: 12,
   outlinewidth: 0,
   exponentformat: "power",
+  minexponent: 7,
 });
 
 /** Least and greatest value. */
@@ -131,7 +132,7 @@ function drawThree(place) {
   const { goals } = state.comparison;
   const { x, y, z } = view;
   const traces = [...goingTraces({ x, y, z }, "scatter3d", true), ...pointTraces({ x, y, z }, "scatter3d", true)];
-  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", gridcolor: "#ccc", color: INK });
+  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", minexponent: 7, gridcolor: "#ccc", color: INK });
   const scene = { xaxis: space(x), yaxis: space(y), zaxis: space(z), uirevision: `${x} ${y} ${z}`, camera: { eye: { x: 1.8, y: 1.8, z: 0.9 } } };
   const figure = layout({ height: 520, scene, modebar: { orientation: "h" }, margin: { l: 0, r: 0, t: 60, b: 0 }, showlegend: legendWanted(traces) });
   draw(place, traces, figure);

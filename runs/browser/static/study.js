@@ -11,6 +11,10 @@ function showStudy() {
   if (figures !== figuresShown) buildFigures();
   figuresShown = figures;
   fill(byId("study-tables"), (tables ?? []).map(tableElement));
+  if (state.data.note) fill(byId("study-note"), state.data.note);
+  const across = state.data.tables ?? state.measures?.tables ?? [];
+  byId("across").hidden = !across.length;
+  fill(byId("across-tables"), across.map(tableElement));
   redrawStudy();
 }
 

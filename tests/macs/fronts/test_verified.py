@@ -136,7 +136,7 @@ def test_an_error_that_grows_by_itself_is_called_unstable():
     u = phase.control("u", bounds=(-100, 100))
     phase.dynamics(x=40.0 * x + u)
     problem.minimize("miss", phase.integral((x - 1.0) ** 2 + 1e-4 * u**2))
-    fine, coarse = (optimize(problem, mesh) for mesh in (DFET(20, 5), DFET(3, 1)))
+    fine, coarse = (optimize(problem, mesh, starts=1) for mesh in (DFET(20, 5), DFET(3, 1)))
     assert fine.status == coarse.status == "converged" and fine.verified is coarse.verified is False
     assert "the dynamics are unstable, and no simulation without feedback can follow them" in fine.note
     assert "its states differ by" in coarse.note and "unstable" not in coarse.note
@@ -178,7 +178,7 @@ def test_none_means_that_nothing_is_simulated():
     front = MACS(agents=4, archive=4).solve(cart(), MESH, evaluations=40, seed=1, verify=None)
     assert len(front) and not front.was_simulated.any() and not front.verified.any() and "verify" not in front.stats
     assert "defect" not in front.table() and "between nodes" in front.table()
-    assert optimize(cart(), MESH, verify=None).verified is None
+    assert optimize(cart(), MESH, verify=None, starts=1).verified is None
     once = NSGA2(population=4).solve(cart(), SingleShooting(4), evaluations=8, seed=1)
     assert once.was_simulated.all() and once.verify(None).stats["verify"] == VERIFY
 
@@ -189,7 +189,7 @@ def test_a_tolerance_is_a_positive_number(wrong):
     for call in (
         front.verify,
         lambda verify: MACS().solve(cart(), MESH, evaluations=10**9, verify=verify),
-        lambda verify: optimize(cart(), MESH, verify=verify),
+        lambda verify: optimize(cart(), MESH, verify=verify, starts=1),
     ):
         with pytest.raises(ValueError, match="verify must be a positive number"):
             call(wrong)
