@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,6 +52,16 @@ def numbers(values: Any) -> list[str]:
     own = [max(digits, 4 - _decade(abs(value))) if more else digits for value, more in zip(values, small.tolist(), strict=True)]
     width = max(own, default=0)
     return [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]
+
+
+def csv_table(heads: Sequence[tuple[str, str]], rows: Iterable[Sequence[Any]]) -> str:
+    """Comma-separated values under a header of names with units; numbers in full, empty cells for None and NaN."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in heads])
+    for row in rows:
+        writer.writerow(["" if value is None or (isinstance(value, float) and np.isnan(value)) else value for value in row])
+    return text.getvalue()
 
 
 def counted(number: int, what: str) -> str:

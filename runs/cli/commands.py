@@ -125,7 +125,10 @@ def show(arguments: Namespace) -> int:
     if arguments.plot:
         draw(front if point is None else point, arguments.plot, costates=arguments.costates)
     if arguments.csv:
-        (front if point is None else point).to_csv(arguments.csv)
+        if point is None or point.trajectory is None:
+            (front if point is None else front[[point.index]]).to_csv(arguments.csv)
+        else:
+            point.to_csv(arguments.csv)
         print(f"values in {arguments.csv}")
     return DONE
 
