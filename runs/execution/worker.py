@@ -16,7 +16,7 @@ import threading
 from typing import Any
 
 # Imported before the first run begins, so that the time of a run does not include it.
-import h5netcdf  # noqa: F401
+import h5py  # noqa: F401
 
 import macs.fronts.files  # noqa: F401
 

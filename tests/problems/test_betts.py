@@ -12,7 +12,7 @@ from transcription import DFET, MultipleShooting
 
 @pytest.mark.slow
 def test_the_optimum_is_near_on_a_coarse_mesh():
-    point = optimize(load("betts"), DFET(12, 3), starts=1)
+    point = optimize(load("betts"), DFET(12, 3))
     assert point.status == "converged"
     assert point.objectives["cross-range"] == pytest.approx(betts.CROSS_RANGE, abs=5e-3)
     assert point.trajectory["entry"].tf == pytest.approx(betts.FINAL_TIME, abs=1.0)

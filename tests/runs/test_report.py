@@ -58,7 +58,9 @@ def told(folder) -> str:
     return str(study().report(folder))
 
 
-@pytest.mark.parametrize("solvers", [{"ends": Payoff(starts=1)}, {"front": Sweep(points=3, starts=1)}])
+@pytest.mark.parametrize(
+    "solvers", [{"ends": Payoff(starts=1)}, pytest.param({"front": Sweep(points=3, starts=1)}, marks=pytest.mark.slow)]
+)
 def test_gradient_tools_alone_need_no_ends_and_no_figures_over_evaluations(solvers, tmp_path, monkeypatch):
     def unasked(*_):
         raise AssertionError("ends that are known, or not needed, were sought")

@@ -45,6 +45,7 @@ def mine(tmp_path, monkeypatch) -> str:
 # Studies
 
 
+@pytest.mark.slow
 def test_a_study_runs_resumes_and_reports_vector_problems_beside_others(tmp_path, mine):
     (tmp_path / "many.toml").write_text(
         f"""

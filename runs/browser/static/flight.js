@@ -86,6 +86,7 @@ function groups(flights) {
 function drawPanels(flights) {
   const place = byId("flights-plot");
   clearPanels();
+  if (!canDraw()) return;
   for (const [title, quantities] of groups(flights)) {
     const grid = element("div", { class: "panels" });
     place.append(element("h3", {}, title), grid);
@@ -93,7 +94,7 @@ function drawPanels(flights) {
       const figure = panelFigure(flights, quantity);
       const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
       grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
-      draw(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
+      drawWhenSeen(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
     }
   }
   byId("flights").dataset.drawn = flights.map(({ point }) => point.key).join(" "); // for tests and style sheets

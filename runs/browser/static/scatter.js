@@ -13,10 +13,10 @@ function pointTraces(axes, type, marker3d) {
   const many = shown.length > MANY;
   const size = many ? 5 : SIZE;
   const traces = [];
+  const template = hoverTemplate();
   const trace = (points, name, marker, more = {}) => {
-    const made = { type, mode: "markers", name, marker, hovertemplate: "%{text}<extra></extra>", ...more };
-    made.text = points.map(hoverText);
-    made.customdata = points.map((point) => point.key);
+    const made = { type, mode: "markers", name, marker, hovertemplate: template, ...more };
+    made.customdata = points.map(hoverData);
     for (const [letter, i] of Object.entries(axes)) made[letter] = points.map((point) => point.values[i]);
     return made;
   };
@@ -112,7 +112,7 @@ function referenceTraces(x, y) {
 function drawTwo(place) {
   const { goals } = state.comparison;
   const { x, y } = view;
-  const type = HAS_GL && shownPoints().length > MANY ? "scattergl" : "scatter";
+  const type = shownPoints().length > MANY && hasGl() ? "scattergl" : "scatter";
   const traces = [...referenceTraces(x, y), ...goingTraces({ x, y }, "scatter", false), ...pointTraces({ x, y }, type, false)];
   const figure = layout({
     height: 440,
@@ -144,7 +144,7 @@ const legendWanted = (traces) => traces.filter((trace) => trace.showlegend !== f
 /** What a click or a rectangle in the figure does. The figure forgets this where its kind changes. */
 function listenToScatter(place) {
   place.on("plotly_click", (event) => {
-    const key = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
+    const key = event.points.map((point) => point.customdata?.[0]).find(Boolean);
     if (key) select(key);
   });
   place.on("plotly_selected", (event) => {

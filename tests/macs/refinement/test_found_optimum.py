@@ -34,6 +34,7 @@ def back_to_the_side() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_other_starts_find_a_better_optimum():
     """From the first start of this seed alone the car goes round the wrong way."""
     record = published("dubins")[0]

@@ -120,7 +120,7 @@ def test_objectives_without_derivatives_are_solved_by_projection():
     phase.dynamics(x=v, v=u - 0.3 * v * ca.fabs(v) ** 2)
     problem.maximize("peak", phase.peak(x))
     problem.minimize("effort", phase.integral(u**2))
-    front = MACS(archive=3).solve(problem, DFET(2, 3), evaluations=60, seed=1)
+    front = MACS(archive=4).solve(problem, DFET(2, 3), evaluations=60, seed=1)
     fine = front.refine_mesh(tolerance=1e-6, limit=6)
     assert len(fine) == len(front) and fine.stats["gradient_solves"] == 0
     assert fine.status.tolist() == ["converged"] * len(front) and all(point.optimality is None for point in fine)

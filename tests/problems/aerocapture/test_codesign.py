@@ -185,7 +185,7 @@ NAMES = ("nose radius", "rear radius", "front angle", "rear angle", "angle of at
 @pytest.mark.parametrize("objective", ["inverse packing efficiency", "TPS mass fraction"])
 def test_single_optima_flown_again(objective):
     problem = load("aerocapture_codesign", shape=2)
-    point = optimize(problem, stated(problem.default_transcription), objective=objective, starts=1)
+    point = optimize(problem, stated(problem.default_transcription), objective=objective)
     assert point.status == "converged" and point.verified
     confirm(point)
     start = judged(np.array([TABLE_2[2].design]))
@@ -195,7 +195,7 @@ def test_single_optima_flown_again(objective):
 @pytest.mark.slow
 def test_slender_shapes_are_mirror_images():
     problem = load("aerocapture_codesign", shape=1)
-    point = optimize(problem, stated(problem.default_transcription), objective="inverse packing efficiency", starts=1)
+    point = optimize(problem, stated(problem.default_transcription), objective="inverse packing efficiency")
     assert point.verified and point.parameters["angle of attack"] > 0.0
     assert point.objectives["inverse packing efficiency"] < TABLE_2[1].packing
     confirm(point)
@@ -231,7 +231,7 @@ def test_the_steepest_exit_for_a_limit_of_the_burn():
 @pytest.mark.slow
 def test_the_corridor_is_a_fourth_objective():
     problem = load("aerocapture_codesign", shape=2, corridor=True)
-    point = optimize(problem, stated(problem.default_transcription), objective="entry corridor", starts=1)
+    point = optimize(problem, stated(problem.default_transcription), objective="entry corridor")
     assert point.verified
     found = judged(np.array([[point.parameters[name] for name in NAMES]]))
     ballistic, ratio = float(found.ballistic[0]), float(found.lift_to_drag[0])
