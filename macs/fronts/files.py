@@ -1,4 +1,4 @@
-"""A front as one netCDF-4 file, whole or not at all; and as a table of comma-separated values.
+"""A front as one netCDF-4 file, whole or not at all.
 
 Root group: `dataset.root_dataset`. One group for each phase: `dataset.phase_dataset`. Group `_closest`, if there is one: the least
 infeasible point of an empty front, laid out like a root. At the end, a checksum (`io.atomic`), without which nothing of the file is read.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 from typing import Any
@@ -23,7 +23,6 @@ from ..io import netcdf
 from ..io.atomic import check_target, read_whole, sealed, unsealed, write_whole
 from ..io.labelled import checked, document, read_attribute, read_document, variable_columns
 from ..io.netcdf import Group, Labelled, words
-from ..io.text import csv_table
 from .dataset import (
     CLOSEST,
     FORMAT,
@@ -81,53 +80,6 @@ def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) ->
         for points in [front] if front._closest is None else [front, front._closest._points]:
             points.source, points._problem = source, known
     return front
-
-
-def save_csv(front: Points, path: str | PathLike[str]) -> None:
-    """Write a row for each point; see `Front.to_csv`."""
-    verified = {True: "yes", False: "no", None: ""}
-    columns: dict[tuple[str, str], Sequence[Any]] = {
-        ("point", ""): range(len(front)),
-        **{(goal.name, goal.unit): values.tolist() for goal, values in zip(front.goals, front.objectives.T, strict=True)},
-        ("verified", ""): [verified[point.verified] for point in front],
-        ("status", ""): front.status.tolist(),
-        **_chosen_columns(front),
-        ("violation", ""): front.violation.tolist(),
-        **(_simulated_columns(front) if front.was_simulated.any() else {}),
-    }
-    write_whole(path, csv_table([*columns], zip(*columns.values(), strict=True)).encode())
-
-
-def _chosen_columns(front: Points) -> dict[tuple[str, str], list[Any]]:
-    """Parameters, and when each phase begins and ends; of points without trajectories all their variables."""
-    if not front.dynamic:
-        return {(v.name, v.unit): front.decision[:, k].tolist() for k, v in enumerate(front.variables)}
-    units = {variable.name: variable.unit for variable in front.variables}
-    flights = front.trajectories
-    known = next((flight for flight in flights if flight is not None), None)
-    if known is None:
-        return {}
-    parameters = {
-        (name, units.get(name, "")): [None if one is None else one.parameters[name] for one in flights] for name in known.parameters
-    }
-    times = {
-        (f"{phase.name}: {end}", phase.time_unit): [None if one is None else getattr(one[phase.name], end) for one in flights]
-        for phase in known.phases
-        for end in ("t0", "tf")
-    }
-    return parameters | times
-
-
-def _simulated_columns(front: Points) -> dict[tuple[str, str], list[float]]:
-    """What a simulation found by name and unit; NaN for a point that was not simulated."""
-    vector = front.source is not None and front.source.vector
-    how = "evaluated again" if vector else "simulated"
-    simulated = (front.simulated_F * front.signs).T
-    return {
-        **({} if vector else {("defect", ""): front.defect.tolist()}),
-        **{(f"{goal.name}, {how}", goal.unit): column.tolist() for goal, column in zip(front.goals, simulated, strict=True)},
-        (f"violation, {how}", ""): front.simulated_violation.tolist(),
-    }
 
 
 def to_bytes(front: Points) -> bytes:

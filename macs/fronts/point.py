@@ -15,7 +15,6 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.reevaluated import Reevaluation, reevaluation
-from ..io.atomic import write_whole
 from .columns import number
 from .provenance import Source
 
@@ -257,18 +256,12 @@ class Point:
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the trajectory as a table for a spreadsheet, a row for each node, under a header that names units.
 
-        Its columns are the phase, time, states, controls, path constraints, and the costates and the Hamiltonian if there are any.
-
-        Raises
-        ------
-        ValueError
-            If there is no trajectory: `Front.to_csv` writes what is known of such points.
+        Its columns are the phase, time, states, controls, path constraints, and the costates and the Hamiltonian if there are any. Without
+        dynamics it is the row of the point in `Front.to_csv`.
         """
-        from .pictures.flight_table import flight_table
+        from .spreadsheets import save_point_csv
 
-        if self.trajectory is None:
-            raise ValueError(f"point {self.index} has no trajectory: front.to_csv() writes what is known of it")
-        write_whole(path, flight_table(self.trajectory, self.costates).encode())
+        save_point_csv(self, path)
 
     @property
     def title(self) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,20 +46,10 @@ def numbers(values: Any) -> list[str]:
     if span > 1e-9 * largest:
         digits = max(digits, 3 - _decade(span))
     digits = int(np.clip(digits, 0, 11 - _decade(largest)))
-    small = (np.abs(values) >= 1e-6 * largest) & (values != 0)
+    small = np.isfinite(values) & (np.abs(values) >= 1e-6 * largest) & (values != 0)
     own = [max(digits, 4 - _decade(abs(value))) if more else digits for value, more in zip(values, small.tolist(), strict=True)]
     width = max(own, default=0)
     return [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]
-
-
-def csv_table(heads: Sequence[tuple[str, str]], rows: Iterable[Sequence[Any]]) -> str:
-    """Comma-separated values under a header of names with units; numbers in full, empty cells for None and NaN."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in heads])
-    for row in rows:
-        writer.writerow(["" if value is None or (isinstance(value, float) and np.isnan(value)) else value for value in row])
-    return text.getvalue()
 
 
 def counted(number: int, what: str) -> str:
