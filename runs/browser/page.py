@@ -51,10 +51,12 @@ def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
         safe_json(data),
         b"</script>\n",
     ]
+    parts += [b"<script>\n", _scripts(*SCRIPTS, EMBEDDED), b"</script>\n"]
+    # What needs no figure is there before the drawing package has been read, and all figures before the details of points.
+    parts += [b"<script>\n", plotly(), b"\n</script>\n<script>drawFigures();</script>\n"]
     for name, content in blocks.items():
         parts += [f'<script type="application/octet-stream" id="block-{name}">'.encode(), base64.b64encode(content), b"</script>\n"]
-    parts += [b"<script>\n", plotly(), b"\n</script>\n<script>\n", _scripts(*SCRIPTS, EMBEDDED), b"</script>\n</body>\n</html>\n"]
-    return b"".join(parts)
+    return b"".join([*parts, b"</body>\n</html>\n"])
 
 
 def packed(content: Any) -> bytes:
@@ -78,7 +80,7 @@ def _head(title: str, policy: str) -> bytes:
 
 def live_page(title: str) -> bytes:
     """A page without data, which its scripts ask its server for."""
-    return _head(title, LIVE_POLICY) + b'<script src="plotly.js"></script>\n<script src="scripts.js"></script>\n</body>\n</html>\n'
+    return _head(title, LIVE_POLICY) + b'<script src="scripts.js"></script>\n<script src="plotly.js" defer></script>\n</body>\n</html>\n'
 
 
 def live_scripts() -> bytes:

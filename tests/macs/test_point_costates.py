@@ -258,7 +258,7 @@ def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
 
 
 def test_a_picture_shows_them_below(ascents):
-    axes = ascents[3].plot()
+    axes = ascents[3].plot(costates=True)
     names, units = zip(*(" ".join(ax.get_ylabel().split()).split(" [") for ax in axes[5:]), strict=True)
     assert names == ("costate of x", "costate of vx", "costate of y", "costate of vy", "Hamiltonian")
     assert units[0] == units[2] == "per km]" and units[4] == "per s]"
@@ -267,7 +267,7 @@ def test_a_picture_shows_them_below(ascents):
     # A costate that is zero is drawn as such, not its round-off.
     low, high = axes[5].get_ylim()
     assert high - low > 1e-5
-    assert len(ascents.replace(costates=[None] * len(ascents))[3].plot()) == 5
+    assert len(ascents.replace(costates=[None] * len(ascents))[3].plot(costates=True)) == 5
 
 
 def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):

@@ -177,8 +177,8 @@ def test_the_csv_has_units_and_what_was_found_again(front, tmp_path):
     front.to_csv(tmp_path / "front.csv")
     with (tmp_path / "front.csv").open() as file:
         head, first, *_ = csv.reader(file)
-    assert head[:3] == ["near [m2]", "nearness [m2]", "violation"] and head[-2:] == ["x [m]", "y"] and "defect" not in head
-    assert "near, evaluated again [m2]" in head and float(first[-2]) == front[0].parameters["x"]
+    assert head[:4] == ["point", "near [m2]", "nearness [m2]", "verified"] and head[5:7] == ["x [m]", "y"] and "defect" not in head
+    assert "near, evaluated again [m2]" in head and float(first[5]) == front[0].parameters["x"]
 
 
 def test_what_needs_dynamics_or_derivatives_is_refused_in_one_line(front):

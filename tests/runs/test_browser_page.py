@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from misbehaving import Crashing, Plain, glide
-from synthetic_fronts import black_box, empty, flights, marked
+from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
 from test_study import Inline
 
 from macs import optimize
@@ -103,6 +104,30 @@ def test_costates_are_those_of_the_point_and_have_units():
     exact = {**point.costates["ascent"], "Hamiltonian": point.hamiltonian["ascent"]}
     for name, one in adjoint.items():
         assert [one["v"][0], one["v"][-1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("length", [-3.7e-6, 0.0, 2e-6])
+def test_a_phase_without_length_has_no_costates_and_does_not_stretch_those_of_others(length):
+    trajectory, costates = with_optional_phase(length)
+    climb, coast = curves(trajectory, costates, 400)
+    assert (climb["lasts"], coast["lasts"]) == (True, False)
+    assert {one["kind"] for one in coast["quantities"]} == {"state"}
+    adjoint = [one for one in climb["quantities"] if one["kind"] in ("costate", "hamiltonian")]
+    assert [one["name"] for one in adjoint] == ["h", "v", "Hamiltonian"]
+    assert max(one["least"] for one in adjoint) < 1.0
+    whole = curves(*with_optional_phase(1.0), 400)[1]
+    assert whole["lasts"] and {one["kind"] for one in whole["quantities"]} == {"state", "costate", "hamiltonian"}
+
+
+def test_round_off_of_a_constant_state_does_not_stretch_its_costate():
+    """Of a mass that does not change, say."""
+    trajectory, costates = with_optional_phase(1.0)
+    climb, coast = trajectory.phases
+    constant = coast.states.copy()
+    constant[:] = 5.0
+    constant[-1] += 1e-15
+    still = replace(trajectory, phases=(climb, replace(coast, states=constant)))
+    assert max(one["least"] for one in curves(still, costates, 400)[1]["quantities"]) < 1e5
 
 
 def test_a_page_loads_nothing_and_stays_small():

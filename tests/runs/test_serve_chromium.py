@@ -30,6 +30,12 @@ def others(browser) -> list[str]:
     return [one for one in errors(browser) if "ERR_" not in one]
 
 
+def seen(browser, place: str) -> None:
+    """Turn to a figure, which is drawn once it is seen."""
+    browser.execute_script(f"document.querySelector('{place}').scrollIntoView()")
+    wait(browser, f"document.querySelector('{place}').data")
+
+
 def text(browser, place: str) -> str:
     return browser.execute_script(f"return byId('{place}').textContent")
 
@@ -55,7 +61,8 @@ def test_a_page_follows_a_study_and_keeps_what_was_chosen(browser, tmp_path):
         row = browser.execute_script("return document.activeElement.dataset.key")
         study(runs=3).run(out, executor=Inline())
         wait(browser, f"state.points.length > {before} && byId('headline').textContent.startsWith('3 of 6 runs finished, 3 failed')")
-        wait(browser, "state.comparison.attainment && byId('attainment').data")
+        wait(browser, "state.comparison.attainment && byId('attainment')")
+        seen(browser, "#attainment")
         assert browser.execute_script("return [selectedPoint().index, state.kept.length, state.ranges[0][1]]") == [1, 1, 1e9]
         assert browser.execute_script("return [...byId('plot').layout.xaxis.range, ...byId('plot').layout.yaxis.range]") == [1.5, 2.5, 2, 4]
         assert browser.execute_script("return document.activeElement.dataset.key") == row

@@ -123,7 +123,7 @@ def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatc
     assert main(["show", "beam.nc", "--point", "2", "--plot", "point.png", "--csv", "point.csv"]) == 0
     out = capsys.readouterr().out
     assert f"weld length [in]     {front[2].parameters['weld length']:.10g}" in out and "buckling load" in out
-    assert Path("point.png").stat().st_size > 10_000 and Path("point.csv").read_text().startswith("cost [$],deflection [in]")
+    assert Path("point.png").stat().st_size > 10_000 and Path("point.csv").read_text().startswith("point,cost [$],deflection [in],verified")
     assert main(["verify", "beam.nc"]) == 0
     assert f"All {len(front)} points verify: evaluated again" in capsys.readouterr().out
     front.replace(F=front.F * 1.001).save("wrong.nc")

@@ -50,7 +50,7 @@ function show(status, { data, going, measures }) {
   if (state.measures) showMeasured(status);
   if (status.reading) fill(byId("headline"), `${status.reading} \u2026`);
   tell([...(status.trouble ? [`Not readable now: ${status.trouble}.`] : []), ...unreadable]);
-  if (state.data) document.documentElement.dataset.ready = "yes";
+  if (state.data && canDraw()) document.documentElement.dataset.ready = "yes";
 }
 
 /** Without any front there is no place for figures. */
@@ -86,3 +86,4 @@ function again(wait) {
 
 begin();
 again(0);
+document.addEventListener("DOMContentLoaded", drawFigures); // the drawing package is read by then

@@ -42,6 +42,15 @@ function begin() {
   });
 }
 
+/** To be called once the drawing package has been read. */
+function drawFigures() {
+  if (!state.comparison) return;
+  drawFront();
+  redrawStudy();
+  showFlights();
+  document.documentElement.dataset.ready = "yes";
+}
+
 function refresh() {
   drawFront();
   showTable();
@@ -85,7 +94,7 @@ function buildViews() {
   const { goals, solvers } = state.comparison;
   axesShown = axesPossible();
   const options = goals.map((goal, i) => [i, goal.name]);
-  const possible = VIEWS.filter(([kind, , least]) => goals.length >= least && (kind === "two" || HAS_GL));
+  const possible = VIEWS.filter(([, , least]) => goals.length >= least);
   const tabs = element("div", { role: "tablist", "aria-label": "Kind of figure" }, possible.map(([kind, words]) => tab(kind, words)));
   const axisOf = (letter, words) => choice(words, options, view[letter], (value) => {
     view[letter] = Number(value);
@@ -104,6 +113,10 @@ function buildViews() {
 function tab(kind, words) {
   const chosen = view.kind === kind;
   const show = (next) => {
+    if (next !== "two" && !hasGl()) {
+      fill(byId("plot-note"), "This browser has no WebGL, without which it cannot draw this figure.");
+      return announce(byId("plot-note").textContent);
+    }
     view.kind = next;
     buildViews();
     drawFront();
@@ -124,6 +137,7 @@ let drawn = null; // the kind of figure that is there
 
 /** Draw the figure of the front. One of another kind begins with an empty place. */
 function drawFront() {
+  if (!canDraw()) return;
   let place = byId("plot");
   const kinds = { two: drawTwo, three: drawThree, parallel: drawParallel };
   const fresh = drawn !== view.kind;

@@ -13,10 +13,10 @@ function pointTraces(axes, type, marker3d) {
   const many = shown.length > MANY;
   const size = many ? 5 : SIZE;
   const traces = [];
+  const template = hoverTemplate();
   const trace = (points, name, marker, more = {}) => {
-    const made = { type, mode: "markers", name, marker, hovertemplate: "%{text}<extra></extra>", ...more };
-    made.text = points.map(hoverText);
-    made.customdata = points.map((point) => point.key);
+    const made = { type, mode: "markers", name, marker, hovertemplate: template, ...more };
+    made.customdata = points.map(hoverData);
     for (const [letter, i] of Object.entries(axes)) made[letter] = points.map((point) => point.values[i]);
     return made;
   };
@@ -77,6 +77,7 @@ const colorbar = (i) => ({
   thickness: 12,
   outlinewidth: 0,
   exponentformat: "power",
+  minexponent: 7,
 });
 
 /** Least and greatest value. */
@@ -111,7 +112,7 @@ function referenceTraces(x, y) {
 function drawTwo(place) {
   const { goals } = state.comparison;
   const { x, y } = view;
-  const type = HAS_GL && shownPoints().length > MANY ? "scattergl" : "scatter";
+  const type = shownPoints().length > MANY && hasGl() ? "scattergl" : "scatter";
   const traces = [...referenceTraces(x, y), ...goingTraces({ x, y }, "scatter", false), ...pointTraces({ x, y }, type, false)];
   const figure = layout({
     height: 440,
@@ -131,7 +132,7 @@ function drawThree(place) {
   const { goals } = state.comparison;
   const { x, y, z } = view;
   const traces = [...goingTraces({ x, y, z }, "scatter3d", true), ...pointTraces({ x, y, z }, "scatter3d", true)];
-  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", gridcolor: "#ccc", color: INK });
+  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", minexponent: 7, gridcolor: "#ccc", color: INK });
   const scene = { xaxis: space(x), yaxis: space(y), zaxis: space(z), uirevision: `${x} ${y} ${z}`, camera: { eye: { x: 1.8, y: 1.8, z: 0.9 } } };
   const figure = layout({ height: 520, scene, modebar: { orientation: "h" }, margin: { l: 0, r: 0, t: 60, b: 0 }, showlegend: legendWanted(traces) });
   draw(place, traces, figure);
@@ -143,7 +144,7 @@ const legendWanted = (traces) => traces.filter((trace) => trace.showlegend !== f
 /** What a click or a rectangle in the figure does. The figure forgets this where its kind changes. */
 function listenToScatter(place) {
   place.on("plotly_click", (event) => {
-    const key = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
+    const key = event.points.map((point) => point.customdata?.[0]).find(Boolean);
     if (key) select(key);
   });
   place.on("plotly_selected", (event) => {

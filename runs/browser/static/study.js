@@ -22,7 +22,7 @@ function showStudy() {
 function buildFigures() {
   const { attainment, convergence } = state.comparison;
   const place = byId("study-figures");
-  place.querySelectorAll(".js-plotly-plot").forEach(retire);
+  place.querySelectorAll(".plot").forEach(retire);
   const parts = [];
   if (attainment) parts.push(figureBox("Attainment surfaces", "attainment", "What at least one run (best), half of the runs (median) and all runs (worst) of a solver attain."));
   if (convergence?.length) parts.push(convergenceBox(convergence));
@@ -31,6 +31,7 @@ function buildFigures() {
 
 /** Draw the figures. */
 function redrawStudy() {
+  if (!canDraw()) return;
   const { attainment, convergence } = state.comparison;
   if (attainment) drawAttainment(attainment);
   if (convergence?.length) drawConvergence(convergence, Number(byId("study-figures").querySelector("select").value));
@@ -84,7 +85,7 @@ function drawAttainment(surfaces) {
     }
   }
   const figure = layout({ height: 440, xaxis: axis(goalLabel(goals[0])), yaxis: axis(goalLabel(goals[1])), uirevision: "same", modebar: { orientation: "h" }, showlegend: true, legend: { x: 1.02, y: 1 } });
-  draw(byId("attainment"), traces, figure);
+  drawWhenSeen(byId("attainment"), traces, figure);
 }
 
 function convergenceBox(all) {
@@ -113,7 +114,7 @@ function drawConvergence(all, k) {
     traces.push({ x: times, y: last(median), mode: "lines", line, name: `${plotText(solver)}, ${counted(runs, "run")}`, hovertemplate: "%{y:.3g} at %{x:.4g}<extra></extra>" });
   }
   const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(decades) } : {});
-  draw(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, uirevision: k, modebar: { orientation: "h" }, legend: { x: 1.02, y: 1 }, showlegend: true }));
+  drawWhenSeen(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, uirevision: k, modebar: { orientation: "h" }, legend: { x: 1.02, y: 1 }, showlegend: true }));
   byId("convergence").setAttribute("aria-label", `${indicator} over ${cost}, ${Object.keys(solvers).join(", ")}`);
 }
 

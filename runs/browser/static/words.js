@@ -2,6 +2,7 @@
 // Numbers, labels and elements. All texts of users go through `element` (as text, never as HTML) or `plotText`.
 
 const MINUS = "\u2212";
+const DIGIT_SPACE = "\u2007", POINT_SPACE = "\u2008"; // as wide as a digit and as a point
 
 /** A number with some significant digits; "-" where there is none. */
 function number(value, digits = 6) {
@@ -30,7 +31,12 @@ function column(values) {
   let decimals = 5 - decade(largest);
   if (span > 1e-9 * largest) decimals = Math.max(decimals, 3 - decade(span));
   decimals = Math.min(Math.max(decimals, 0), 11 - decade(largest));
-  return values.map((value) => (Number.isFinite(value) ? (value + 0).toFixed(decimals).replace(/^-/, MINUS) : "-"));
+  // Numbers with fewer than five digits have more decimals, unless they are round-off of the largest; decimal points stay below each other.
+  const small = (value) => Number.isFinite(value) && value !== 0 && Math.abs(value) >= 1e-6 * largest;
+  const own = values.map((value) => (small(value) ? Math.max(decimals, 4 - decade(Math.abs(value))) : decimals));
+  const width = Math.max(decimals, ...own);
+  const rest = (n) => (n === 0 && width > 0 ? POINT_SPACE : "") + DIGIT_SPACE.repeat(width - n);
+  return values.map((value, k) => (Number.isFinite(value) ? (value + 0).toFixed(own[k]).replace(/^-/, MINUS) + rest(own[k]) : "-"));
 }
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);

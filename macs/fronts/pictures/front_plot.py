@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
 from os import PathLike
 from pathlib import Path
@@ -12,10 +12,10 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..io.atomic import write_whole
-from ..io.text import counted
-from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
-from .pictures.style import (
+from ...io.atomic import write_whole
+from ...io.text import counted, numbers
+from .kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
+from .style import (
     COLORS,
     GREY,
     STYLE,
@@ -29,32 +29,44 @@ from .pictures.style import (
     title_and_legend,
     wrapped,
 )
-from .points import Points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from .points import Points
 
 
 FEW = 100
 """Other points up to this number are drawn as crosses."""
 
 
-def save_picture(what: Any, path: str | PathLike[str]) -> None:
-    """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
+SAME = 1e-9
+"""Objectives that differ by less, of their size, are the same but for round-off."""
+
+
+def save_front(front: Any, path: str | PathLike[str]) -> None:
+    """Draw a front into a file; the suffix gives the format."""
+    _write(lambda: front_figure(front), path)
+
+
+def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
+    """Draw what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
+
+    def drawn() -> Any:
+        figure = blank_figure()
+        what.plot(figure=figure, **how)
+        return figure
+
+    _write(drawn, path)
+
+
+def _write(drawn: Callable[[], Any], path: str | PathLike[str]) -> None:
     import matplotlib
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        if isinstance(what, Points):
-            figure = front_figure(what)
-        else:
-            figure = blank_figure()
-            what.plot(figure=figure)
+        figure = drawn()
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
 
-def front_figure(front: Points) -> Any:
+def front_figure(front: Any) -> Any:
     """A figure without a window of a front."""
     figure = blank_figure()
     figure.set_size_inches(*_size(front))
@@ -62,11 +74,11 @@ def front_figure(front: Points) -> Any:
     return figure
 
 
-def _size(front: Points) -> tuple[float, float]:
+def _size(front: Any) -> tuple[float, float]:
     return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
 
 
-def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
+def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
     """Axes with the objectives of a front.
 
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
@@ -75,7 +87,7 @@ def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = ()
 
     Parameters
     ----------
-    front : Points
+    front : Any
     ax : Axes, optional
         Axes to draw into. Default: those of a new figure.
     marked : numbers of points
@@ -111,7 +123,7 @@ def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
         ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
 
 
-def _title(front: Points) -> str:
+def _title(front: Any) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
@@ -119,7 +131,7 @@ def _title(front: Points) -> str:
     return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
-def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
+def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     if not len(front):
@@ -146,6 +158,10 @@ def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
         ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
+    for axis, column in zip("xyz", axes, strict=False):
+        about = _about(column) if len(column) > 1 else None
+        if about:
+            getattr(ax, f"set_{axis}lim")(*about)
     for i, edge in zip(marked, COLORS, strict=False):
         ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
     if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
@@ -157,27 +173,43 @@ def _shades(values: np.ndarray) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    return ScalarMappable(Normalize(values.min(), values.max()), "viridis")
+    return ScalarMappable(Normalize(*(_about(values) or (values.min(), values.max()))), "viridis")
 
 
-def _values(front: Points, number: int) -> str:
+def _about(values: np.ndarray) -> tuple[float, float] | None:
+    """Ends of a range about values that are all the same but for round-off; None for others."""
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max(initial=0.0))
+    if not len(finite) or np.ptp(finite) > SAME * size:
+        return None
+    half = 0.1 * size or 1.0
+    return float(finite.min()) - half, float(finite.max()) + half
+
+
+def _value(front: Any, number: int, k: int) -> str:
+    """An objective of a point with its unit, as tables have it."""
+    text = numbers(front.objectives[:, k])[number].strip()
+    return f"{text} {raised(front.goals[k].unit)}".rstrip()
+
+
+def _values(front: Any, number: int) -> str:
     """The number of a point and its objectives, for a legend."""
-    values = (f"{value:.5g} {raised(goal.unit)}".rstrip() for goal, value in zip(front.goals, front.objectives[number], strict=True))
+    values = [_value(front, number, k) for k in range(len(front.goals))]
     return f"#{range(len(front))[number]}: {', '.join(values)}"
 
 
-def _mark_extremes(front: Points, ax: Any) -> None:
+def _mark_extremes(front: Any, ax: Any) -> None:
     """Mark the best point of each of two objectives; the legend has its value."""
     F = np.where(kinds(front)[0][:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {raised(goal.unit)}' if goal.unit else ''} (#{best})"
+        text = f"best {goal.name}: {_value(front, best, k)} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
 
-def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
+def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
     """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
     feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
     import matplotlib
@@ -188,7 +220,8 @@ def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:
         best = worst = np.zeros(F.shape[1])
-    height = 1.0 - (F - best) / np.where(worst > best, worst - best, 1.0)
+    same = worst - best <= SAME * np.maximum(np.abs(worst), np.abs(best))
+    height = np.where(same & np.isfinite(F), 1.0, 1.0 - (F - best) / np.where(same, 1.0, worst - best))
     shade = matplotlib.colormaps["viridis"]
     for row in height[good]:
         ax.plot(row, color=shade(0.85 * row[0]), lw=1.0, alpha=0.85)
