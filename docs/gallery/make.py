@@ -39,7 +39,7 @@ LEARNED = "# What was learned\n"
 LOADED = re.compile(r'load\("([\w/]+)"')
 RESULT, LESSONS = "## Result\n\n", "## What was learned\n\n"
 """Headings of a page."""
-DPI, SHADES, ACROSS = 120, 256, 3
+DPI, SHADES, ACROSS = 110, 256, 3
 """Of pictures; colours of each; pictures in a row of the index."""
 ALONE = ("problems.cases", "problems.cases.standard")
 """Packages whose modules are problems of their own; a case in another folder is made of all its modules."""
@@ -112,9 +112,9 @@ class Shown:
     seconds: float
 
 
-def scripts(folder: Path = HERE) -> list[Script]:
+def scripts() -> list[Script]:
     """All of them, those of the published problems last."""
-    found = [Script.read(path) for path in sorted(folder.glob("*.py")) if path.name != Path(__file__).name]
+    found = [Script.read(path) for path in sorted(HERE.glob("*.py")) if path.name != Path(__file__).name]
     order = list(CASES)
     return sorted(found, key=lambda script: min(order.index(case) for case in script.cases))
 
