@@ -39,8 +39,8 @@ LEARNED = "# What was learned\n"
 LOADED = re.compile(r'load\("([\w/]+)"')
 RESULT, LESSONS = "## Result\n\n", "## What was learned\n\n"
 """Headings of a page."""
-DPI, SHADES, ACROSS = 110, 256, 3
-"""Of pictures; colours of each; pictures in a row of the index."""
+DPI, SHADES, LARGEST, ACROSS = 100, (256, 64, 32), 80_000, 3
+"""Of pictures; how many colours they may have; their largest size, bytes; pictures in a row of the index."""
 ALONE = ("problems.cases", "problems.cases.standard")
 """Packages whose modules are problems of their own; a case in another folder is made of all its modules."""
 
@@ -159,15 +159,23 @@ def show(path: Path) -> Shown:
 
 
 def _png(figure: Any) -> bytes:
-    """A figure as a small PNG, of few colours: the most frequent ones as they are, and those in between."""
+    """A figure as a small PNG, of as many colours as it has room for."""
     from PIL import Image
 
-    drawn, small = io.BytesIO(), io.BytesIO()
+    drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
     picture = np.asarray(Image.open(drawn).convert("RGB"))
+    return next(found for shades in SHADES if len(found := of_few_colors(picture, shades)) <= LARGEST or shades == SHADES[-1])
+
+
+def of_few_colors(picture: np.ndarray, shades: int) -> bytes:
+    """A picture (height, width, 3) as PNG: the most frequent colours as they are, and those in between."""
+    from PIL import Image
+
+    small = io.BytesIO()
     colors, places, counts = np.unique(picture.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True)
-    between = Image.fromarray(colors[None]).quantize(SHADES // 2).getpalette() or []
-    palette = np.vstack([colors[np.argsort(-counts)[: SHADES // 2]], np.array(between, dtype=np.uint8).reshape(-1, 3)[: SHADES // 2]])
+    between = Image.fromarray(colors[None]).quantize(shades // 2).getpalette() or []
+    palette = np.vstack([colors[np.argsort(-counts)[: shades // 2]], np.array(between, dtype=np.uint8).reshape(-1, 3)[: shades // 2]])
     nearest = cKDTree(palette.astype(float)).query(colors.astype(float))[1]
     result = Image.fromarray(nearest[places].reshape(picture.shape[:2]).astype(np.uint8))
     result.putpalette(palette.ravel().tolist())
