@@ -290,6 +290,8 @@ class Front(Points):
     def plot(self, ax: Axes | None = None, *, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
         """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates.
 
+        `front.plot().figure.savefig("front.png")` writes the picture to a file.
+
         Parameters
         ----------
         ax : Axes, optional
@@ -300,7 +302,9 @@ class Front(Points):
             Name -> two objectives (k, 2) of other points, such as a known front; drawn in black and grey.
         """
         from .fronts.front_plot import draw_front
+        from .fronts.pictures.style import check_no_path
 
+        check_no_path(ax, "front.plot()")
         return draw_front(self, ax, marked, beside)
 
     def plot_trajectories(self, points: Sequence[int], figure: Figure | None = None) -> np.ndarray:
@@ -319,7 +323,9 @@ class Front(Points):
             If there are none or too many, or one has no trajectory.
         """
         from .fronts.pictures.several_flights import draw_flights
+        from .fronts.pictures.style import check_no_path
 
+        check_no_path(figure, f"front.plot_trajectories({list(points)})[0]")
         return draw_flights([self[i] for i in points], figure)
 
     def plot_variables(self, figure: Figure | None = None) -> np.ndarray:
@@ -331,7 +337,9 @@ class Front(Points):
             For trajectories: `front[i].plot()` draws one of them.
         """
         from .fronts.pictures.design_plot import draw_designs
+        from .fronts.pictures.style import check_no_path
 
+        check_no_path(figure, "front.plot_variables()[0]")
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
@@ -353,7 +361,12 @@ class Front(Points):
         return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write objectives, violation, status, what a simulation found, and decisions, one row a point, under a header that names units."""
+        """Write a table for a spreadsheet, a row for each point, under a header that names units.
+
+        Its columns are the number of the point, objectives, whether it is verified, status, parameters, the times at which phases begin
+        and end (of points without trajectories all their variables), violation and what a simulation found. `front[i].to_csv()` writes a
+        trajectory.
+        """
         files.save_csv(self, path)
 
     def save(self, path: str | PathLike[str]) -> None:

@@ -12,7 +12,7 @@ from problems.cases.betts import CROSS_RANGE, FINAL_TIME
 best = optimize(load("betts"))
 print(best.alone().table())
 print(f"final time {best.trajectory['entry'].tf:.2f} s; Betts: {CROSS_RANGE} deg after {FINAL_TIME} s")
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

@@ -26,7 +26,7 @@ bead = slide.at(np.linspace(0.0, slide.tf, 201))
 ax = plt.figure(figsize=(5.5, 4.0), layout="constrained").add_subplot(xlabel="x [m]", ylabel="depth y [m]", aspect="equal")
 ax.plot(bead["x"], bead["y"])
 ax.invert_yaxis()
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

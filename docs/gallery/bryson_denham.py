@@ -18,7 +18,7 @@ print(best.alone().table())
 known = published("bryson_denham")[0]
 value = best.simulated[known.objective]
 print(f"{known.objective}: simulated {value:.9g}, published {known.value:.9g} ({known.source}); difference {value - known.value:.0e}")
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

@@ -28,7 +28,7 @@ car = drive.at(np.linspace(0.0, drive.tf, 401))
 ax = plt.figure(figsize=(5.5, 4.0), layout="constrained").add_subplot(xlabel="x", ylabel="y", aspect="equal")
 ax.plot(car["x"], car["y"])
 ax.quiver([0, -3], [0, 1], [1, 1], [0, 0], color="#D55E00", width=0.006, zorder=3)
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

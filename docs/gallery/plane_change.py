@@ -15,7 +15,7 @@ known = published("plane_change")[0]
 value = best.simulated[known.objective]
 print(f"{known.objective}: simulated {value:.9g}, published {known.value:.9g} ({known.source}); difference {value - known.value:.0e}")
 print(f"peak of the heating: {best.trajectory['flight']['heating'].max():.0f}")
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

@@ -20,7 +20,7 @@ value = best.simulated[known.objective]
 print(f"{known.objective}: simulated {value:.9g}, published {known.value:.9g} ({known.source}); difference {value - known.value:.0e}")
 stats = best.alone().stats
 print(f"{stats['starts']} starts led to {stats['optima']} optima, {stats['found']} of them to this one; known local: {known.local[0]}")
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

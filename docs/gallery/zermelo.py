@@ -24,7 +24,7 @@ ship = trip.at(np.linspace(0.0, trip.tf, 201))
 ax = plt.figure(figsize=(5.5, 3.6), layout="constrained").add_subplot(xlabel="x", ylabel="y")
 ax.plot(ship["x"], ship["y"])
 ax.quiver(*np.meshgrid([0, 1, 2, 3, 4], [-2, -1, 1]), [[2] * 5, [1] * 5, [-1] * 5], 0, color="#666666", width=0.003)
-best.plot()
+best.plot(costates=True)
 
 # What was learned
 #

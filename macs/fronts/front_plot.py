@@ -13,7 +13,8 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..io.atomic import write_whole
-from .pictures.kinds import NOT_FEASIBLE, NOT_VERIFIED, kinds
+from ..io.text import counted, numbers
+from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
 from .pictures.style import (
     COLORS,
     GREY,
@@ -40,7 +41,11 @@ FEW = 100
 """Other points up to this number are drawn as crosses."""
 
 
-def save_picture(what: Any, path: str | PathLike[str]) -> None:
+SAME = 1e-9
+"""Objectives that differ by less, of their size, are the same but for round-off."""
+
+
+def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
     """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
     import matplotlib
 
@@ -49,7 +54,7 @@ def save_picture(what: Any, path: str | PathLike[str]) -> None:
             figure = front_figure(what)
         else:
             figure = blank_figure()
-            what.plot(figure=figure)
+            what.plot(figure=figure, **how)
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
 
@@ -114,7 +119,8 @@ def _title(front: Points) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
-    return f"{name}, {len(front)} point{'' if len(front) == 1 else 's'}".lstrip(", ")
+    said = f", {NOT_SIMULATED}" if front.dynamic and not front.was_simulated.any() else ""
+    return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
 def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
@@ -134,23 +140,53 @@ def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
     third = values.shape[1] == 3 and ax.name != "3d"
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
-    drawn = ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color)
-    for rows, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
+    shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
+    ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
+    rims = shades.to_rgba(values[apart, 2]) if shades else COLORS[0]
+    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
         if rows.any():
             ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
-    if third and good.any():
-        ax.figure.colorbar(drawn, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
+    if shades:
+        ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
+    for axis, column in zip("xyz", axes, strict=False):
+        about = _about(column) if len(column) > 1 else None
+        if about:
+            getattr(ax, f"set_{axis}lim")(*about)
     for i, edge in zip(marked, COLORS, strict=False):
         ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
     if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
         _mark_extremes(front, ax)
 
 
+def _shades(values: np.ndarray) -> Any:
+    """Colours of the values of a third objective, of points that are not verified, too."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(*(_about(values) or (values.min(), values.max()))), "viridis")
+
+
+def _about(values: np.ndarray) -> tuple[float, float] | None:
+    """Ends of a range about values that are all the same but for round-off; None for others."""
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max(initial=0.0))
+    if not len(finite) or np.ptp(finite) > SAME * size:
+        return None
+    half = 0.1 * size or 1.0
+    return float(finite.min()) - half, float(finite.max()) + half
+
+
+def _value(front: Points, number: int, k: int) -> str:
+    """An objective of a point with its unit, as tables have it."""
+    text = numbers(front.objectives[:, k])[number].strip()
+    return f"{text} {raised(front.goals[k].unit)}".rstrip()
+
+
 def _values(front: Points, number: int) -> str:
     """The number of a point and its objectives, for a legend."""
-    values = (f"{value:.5g} {raised(goal.unit)}".rstrip() for goal, value in zip(front.goals, front.objectives[number], strict=True))
+    values = [_value(front, number, k) for k in range(len(front.goals))]
     return f"#{range(len(front))[number]}: {', '.join(values)}"
 
 
@@ -160,7 +196,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {front.objectives[best, k]:.5g}{f' {raised(goal.unit)}' if goal.unit else ''} (#{best})"
+        text = f"best {goal.name}: {_value(front, best, k)} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
@@ -176,7 +212,8 @@ def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:
         best = worst = np.zeros(F.shape[1])
-    height = 1.0 - (F - best) / np.where(worst > best, worst - best, 1.0)
+    same = worst - best <= SAME * np.maximum(np.abs(worst), np.abs(best))
+    height = np.where(same & np.isfinite(F), 1.0, 1.0 - (F - best) / np.where(same, 1.0, worst - best))
     shade = matplotlib.colormaps["viridis"]
     for row in height[good]:
         ax.plot(row, color=shade(0.85 * row[0]), lw=1.0, alpha=0.85)
