@@ -61,7 +61,8 @@ class Script:
         source = path.read_text(encoding="utf-8")
         tree = ast.parse(source, path.name)
         title, _, text = (ast.get_docstring(tree) or "").partition("\n")
-        code, found, learned = "".join(source.splitlines(keepends=True)[tree.body[0].end_lineno :]).partition(LEARNED)
+        after = tree.body[0].end_lineno if tree.body else 0
+        code, found, learned = "".join(source.splitlines(keepends=True)[after:]).partition(LEARNED)
         lines = learned.splitlines()
         if not title or not text.strip() or not found or not lines or not all(line.startswith("#") for line in lines):
             raise ValueError(f"{path.name} needs a title, a text, and a comment '{LEARNED.strip()}' at its end")
