@@ -103,7 +103,7 @@ def test_a_change_is_noticed(tmp_path, monkeypatch, capsys):
     assert script.result() is not None and not script.is_current()
     assert make.main(["--check"]) == 1 and "car" in capsys.readouterr().out.splitlines()[-1]
     assert make.main([]) == 0 and "Much." in (tmp_path / "car.md").read_text() and make.main(["--check"]) == 0
-    path.write_text(text.replace("best.plot()", "best.plot()\nprint()"))
+    path.write_text(text.replace("print(best", "print()\nprint(best"))
     assert make.Script.read(path).result() is None
     path.write_text(text)
     page = tmp_path / "car.md"
