@@ -18,6 +18,7 @@ from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
+from .fronts.spreadsheets import save_csv
 from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
@@ -82,7 +83,7 @@ class Front(Points):
 
     def _repr_html_(self) -> str:
         """For notebooks: the table and a small picture."""
-        from .fronts.front_plot import front_figure
+        from .fronts.pictures.front_plot import front_figure
         from .fronts.pictures.style import rendered
 
         return front_html(self, rendered(front_figure(self), "png", 80))
@@ -301,7 +302,7 @@ class Front(Points):
         beside : mapping, optional
             Name -> two objectives (k, 2) of other points, such as a known front; drawn in black and grey.
         """
-        from .fronts.front_plot import draw_front
+        from .fronts.pictures.front_plot import draw_front
         from .fronts.pictures.style import check_no_path
 
         check_no_path(ax, "front.plot()")
@@ -367,7 +368,7 @@ class Front(Points):
         and end (of points without trajectories all their variables), violation and what a simulation found. `front[i].to_csv()` writes a
         trajectory.
         """
-        files.save_csv(self, path)
+        save_csv(self, path)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write everything to one netCDF-4 file with a checksum, whole or not at all.

@@ -259,7 +259,7 @@ class Point:
         Its columns are the phase, time, states, controls, path constraints, and the costates and the Hamiltonian if there are any. Without
         dynamics it is the row of the point in `Front.to_csv`.
         """
-        from .files import save_point_csv
+        from .spreadsheets import save_point_csv
 
         save_point_csv(self, path)
 

@@ -46,7 +46,7 @@ def numbers(values: Any) -> list[str]:
     if span > 1e-9 * largest:
         digits = max(digits, 3 - _decade(span))
     digits = int(np.clip(digits, 0, 11 - _decade(largest)))
-    small = (np.abs(values) >= 1e-6 * largest) & (values != 0)
+    small = np.isfinite(values) & (np.abs(values) >= 1e-6 * largest) & (values != 0)
     own = [max(digits, 4 - _decade(abs(value))) if more else digits for value, more in zip(values, small.tolist(), strict=True)]
     width = max(own, default=0)
     return [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]

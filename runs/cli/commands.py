@@ -11,7 +11,7 @@ from typing import Any
 import problems
 import transcription
 from macs.front import Front
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_front, save_picture
 from macs.fronts.pictures.style import label
 from macs.fronts.point import Point
 from macs.fronts.verification import Check
@@ -231,7 +231,10 @@ def free_name(problem: str) -> Path:
 
 def draw(drawn: Front | Point, path: str, costates: bool = False) -> None:
     """Draw a front, or a point's trajectory, with or without costates."""
-    save_picture(drawn, path, **({"costates": True} if costates else {}))
+    if isinstance(drawn, Front):
+        save_front(drawn, path)
+    else:
+        save_picture(drawn, path, **({"costates": True} if costates else {}))
     print(f"picture in {path}")
 
 

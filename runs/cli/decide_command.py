@@ -16,7 +16,7 @@ from macs.decisions import Choice, Dialogue, ReferencePoint, from_dict
 from macs.decisions.choice import degree_text
 from macs.decisions.dialogue_file import is_dialogue, read
 from macs.front import Front
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_picture
 from macs.fronts.pictures.style import label
 from macs.io.atomic import check_target
 from macs.io.text import text_table

@@ -228,6 +228,7 @@ def test_numbers_show_what_differs():
     assert numbers([109.09461, 250]) == ["109.095", "250.000"]
     assert numbers([5.35104, 67069.2, 835267.4]) == ["5.3510", "67069     ", "835267     "], "points below each other"
     assert numbers([0.5, 1e-5, 1000]) == ["0.50000", "0.00   ", "1000.00   "]
+    assert numbers([np.inf, 5.35104, np.nan]) == ["inf", "5.35104", "nan"], "what is no number has no digits"
     assert numbers([-0.0, 0.0]) == ["0.00000", "0.00000"]
     assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
 

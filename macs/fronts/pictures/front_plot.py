@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
 from os import PathLike
 from pathlib import Path
@@ -12,10 +12,10 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..io.atomic import write_whole
-from ..io.text import counted, numbers
-from .pictures.kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
-from .pictures.style import (
+from ...io.atomic import write_whole
+from ...io.text import counted, numbers
+from .kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
+from .style import (
     COLORS,
     GREY,
     STYLE,
@@ -29,12 +29,9 @@ from .pictures.style import (
     title_and_legend,
     wrapped,
 )
-from .points import Points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from .points import Points
 
 
 FEW = 100
@@ -45,20 +42,31 @@ SAME = 1e-9
 """Objectives that differ by less, of their size, are the same but for round-off."""
 
 
+def save_front(front: Any, path: str | PathLike[str]) -> None:
+    """Draw a front into a file; the suffix gives the format."""
+    _write(lambda: front_figure(front), path)
+
+
 def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
-    """Draw a front, or what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
+    """Draw what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
+
+    def drawn() -> Any:
+        figure = blank_figure()
+        what.plot(figure=figure, **how)
+        return figure
+
+    _write(drawn, path)
+
+
+def _write(drawn: Callable[[], Any], path: str | PathLike[str]) -> None:
     import matplotlib
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        if isinstance(what, Points):
-            figure = front_figure(what)
-        else:
-            figure = blank_figure()
-            what.plot(figure=figure, **how)
+        figure = drawn()
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
 
-def front_figure(front: Points) -> Any:
+def front_figure(front: Any) -> Any:
     """A figure without a window of a front."""
     figure = blank_figure()
     figure.set_size_inches(*_size(front))
@@ -66,11 +74,11 @@ def front_figure(front: Points) -> Any:
     return figure
 
 
-def _size(front: Points) -> tuple[float, float]:
+def _size(front: Any) -> tuple[float, float]:
     return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
 
 
-def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
+def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
     """Axes with the objectives of a front.
 
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
@@ -79,7 +87,7 @@ def draw_front(front: Points, ax: Axes | None = None, marked: Sequence[int] = ()
 
     Parameters
     ----------
-    front : Points
+    front : Any
     ax : Axes, optional
         Axes to draw into. Default: those of a new figure.
     marked : numbers of points
@@ -115,7 +123,7 @@ def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
         ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
 
 
-def _title(front: Points) -> str:
+def _title(front: Any) -> str:
     name = front.source.name if front.source else front.solver.get("name", "")
     if not len(front):
         return f"{name}: no feasible point" if name else "no feasible point"
@@ -123,7 +131,7 @@ def _title(front: Points) -> str:
     return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
 
 
-def _scatter(front: Points, ax: Any, marked: Sequence[int]) -> None:
+def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     if not len(front):
@@ -178,19 +186,19 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
     return float(finite.min()) - half, float(finite.max()) + half
 
 
-def _value(front: Points, number: int, k: int) -> str:
+def _value(front: Any, number: int, k: int) -> str:
     """An objective of a point with its unit, as tables have it."""
     text = numbers(front.objectives[:, k])[number].strip()
     return f"{text} {raised(front.goals[k].unit)}".rstrip()
 
 
-def _values(front: Points, number: int) -> str:
+def _values(front: Any, number: int) -> str:
     """The number of a point and its objectives, for a legend."""
     values = [_value(front, number, k) for k in range(len(front.goals))]
     return f"#{range(len(front))[number]}: {', '.join(values)}"
 
 
-def _mark_extremes(front: Points, ax: Any) -> None:
+def _mark_extremes(front: Any, ax: Any) -> None:
     """Mark the best point of each of two objectives; the legend has its value."""
     F = np.where(kinds(front)[0][:, None], front.F, np.inf)
     for k, goal in enumerate(front.goals):
@@ -201,7 +209,7 @@ def _mark_extremes(front: Points, ax: Any) -> None:
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
 
-def _parallel(front: Points, ax: Any, marked: Sequence[int]) -> None:
+def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
     """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
     feasible or not verified may lie beyond the ends of the axes, which are those of the others, if there are two or more."""
     import matplotlib
