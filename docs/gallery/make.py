@@ -219,7 +219,8 @@ them. `make gallery` runs the scripts whose pages are out of date; `{COMMAND} --
 
 ## Fronts
 
-Most come from papers; what these leave open is chosen, and said in the module of the case. All are in `problems/cases`.
+Most come from papers; what these leave open is chosen, and said in the module of the case. Both re-entries after Betts have one objective.
+All are in `problems/cases`.
 
 {grid(own)}
 
