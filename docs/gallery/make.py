@@ -39,8 +39,8 @@ LEARNED = "# What was learned\n"
 LOADED = re.compile(r'load\("([\w/]+)"')
 RESULT, LESSONS = "## Result\n\n", "## What was learned\n\n"
 """Headings of a page."""
-DPI, SHADES, ACROSS = 120, 256, 3
-"""Of pictures; colours of each; pictures in a row of the index."""
+DPI, SHADES, LARGEST, ACROSS = 100, (256, 64, 32), 80_000, 3
+"""Of pictures; how many colours they may have; their largest size, bytes; pictures in a row of the index."""
 ALONE = ("problems.cases", "problems.cases.standard")
 """Packages whose modules are problems of their own; a case in another folder is made of all its modules."""
 
@@ -61,7 +61,8 @@ class Script:
         source = path.read_text(encoding="utf-8")
         tree = ast.parse(source, path.name)
         title, _, text = (ast.get_docstring(tree) or "").partition("\n")
-        code, found, learned = "".join(source.splitlines(keepends=True)[tree.body[0].end_lineno :]).partition(LEARNED)
+        after = tree.body[0].end_lineno if tree.body else 0
+        code, found, learned = "".join(source.splitlines(keepends=True)[after:]).partition(LEARNED)
         lines = learned.splitlines()
         if not title or not text.strip() or not found or not lines or not all(line.startswith("#") for line in lines):
             raise ValueError(f"{path.name} needs a title, a text, and a comment '{LEARNED.strip()}' at its end")
@@ -112,9 +113,9 @@ class Shown:
     seconds: float
 
 
-def scripts(folder: Path = HERE) -> list[Script]:
+def scripts() -> list[Script]:
     """All of them, those of the published problems last."""
-    found = [Script.read(path) for path in sorted(folder.glob("*.py")) if path.name != Path(__file__).name]
+    found = [Script.read(path) for path in sorted(HERE.glob("*.py")) if path.name != Path(__file__).name]
     order = list(CASES)
     return sorted(found, key=lambda script: min(order.index(case) for case in script.cases))
 
@@ -159,15 +160,23 @@ def show(path: Path) -> Shown:
 
 
 def _png(figure: Any) -> bytes:
-    """A figure as a small PNG, of few colours: the most frequent ones as they are, and those in between."""
+    """A figure as a small PNG, of as many colours as it has room for."""
     from PIL import Image
 
-    drawn, small = io.BytesIO(), io.BytesIO()
+    drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
     picture = np.asarray(Image.open(drawn).convert("RGB"))
+    return next(found for shades in SHADES if len(found := of_few_colors(picture, shades)) <= LARGEST or shades == SHADES[-1])
+
+
+def of_few_colors(picture: np.ndarray, shades: int) -> bytes:
+    """A picture (height, width, 3) as PNG: the most frequent colours as they are, and those in between."""
+    from PIL import Image
+
+    small = io.BytesIO()
     colors, places, counts = np.unique(picture.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True)
-    between = Image.fromarray(colors[None]).quantize(SHADES // 2).getpalette() or []
-    palette = np.vstack([colors[np.argsort(-counts)[: SHADES // 2]], np.array(between, dtype=np.uint8).reshape(-1, 3)[: SHADES // 2]])
+    between = Image.fromarray(colors[None]).quantize(shades // 2).getpalette() or []
+    palette = np.vstack([colors[np.argsort(-counts)[: shades // 2]], np.array(between, dtype=np.uint8).reshape(-1, 3)[: shades // 2]])
     nearest = cKDTree(palette.astype(float)).query(colors.astype(float))[1]
     result = Image.fromarray(nearest[places].reshape(picture.shape[:2]).astype(np.uint8))
     result.putpalette(palette.ravel().tolist())
@@ -210,7 +219,8 @@ them. `make gallery` runs the scripts whose pages are out of date; `{COMMAND} --
 
 ## Fronts
 
-Most come from papers; what these leave open is chosen, and said in the module of the case. All are in `problems/cases`.
+Most come from papers; what these leave open is chosen, and said in the module of the case. Both re-entries after Betts have one objective.
+All are in `problems/cases`.
 
 {grid(own)}
 

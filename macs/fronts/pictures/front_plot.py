@@ -211,11 +211,11 @@ def _mark_extremes(front: Any, ax: Any) -> None:
 
 def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
     """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
-    feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
+    feasible or not verified may lie beyond the ends of the axes, which are those of the others, if there are two or more."""
     import matplotlib
 
     F, values, (good, apart, infeasible) = front.F, front.objectives, kinds(front)
-    finite = np.where(np.isfinite(F) & (good | (not good.any()))[:, None], F, np.nan)
+    finite = np.where(np.isfinite(F) & (good | (good.sum() < 2))[:, None], F, np.nan)
     if len(front) and not np.isnan(finite).all():
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:

@@ -88,3 +88,9 @@ def test_a_shorter_trajectory_is_above_a_longer_one():
     ax = front.plot_trajectories([short, long])[0]
     lines = [to_hex(line.get_color()).upper() for line in ax.lines if line.get_linestyle() == "-"]
     assert lines.index(COLORS[1]) < lines.index(COLORS[0])
+
+
+def test_parallel_coordinates_of_one_verified_point_have_a_range():
+    F = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 4.0, 2.0, 3.0], [3.0, 2.0, 4.0, 1.0]])
+    ax = marked(black_box(3, 4, F=F), [False, True, False]).plot()
+    assert [text.get_text() for text in ax.texts] == ["0", "3", "0", "4", "0", "4", "0", "3"]
